@@ -1,0 +1,89 @@
+# ssdgs.h: `make help` lists what there is. CC=anything, CFLAGS and BUILD can be set; STRICT=1 turns warnings into errors.
+CFLAGS ?= -O2
+CXX ?= c++
+BUILD = build
+ITERATIONS = 3000
+LDLIBS = -lm -lpthread
+WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
+STRICT_1 = $(WARNINGS) -Wstrict-prototypes -Wmissing-prototypes
+COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT))
+
+HEADERS = ssdgs.h examples/olat.h tests/test.h
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal
+SOURCES = $(wildcard tests/t_*.c)
+IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
+TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
+	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme
+DEMO = $(BUILD)/demo
+
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal
+
+demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=3000), relights it into build/demo
+	@mkdir -p $(DEMO)
+	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
+	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
+	  --out $(DEMO) --sheet $(DEMO)/sheet.png
+
+# Each program closes with "N passed, N failed"; one that does not counts as one failed.
+test: $(TESTS) $(EXAMPLES) ## every test; SSDGS_GOLDEN=folder reads the golden files there
+	@passed=0; failed=0; for t in $(TESTS) builds; do \
+	  echo "== $$t"; log=$(BUILD)/$${t##*/}.log; \
+	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; *) $$t;; esac >$$log 2>&1; code=$$?; \
+	  cat $$log; p=0; f=1; \
+	  line=$$(sed -n '$$s/^\([0-9][0-9]*\) passed, \([0-9][0-9]*\) failed$$/p=\1 f=\2/p' $$log); \
+	  if [ -n "$$line" ]; then eval "$$line"; fi; \
+	  if [ $$code -ne 0 ] && [ $$f -eq 0 ]; then f=1; fi; \
+	  if [ $$code -ne 0 ]; then echo "$$t: exit $$code"; fi; \
+	  passed=$$((passed + p)); failed=$$((failed + f)); \
+	done; echo "$$passed passed, $$failed failed"; [ $$failed -eq 0 ]
+
+test-asan: ## tests under the address sanitizer
+	$(MAKE) test BUILD=$(BUILD)/asan CFLAGS="-O1 -g -fsanitize=address -fno-omit-frame-pointer"
+test-ubsan: ## tests under the undefined-behaviour sanitizer
+	$(MAKE) test BUILD=$(BUILD)/ubsan CFLAGS="-O1 -g -fsanitize=undefined -fno-sanitize-recover=all"
+test-tsan: ## tests under the thread sanitizer
+	$(MAKE) test BUILD=$(BUILD)/tsan CFLAGS="-O1 -g -fsanitize=thread"
+test-cxx: ## tests compiled as C++
+	$(MAKE) test BUILD=$(BUILD)/cxx CC="$(CXX)"
+test-clang: ## tests with clang
+	$(MAKE) test BUILD=$(BUILD)/clang CC=clang CXX=clang++
+test-tcc: ## tests with tcc
+	$(MAKE) test BUILD=$(BUILD)/tcc CC=tcc CFLAGS=
+test-nosimd: ## tests of the scalar kernels alone
+	$(MAKE) test BUILD=$(BUILD)/nosimd CFLAGS="$(CFLAGS) -DSSDGS_NO_SIMD"
+test-native: ## tests with -march=native
+	$(MAKE) test BUILD=$(BUILD)/native CFLAGS="$(CFLAGS) -march=native"
+test-fastmath: ## tests with -ffast-math
+	$(MAKE) test BUILD=$(BUILD)/fastmath CFLAGS="$(CFLAGS) -ffast-math"
+test-c99: ## tests with -std=c99
+	$(MAKE) test BUILD=$(BUILD)/c99 CC="$(CC) -std=c99"
+
+clean: ## removes build/
+	rm -rf $(BUILD)
+help: ## this list
+	@sed -n 's/^\([a-z0-9-]*\):.*## /\1: /p' Makefile
+
+$(BUILD):
+	mkdir -p $(BUILD)
+$(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $< -o $@ $(LDLIBS)
+$(BUILD)/t_%_64: tests/t_%.c $(HEADERS) | $(BUILD)
+	$(COMPILE) -DSSDGS_REAL64 $< -o $@ $(LDLIBS)
+$(BUILD)/t_%: tests/t_%.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $< -o $@ $(LDLIBS)
+$(BUILD)/%.o: tests/%.c $(HEADERS) | $(BUILD)
+	$(COMPILE) -c $< -o $@
+$(BUILD)/multi: $(BUILD)/multi_a.o $(BUILD)/multi_b.o
+	$(COMPILE) $^ -o $@ $(LDLIBS)
+$(BUILD)/compile_c: $(BUILD)/multi_a.o $(BUILD)/compile_c.o
+	$(COMPILE) $^ -o $@ $(LDLIBS)
+# Without a C++ compiler there is nothing to check.
+$(BUILD)/compile_cpp: tests/compile_cpp.cpp tests/compile_c.c $(HEADERS) | $(BUILD)
+	if command -v $(CXX) >/dev/null; then $(CXX) $(CFLAGS) -std=c++11 $< -o $@ $(LDLIBS); \
+	else printf '#!/bin/sh\necho "$(CXX) is missing: C++ not tested"\necho "0 passed, 0 failed"\n' >$@; chmod +x $@; fi
+$(BUILD)/readme: tests/readme.c README.md $(HEADERS) | $(BUILD)
+	sed -n '/^\/\* readme example \*\//,/^```/{/^```/d;p;}' README.md >$(BUILD)/readme_example.c
+	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
+
+.PHONY: all demo test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+	test-c99 clean help

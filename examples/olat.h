@@ -1,0 +1,1327 @@
+/* olat.h - reads folders of photographs taken under one light at a time, reads and writes PNG. MIT, see ssdgs.h.
+
+   #include "ssdgs.h"
+   #include "olat.h"
+   ...
+   olat_dataset set; char error[512];
+   if (olat_load("scene", "transforms_train.json", 0, &set, error)) { puts(error); return 1; }
+   ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
+
+   KEYS      camera_angle_x, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or in a frame;
+             frames[]: file_path (+ file_ext) or img_path; transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt;
+             pl_pos or pl_dir; pl_intensity. A frame's own key wins over the top's. Distorted lenses are refused.
+   ERRORS    Functions return 0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept.
+   HOSTILE   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its links).
+   SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
+
+#ifndef OLAT_H
+#define OLAT_H
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#ifdef _WIN32
+#include <io.h>
+#include <process.h>
+#define OLAT__READ_FLAGS (O_RDONLY | O_BINARY)
+#define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
+#else
+#include <unistd.h>
+#define OLAT__READ_FLAGS (O_RDONLY | O_NONBLOCK) /* opening a FIFO must not wait for its writer */
+#define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL)
+#endif
+
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define OLAT__API static __attribute__((unused))
+#define OLAT__PRINTF(text, values) __attribute__((format(printf, text, values)))
+#else
+#define OLAT__API static
+#define OLAT__PRINTF(text, values)
+#endif
+
+enum { /* flags of olat_load */
+    OLAT_NO_IMAGES = 1,   /* a trajectory: images are neither needed nor read; sizes are w, h or 256 x 256 */
+    OLAT_ALLOW_PARENT = 2 /* image paths may contain ".." */
+};
+
+typedef struct olat_frame {
+    ssdgs_camera camera;
+    ssdgs_light light;
+    char *file;          /* folder/path of the image; NULL if the frame names none */
+    void *pixels;        /* (h,w,4) straight alpha, tightly packed; NULL without image */
+    ssdgs_pixels format;
+    int has_image;
+} olat_frame;
+
+typedef struct olat_dataset {
+    olat_frame *frames;
+    int count;
+} olat_dataset;
+
+enum {
+    OLAT__MAX_SIDE = 1 << 15, OLAT__MAX_PIXELS = 1 << 28, OLAT__MAX_FILE = 0x7fffffff, OLAT__MAX_PATH = 4096,
+    OLAT__MAX_DEPTH = 64, OLAT__MAX_NODES = 1 << 24, OLAT__MAX_STRING = 1 << 20, OLAT__MAX_FRAMES = 1 << 20
+};
+
+/* ==== errors and files ==== */
+
+OLAT__PRINTF(2, 3) static int olat__fail(char *error, const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    vsnprintf(error, 512, format, list);
+    va_end(list);
+    for (; *error; error++) { /* names come from files and must not steer a terminal */
+        if ((unsigned char)*error < 32 || *error == 127) *error = '?';
+    }
+    return 1;
+}
+
+/* The end of a path, which tells more than its beginning where room is short. */
+static const char *olat__tail(const char *path) {
+    size_t length = strlen(path);
+    return length > 160 ? path + (length - 160) : path;
+}
+
+/* Reads a regular file whole and appends a NUL. */
+static int olat__read_file(const char *path, unsigned char **data, size_t *size, char *error) {
+    struct stat info;
+    const char *problem = NULL;
+    size_t done = 0, total = 0;
+    int file = open(path, OLAT__READ_FLAGS);
+    if (file < 0) return olat__fail(error, "%s: cannot be opened: %s", olat__tail(path), strerror(errno));
+    if (fstat(file, &info) != 0) problem = "cannot be examined";
+    else if (!S_ISREG(info.st_mode)) problem = "is not a regular file";
+    else if (info.st_size < 0 || info.st_size > OLAT__MAX_FILE) problem = "is larger than 2 GiB";
+    else if ((*data = (unsigned char *)malloc((size_t)info.st_size + 1)) == NULL) problem = "out of memory";
+    else total = (size_t)info.st_size;
+    while (!problem && done < total) {
+        size_t part = total - done < 1 << 20 ? total - done : 1 << 20;
+        long got = (long)read(file, *data + done, (unsigned)part);
+        if (got > 0) done += (size_t)got;
+        else if (got == 0 || errno != EINTR) problem = got == 0 ? "ended while it was read" : "cannot be read";
+    }
+    close(file);
+    *size = total;
+    if (!problem) (*data)[total] = 0;
+    return problem ? olat__fail(error, "%s: %s", olat__tail(path), problem) : 0;
+}
+
+/* Writes a file under a temporary name and renames it, so that path never holds half a file. */
+static int olat__write_file(const char *path, const unsigned char *data, size_t size, char *error) {
+    size_t done = 0, room = strlen(path) + 40;
+    int file = -1, attempt, reason = 0;
+    char *name = (char *)malloc(room);
+    if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
+    for (attempt = 0; file < 0 && attempt < 100 && (attempt == 0 || errno == EEXIST); attempt++) {
+        snprintf(name, room, "%s.tmp.%ld.%d", path, (long)getpid(), attempt);
+        file = open(name, OLAT__WRITE_FLAGS, 0666);
+    }
+    if (file < 0) reason = errno;
+    while (!reason && done < size) {
+        size_t part = size - done < 1 << 20 ? size - done : 1 << 20;
+        long put = (long)write(file, data + done, (unsigned)part);
+        if (put >= 0) done += (size_t)put;
+        else if (errno != EINTR) reason = errno;
+    }
+    if (file >= 0) {
+        if (close(file) != 0 && !reason) reason = errno;
+#ifdef _WIN32
+        if (!reason) remove(path); /* rename does not replace there */
+#endif
+        if (!reason && rename(name, path) != 0) reason = errno;
+        if (reason) remove(name);
+    }
+    free(name);
+    return reason ? olat__fail(error, "%s: cannot be written: %s", olat__tail(path), strerror(reason)) : 0;
+}
+
+/* ==== inflate and deflate, RFC 1950 and 1951 ==== */
+
+static const unsigned short olat__length_base[29] = {3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 17, 19, 23, 27, 31,
+                                                     35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
+static const unsigned short olat__distance_base[30] = {1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385, 513,
+                                                       769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
+static int olat__length_extra(int i) { return i < 8 || i == 28 ? 0 : i / 4 - 1; }
+static int olat__distance_extra(int i) { return i < 4 ? 0 : i / 2 - 1; }
+
+static unsigned olat__reverse(unsigned code, int length) {
+    unsigned reversed = 0;
+    for (; length > 0; length--, code >>= 1) reversed = reversed << 1 | (code & 1);
+    return reversed;
+}
+
+static uint32_t olat__adler32(const unsigned char *data, size_t size) {
+    uint32_t a = 1, b = 0;
+    while (size > 0) {
+        size_t part = size < 5552 ? size : 5552; /* the most for which b stays below 2^32 */
+        for (size -= part; part > 0; part--) b += a += *data++;
+        a %= 65521;
+        b %= 65521;
+    }
+    return b << 16 | a;
+}
+
+static uint32_t olat__be32(const unsigned char *p) {
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+static void olat__put_be32(unsigned char *p, uint32_t value) {
+    int i;
+    for (i = 0; i < 4; i++) p[i] = (unsigned char)(value >> (24 - 8 * i) & 255);
+}
+
+#define OLAT__FAST_BITS 9
+typedef struct olat__huffman {
+    uint16_t fast[1 << OLAT__FAST_BITS]; /* symbol | length << 9 of the code in the low bits; 0: a longer code, or none */
+    uint16_t count[16], symbol[288];     /* codes of each length; symbols in the order of their codes */
+} olat__huffman;
+
+typedef struct olat__inflater {
+    const unsigned char *in;
+    size_t size, at;
+    uint64_t bits; /* read but not consumed, lowest first, zeros above */
+    int count;
+    unsigned char *out;
+    size_t capacity, length;
+    const char *problem; /* the first one; readers then return harmless values and the loops end */
+    olat__huffman literals, distances;
+} olat__inflater;
+
+static int olat__bad(olat__inflater *z, const char *problem) {
+    if (!z->problem) z->problem = problem;
+    return 256;
+}
+
+/* Builds the canonical code. Incomplete sets are refused, but for the one-code and the empty distance code. */
+static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsigned char *lengths, int count, const char *problem) {
+    unsigned code[16] = {0}, offset[16] = {0}, slot;
+    int i, left = 1, used = 0;
+    memset(h, 0, sizeof *h);
+    for (i = 0; i < count; i++) h->count[lengths[i]]++;
+    h->count[0] = 0;
+    for (i = 1; i < 16; i++) {
+        left = 2 * left - h->count[i];
+        if (left < 0) break;
+        code[i] = (code[i - 1] + h->count[i - 1]) << 1;
+        offset[i] = offset[i - 1] + h->count[i - 1];
+        used += h->count[i];
+    }
+    if (left < 0 || (left > 0 && !(h == &z->distances && used <= 1 && used == h->count[1]))) {
+        olat__bad(z, problem);
+        return;
+    }
+    for (i = 0; i < count; i++) {
+        int length = lengths[i];
+        if (length == 0) continue;
+        h->symbol[offset[length]++] = (uint16_t)i;
+        slot = olat__reverse(code[length]++, length);
+        for (; length <= OLAT__FAST_BITS && slot < 1 << OLAT__FAST_BITS; slot += 1u << length) {
+            h->fast[slot] = (uint16_t)(i | length << 9);
+        }
+    }
+}
+
+static void olat__refill(olat__inflater *z) {
+    for (; z->count <= 56 && z->at < z->size; z->count += 8) z->bits |= (uint64_t)z->in[z->at++] << z->count;
+}
+
+static int olat__drop(olat__inflater *z, int n, int value) {
+    if (z->count < n) return olat__bad(z, "the data end early");
+    z->bits >>= n;
+    z->count -= n;
+    return value;
+}
+
+/* The next n <= 16 bits. */
+static int olat__take(olat__inflater *z, int n) {
+    olat__refill(z);
+    return olat__drop(z, n, (int)(z->bits & ((1u << n) - 1)));
+}
+
+static int olat__symbol(olat__inflater *z, const olat__huffman *h) {
+    int length, code = 0, first = 0, index = 0;
+    unsigned entry;
+    olat__refill(z);
+    entry = h->fast[z->bits & ((1 << OLAT__FAST_BITS) - 1)];
+    if (entry) return olat__drop(z, (int)(entry >> 9), (int)(entry & 511));
+    for (length = 1; length < 16; length++) {
+        code |= (int)(z->bits >> (length - 1) & 1);
+        if (code - first < h->count[length]) return olat__drop(z, length, h->symbol[index + code - first]);
+        index += h->count[length];
+        first = (first + h->count[length]) << 1;
+        code <<= 1;
+    }
+    return olat__bad(z, "a code that stands for nothing");
+}
+
+/* Gives whole unread bytes back to the input and drops the rest of the current one; returns how many bytes are left. */
+static size_t olat__align(olat__inflater *z) {
+    z->at -= (size_t)(z->count / 8);
+    z->bits = 0;
+    z->count = 0;
+    return z->size - z->at;
+}
+
+static void olat__stored(olat__inflater *z) {
+    size_t left = olat__align(z), length;
+    const unsigned char *p = z->in + z->at;
+    if (left < 4) olat__bad(z, "the data end early");
+    else if ((p[0] ^ p[2]) != 255 || (p[1] ^ p[3]) != 255) olat__bad(z, "a stored block's length and its complement disagree");
+    else if ((length = (size_t)(p[0] | p[1] << 8)) > left - 4) olat__bad(z, "the data end early");
+    else if (length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
+    else {
+        memcpy(z->out + z->length, p + 4, length);
+        z->at += 4 + length;
+        z->length += length;
+    }
+}
+
+/* Reads the two codes of a dynamic block, whose lengths are written in a third one. */
+static void olat__dynamic(olat__inflater *z) {
+    static const unsigned char order[19] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
+    unsigned char lengths[320] = {0};
+    int literals = 257 + olat__take(z, 5), distances = 1 + olat__take(z, 5), codes = 4 + olat__take(z, 4), i;
+    if (literals > 286 || distances > 30) olat__bad(z, "too many codes");
+    for (i = 0; i < codes && !z->problem; i++) lengths[order[i]] = (unsigned char)olat__take(z, 3);
+    if (z->problem) return;
+    olat__huffman_build(z, &z->literals, lengths, 19, "bad lengths of code lengths");
+    for (i = 0; i < literals + distances && !z->problem;) {
+        int symbol = olat__symbol(z, &z->literals), value = symbol < 16 ? symbol : 0, repeat = 1;
+        if (symbol == 16) {
+            if (i == 0) olat__bad(z, "a repeat before the first code length");
+            else value = lengths[i - 1];
+        }
+        if (symbol > 15) repeat = symbol == 18 ? 11 + olat__take(z, 7) : 3 + olat__take(z, symbol == 16 ? 2 : 3);
+        if (repeat > literals + distances - i) olat__bad(z, "too many code lengths");
+        for (; repeat > 0 && !z->problem; repeat--) lengths[i++] = (unsigned char)value;
+    }
+    if (lengths[256] == 0) olat__bad(z, "no code for the end of a block");
+    if (z->problem) return;
+    olat__huffman_build(z, &z->literals, lengths, literals, "bad literal codes");
+    olat__huffman_build(z, &z->distances, lengths + literals, distances, "bad distance codes");
+}
+
+static void olat__fixed(olat__inflater *z) {
+    unsigned char lengths[288];
+    memset(lengths, 8, 288);
+    memset(lengths + 144, 9, 112);
+    memset(lengths + 256, 7, 24);
+    olat__huffman_build(z, &z->literals, lengths, 288, "");
+    memset(lengths, 5, 32); /* 30 and 31 complete the code and are refused when met */
+    olat__huffman_build(z, &z->distances, lengths, 32, "");
+}
+
+static void olat__compressed(olat__inflater *z) {
+    while (!z->problem) {
+        int symbol = olat__symbol(z, &z->literals), length;
+        size_t distance;
+        if (symbol == 256) return;
+        if (symbol < 256) {
+            if (z->length == z->capacity) olat__bad(z, "more data than the image needs");
+            else z->out[z->length++] = (unsigned char)symbol;
+            continue;
+        }
+        symbol -= 257;
+        if (symbol > 28) {
+            olat__bad(z, "a bad length code");
+            return;
+        }
+        length = olat__length_base[symbol] + olat__take(z, olat__length_extra(symbol));
+        symbol = olat__symbol(z, &z->distances);
+        if (symbol > 29) {
+            olat__bad(z, "a bad distance code");
+            return;
+        }
+        distance = (size_t)(olat__distance_base[symbol] + olat__take(z, olat__distance_extra(symbol)));
+        if (distance > z->length) olat__bad(z, "a distance reaches before the data");
+        if ((size_t)length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
+        for (; length > 0 && !z->problem; length--, z->length++) z->out[z->length] = z->out[z->length - distance];
+    }
+}
+
+/* Unpacks a zlib stream of exactly z->capacity bytes; returns NULL or what is wrong. */
+static const char *olat__inflate(olat__inflater *z) {
+    int last = 0;
+    if (z->size < 6) return "the data end early";
+    if ((z->in[0] & 15) != 8 || z->in[0] >> 4 > 7 || (z->in[0] * 256 + z->in[1]) % 31 != 0 || (z->in[1] & 32) != 0) {
+        return "a bad zlib header";
+    }
+    for (z->at = 2; !last && !z->problem;) {
+        int type;
+        last = olat__take(z, 1);
+        type = olat__take(z, 2);
+        if (z->problem) break;
+        if (type == 3) olat__bad(z, "a block of unknown type");
+        else if (type == 0) olat__stored(z);
+        else {
+            if (type == 1) olat__fixed(z);
+            else olat__dynamic(z);
+            olat__compressed(z);
+        }
+    }
+    if (z->problem) return z->problem;
+    if (z->length < z->capacity) return "less data than the image needs";
+    if (olat__align(z) < 4) return "the data end early";
+    return olat__be32(z->in + z->at) == olat__adler32(z->out, z->length) ? NULL : "the Adler checksum is wrong";
+}
+
+typedef struct olat__deflater {
+    unsigned char *out;
+    size_t length;
+    uint64_t bits;
+    int count;
+} olat__deflater;
+
+static void olat__put(olat__deflater *z, size_t value, int n) {
+    z->bits |= (uint64_t)value << z->count;
+    for (z->count += n; z->count >= 8; z->count -= 8, z->bits >>= 8) z->out[z->length++] = (unsigned char)(z->bits & 255);
+}
+
+static void olat__put_symbol(olat__deflater *z, int symbol) {
+    int length = symbol < 144 || symbol > 279 ? 8 : symbol < 256 ? 9 : 7;
+    int code = symbol + (symbol < 144 ? 0x30 : symbol < 256 ? 0x190 - 144 : symbol < 280 ? -256 : 0xC0 - 280);
+    olat__put(z, olat__reverse((unsigned)code, length), length);
+}
+
+static unsigned olat__hash(const unsigned char *p) {
+    return ((uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16) * 2654435761u >> 17;
+}
+
+/* Packs size < 2^31 bytes into one block of fixed codes; returns the length of the zlib stream. The table holds (2, 32768)
+   zeros: the last position + 1 of each hash, and the one before of each position. Nine bits a byte are the worst case. */
+static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char *out, uint32_t *table) {
+    olat__deflater z = {out, 0, 0, 0};
+    size_t i = 0;
+    olat__put(&z, 0x0178, 16);
+    olat__put(&z, 3, 3); /* last block, fixed codes */
+    while (i < size) {
+        size_t best = 2, distance = 0, step;
+        uint32_t candidate = i + 3 <= size ? table[olat__hash(in + i)] : 0;
+        int tries, s;
+        for (tries = 0; tries < 48 && candidate && i - (candidate - 1) <= 32768; tries++) {
+            size_t from = candidate - 1, length = 0;
+            while (length < 258 && i + length < size && in[from + length] == in[i + length]) length++;
+            if (length > best) best = length, distance = i - from;
+            candidate = table[32768 + (from & 32767)];
+        }
+        step = distance ? best : 1;
+        if (distance) {
+            for (s = 28; olat__length_base[s] > best; s--) {}
+            olat__put_symbol(&z, 257 + s);
+            olat__put(&z, best - olat__length_base[s], olat__length_extra(s));
+            for (s = 29; olat__distance_base[s] > distance; s--) {}
+            olat__put(&z, olat__reverse((unsigned)s, 5), 5);
+            olat__put(&z, distance - olat__distance_base[s], olat__distance_extra(s));
+        } else olat__put_symbol(&z, in[i]);
+        for (; step > 0; step--, i++) {
+            uint32_t *head = i + 3 <= size ? &table[olat__hash(in + i)] : NULL;
+            if (!head) continue;
+            table[32768 + (i & 32767)] = *head;
+            *head = (uint32_t)i + 1;
+        }
+    }
+    olat__put_symbol(&z, 256);
+    olat__put(&z, 0, (8 - z.count) & 7);
+    olat__put_be32(out + z.length, olat__adler32(in, size));
+    return z.length + 4;
+}
+
+/* ==== PNG ==== */
+
+enum {
+    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44, OLAT__TRNS = 0x74524E53
+};
+static const unsigned char olat__signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
+
+/* The seven passes of an interlaced image, and the only one of others: first pixel and step in x and y. */
+static const unsigned char olat__passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                                                 {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}, {0, 0, 1, 1}};
+
+typedef struct olat__png {
+    int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key;
+    unsigned key[3]; /* the transparent colour */
+    unsigned char palette[256][4];
+    unsigned char *packed, *raw, *out;
+    size_t packed_size, at; /* at: where a problem is */
+    const char *unit;       /* what `at` counts */
+} olat__png;
+
+static uint32_t olat__crc32(const unsigned char *data, size_t size) {
+    uint32_t table[16], crc = 0xFFFFFFFFu, i, k; /* half a byte at a time: a table this small is made on the spot */
+    for (i = 0; i < 16; i++) {
+        for (table[i] = i, k = 0; k < 4; k++) table[i] = (table[i] & 1 ? 0xEDB88320u : 0) ^ table[i] >> 1;
+    }
+    for (; size > 0; size--) {
+        crc ^= *data++;
+        crc = table[crc & 15] ^ crc >> 4;
+        crc = table[crc & 15] ^ crc >> 4;
+    }
+    return crc ^ 0xFFFFFFFFu;
+}
+
+static const char *olat__png_header(olat__png *png, const unsigned char *data, size_t length) {
+    static const unsigned char depths[7] = {31, 0, 24, 15, 24, 0, 24}; /* bit k: depth 2^k is allowed */
+    uint32_t width, height;
+    int k = 0;
+    if (length != 13) return "IHDR is not 13 bytes long";
+    width = olat__be32(data);
+    height = olat__be32(data + 4);
+    while (k < 5 && data[8] != 1 << k) k++;
+    if (width < 1 || height < 1) return "the image has no pixels";
+    if (width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE) return "a side is longer than 32768 pixels";
+    if (height > OLAT__MAX_PIXELS / width) return "the image has more than 2^28 pixels";
+    if (data[9] > 6 || !(depths[data[9]] >> k & 1)) return "unknown combination of colour type and bit depth";
+    if (data[10] != 0 || data[11] != 0 || data[12] > 1) return "unknown compression, filter or interlace method";
+    png->width = (int)width;
+    png->height = (int)height;
+    png->depth = data[8];
+    png->color = data[9];
+    png->channels = png->color == 3 ? 1 : 1 + (png->color & 2) + (png->color >> 2);
+    png->first_pass = data[12] ? 0 : 7;
+    png->end_pass = data[12] ? 7 : 8;
+    return NULL;
+}
+
+static const char *olat__png_palette(olat__png *png, const unsigned char *data, size_t length) {
+    size_t i;
+    if (length % 3 != 0 || length < 3 || length > 768) return "PLTE has a bad length";
+    if (png->color == 3 && length / 3 > (size_t)1 << png->depth) return "PLTE is longer than the bit depth allows";
+    png->palette_size = (int)(length / 3);
+    for (i = 0; i < 4 * (length / 3); i++) png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
+    return NULL;
+}
+
+static const char *olat__png_transparency(olat__png *png, const unsigned char *data, size_t length) {
+    size_t i;
+    if (png->color & 4) return "tRNS in an image with alpha";
+    if (png->color == 3 ? length < 1 || length > (size_t)png->palette_size : length != 2 * (size_t)png->channels) {
+        return "tRNS has a bad length";
+    }
+    png->has_key = 1;
+    for (i = 0; png->color == 3 && i < length; i++) png->palette[i][3] = data[i];
+    for (i = 0; png->color != 3 && i < length / 2; i++) { /* bits beyond the depth mean nothing */
+        png->key[i] = (unsigned)(data[2 * i] << 8 | data[2 * i + 1]) & ((1u << png->depth) - 1);
+    }
+    return NULL;
+}
+
+/* Walks over the chunks: fills the header and the palette, and gathers the compressed data in png->packed. */
+static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, size_t size) {
+    enum { START, HEADER, DATA, AFTER } stage = START;
+    if (size < 8 || memcmp(bytes, olat__signature, 8) != 0) return "this is not a PNG file";
+    for (png->at = 8;;) {
+        const unsigned char *chunk = bytes + png->at, *data = chunk + 8;
+        size_t left = size - png->at, length = left < 12 ? 0 : olat__be32(chunk);
+        const char *problem = NULL;
+        uint32_t type;
+        if (left < 12 || length > left - 12) return "the file ends early";
+        type = olat__be32(chunk + 4);
+        if (stage == START && type != OLAT__IHDR) return "the first chunk is not IHDR";
+        if ((!(chunk[4] & 32) || type == OLAT__TRNS) && olat__be32(data + length) != olat__crc32(chunk + 4, length + 4)) {
+            return "the chunk's CRC is wrong";
+        }
+        if (stage == DATA && type != OLAT__IDAT) stage = AFTER;
+        if (type == OLAT__IHDR) {
+            problem = stage != START ? "a second IHDR" : olat__png_header(png, data, length);
+            stage = HEADER;
+        } else if (type == OLAT__PLTE) {
+            problem = stage != HEADER || png->palette_size ? "PLTE is out of place" : olat__png_palette(png, data, length);
+        } else if (type == OLAT__TRNS) {
+            problem = stage != HEADER || png->has_key ? "tRNS is out of place" : olat__png_transparency(png, data, length);
+        } else if (type == OLAT__IDAT) {
+            if (stage == AFTER) return "IDAT chunks are not consecutive";
+            if (png->color == 3 && !png->palette_size) return "PLTE is missing";
+            memcpy(png->packed + png->packed_size, data, length);
+            png->packed_size += length;
+            stage = DATA;
+        } else if (type == OLAT__IEND) {
+            return stage < DATA ? "IDAT is missing" : length ? "IEND is not empty" : NULL;
+        } else if (!(chunk[4] & 32)) return "unknown critical chunk";
+        if (problem) return problem;
+        png->at += 12 + length;
+    }
+}
+
+/* What a filter expects a byte to be, from the row above (NULL: none) and the byte `back` to the left. */
+static int olat__predict(int filter, const unsigned char *row, const unsigned char *above, size_t i, size_t back) {
+    int a = i < back ? 0 : row[i - back], b = above ? above[i] : 0, c = above && i >= back ? above[i - back] : 0;
+    int pa = abs(b - c), pb = abs(a - c), pc = abs(a + b - 2 * c);
+    switch (filter) {
+    case 1: return a;
+    case 2: return b;
+    case 3: return (a + b) >> 1;
+    case 4: return pa <= pb && pa <= pc ? a : pb <= pc ? b : c;
+    default: return 0;
+    }
+}
+
+/* Size of a pass: pixels and the bytes of a row without its filter byte. */
+static size_t olat__png_pass(const olat__png *png, int pass, int *width, int *height) {
+    const unsigned char *p = olat__passes[pass];
+    *width = (png->width - p[0] + p[2] - 1) / p[2];
+    *height = *width > 0 ? (png->height - p[1] + p[3] - 1) / p[3] : 0;
+    return ((size_t)*width * (size_t)(png->channels * png->depth) + 7) / 8;
+}
+
+/* Writes a row of samples to every step-th pixel of the output from pixel `to` on. */
+static const char *olat__png_row(const olat__png *png, const unsigned char *row, int count, size_t to, size_t step) {
+    const unsigned opaque = (1u << png->depth) - 1;
+    const int second = png->color & 2 ? 1 : 0, third = 2 * second;
+    size_t i = 0;
+    int c;
+    for (; count > 0; count--, to += step) {
+        unsigned s[4] = {0, 0, 0, 0}, rgba[4];
+        for (c = 0; c < png->channels; c++, i++) {
+            size_t bit = i * (size_t)png->depth;
+            if (png->depth == 16) s[c] = (unsigned)(row[2 * i] << 8 | row[2 * i + 1]);
+            else s[c] = (unsigned)row[bit >> 3] >> (8 - png->depth - (int)(bit & 7)) & opaque;
+        }
+        if (png->color == 3) {
+            if (s[0] >= (unsigned)png->palette_size) return "an index beyond the palette";
+            memcpy(png->out + 4 * to, png->palette[s[0]], 4);
+            continue;
+        }
+        rgba[0] = s[0];
+        rgba[1] = s[second];
+        rgba[2] = s[third];
+        rgba[3] = png->color & 4 ? s[png->channels - 1] : opaque;
+        if (png->has_key && s[0] == png->key[0] && s[second] == png->key[second] && s[third] == png->key[third]) rgba[3] = 0;
+        for (c = 0; c < 4; c++) {
+            uint16_t wide = (uint16_t)rgba[c];
+            if (png->depth == 16) memcpy(png->out + 8 * to + 2 * c, &wide, 2);
+            else png->out[4 * to + (size_t)c] = (unsigned char)(rgba[c] * (255 / opaque));
+        }
+    }
+    return NULL;
+}
+
+/* Undoes the filters of png->raw in place and spreads its rows over png->out. */
+static const char *olat__png_unfilter(olat__png *png) {
+    const size_t back = (size_t)(png->channels * png->depth + 7) / 8;
+    unsigned char *row = png->raw;
+    const char *problem = NULL;
+    int pass, width, height, y;
+    for (pass = png->first_pass; pass < png->end_pass; pass++) {
+        const unsigned char *p = olat__passes[pass], *above = NULL;
+        size_t bytes = olat__png_pass(png, pass, &width, &height), i;
+        for (y = 0; y < height && !problem; y++, above = row, row += bytes) {
+            int filter = *row++;
+            png->at = (size_t)(row - png->raw) - 1;
+            if (filter > 4) return "unknown filter";
+            for (i = 0; filter && i < bytes; i++) {
+                row[i] = (unsigned char)((row[i] + olat__predict(filter, row, above, i, back)) & 255);
+            }
+            problem = olat__png_row(png, row, width, (size_t)(p[1] + y * p[3]) * (size_t)png->width + p[0], p[2]);
+        }
+    }
+    return problem;
+}
+
+/* Leaves the pixels in png->out; returns NULL or what is wrong. */
+static const char *olat__png_read(olat__png *png, const unsigned char *bytes, size_t size) {
+    olat__inflater z;
+    const char *problem;
+    uint64_t raw_size = 0, out_size;
+    int pass, width, height;
+    png->unit = "byte";
+    if ((png->packed = (unsigned char *)malloc(size + 1)) == NULL) return "out of memory";
+    if ((problem = olat__png_chunks(png, bytes, size)) != NULL) return problem;
+    for (pass = png->first_pass; pass < png->end_pass; pass++) {
+        size_t row = olat__png_pass(png, pass, &width, &height);
+        raw_size += (uint64_t)height * (row + 1);
+    }
+    out_size = (uint64_t)png->width * (uint64_t)png->height * (png->depth == 16 ? 8 : 4);
+    png->unit = "byte of the compressed data";
+    png->at = png->packed_size;
+    if (raw_size / 1032 > png->packed_size) return "less data than the image needs"; /* deflate packs no better */
+    if (raw_size > SIZE_MAX || out_size > SIZE_MAX) return "out of memory";
+    png->raw = (unsigned char *)malloc((size_t)raw_size);
+    png->out = (unsigned char *)malloc((size_t)out_size);
+    if (!png->raw || !png->out) return "out of memory";
+    memset(&z, 0, sizeof z);
+    z.in = png->packed;
+    z.size = png->packed_size;
+    z.out = png->raw;
+    z.capacity = (size_t)raw_size;
+    problem = olat__inflate(&z);
+    png->at = z.at;
+    if (problem) return problem;
+    png->unit = "byte of the unpacked data";
+    return olat__png_unfilter(png);
+}
+
+static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width, int *height,
+                            ssdgs_pixels *format, void **pixels, char *error) {
+    olat__png png;
+    const char *problem;
+    memset(&png, 0, sizeof png);
+    problem = olat__png_read(&png, bytes, size);
+    free(png.packed);
+    free(png.raw);
+    if (problem) free(png.out);
+    *width = problem ? 0 : png.width;
+    *height = problem ? 0 : png.height;
+    *format = png.depth == 16 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
+    *pixels = problem ? NULL : png.out;
+    return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at, problem) : 0;
+}
+
+/* Decodes a PNG of any kind into (h,w,4) straight RGBA, 16 bits if the file has 16. free() the pixels. */
+OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height, ssdgs_pixels *format,
+                              void **pixels, char error[512]) {
+    return olat__png_decode("PNG", bytes, size, width, height, format, pixels, error);
+}
+
+/* The same from a file. */
+OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, char error[512]) {
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    int failed;
+    *pixels = NULL;
+    failed = olat__read_file(path, &bytes, &size, error) ||
+             olat__png_decode(path, bytes, size, width, height, format, pixels, error);
+    free(bytes);
+    return failed;
+}
+
+/* Filters a row into out: the filter byte, then the differences. Takes the filter whose differences are smallest. */
+static void olat__filter_row(const unsigned char *row, const unsigned char *above, size_t bytes, size_t back, unsigned char *out) {
+    uint64_t best = UINT64_MAX;
+    int turn, chosen = 0;
+    for (turn = 0; turn < 6; turn++) { /* five to measure, one to write */
+        uint64_t sum = 0;
+        size_t i;
+        out[0] = (unsigned char)(turn < 5 ? turn : chosen);
+        for (i = 0; i < bytes; i++) {
+            out[1 + i] = (unsigned char)((row[i] - olat__predict(out[0], row, above, i, back)) & 255);
+            sum += out[1 + i] < 128 ? out[1 + i] : 256u - out[1 + i];
+        }
+        if (sum < best) best = sum, chosen = turn;
+    }
+}
+
+/* Completes a chunk whose length bytes of data are in place already at p + 8; returns where the next one starts. */
+static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t length) {
+    olat__put_be32(p, (uint32_t)length);
+    olat__put_be32(p + 4, type);
+    olat__put_be32(p + 8 + length, olat__crc32(p + 4, length + 4));
+    return p + 12 + length;
+}
+
+/* Writes (h,w,channels) bytes as PNG: 1 grey, 3 RGB, 4 RGBA. The file appears whole or not at all. */
+OLAT__API int olat_write_png(const char *path, int width, int height, int channels, const unsigned char *pixels, char error[512]) {
+    const size_t row = (size_t)width * (size_t)channels, raw_size = (size_t)height * (row + 1);
+    unsigned char *raw, *file, *p;
+    uint32_t *table;
+    int y, failed;
+    if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE || height > OLAT__MAX_PIXELS / width ||
+        (channels != 1 && channels != 3 && channels != 4)) {
+        return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels", olat__tail(path), width, height, channels);
+    }
+    raw = (unsigned char *)malloc(raw_size);
+    file = (unsigned char *)malloc(raw_size + raw_size / 8 + 128); /* nine bits a byte, and the chunks */
+    table = (uint32_t *)calloc(65536, sizeof *table);
+    if (raw && file && table) {
+        for (y = 0; y < height; y++) {
+            const unsigned char *from = pixels + (size_t)y * row;
+            olat__filter_row(from, y ? from - row : NULL, row, (size_t)channels, raw + (size_t)y * (row + 1));
+        }
+        memcpy(file, olat__signature, 8);
+        p = file + 8;
+        memset(p + 16, 0, 5);
+        olat__put_be32(p + 8, (uint32_t)width);
+        olat__put_be32(p + 12, (uint32_t)height);
+        p[16] = 8;
+        p[17] = (unsigned char)(channels == 1 ? 0 : channels == 3 ? 2 : 6);
+        p = olat__put_chunk(p, OLAT__IHDR, 13);
+        p = olat__put_chunk(p, OLAT__IDAT, olat__deflate(raw, raw_size, p + 8, table));
+        p = olat__put_chunk(p, OLAT__IEND, 0);
+        failed = olat__write_file(path, file, (size_t)(p - file), error);
+    } else failed = olat__fail(error, "%s: out of memory", olat__tail(path));
+    free(raw);
+    free(file);
+    free(table);
+    return failed;
+}
+
+/* ==== JSON ==== */
+
+typedef enum olat__type { OLAT__NULL, OLAT__FALSE, OLAT__TRUE, OLAT__NUMBER, OLAT__STRING, OLAT__ARRAY, OLAT__OBJECT } olat__type;
+
+typedef struct olat__node {
+    const char *key, *text; /* key of a member, value of a string; decoded in place, NUL appended; NULL if none */
+    double number;
+    size_t key_length, text_length;
+    olat__type type;
+    int line, parent, child, next, index, size; /* child: the first; next: the sibling; 0 = none, since node 0 is the root */
+} olat__node;
+
+typedef struct olat__json {
+    char *path, *error, *text, *at, *end;
+    olat__node *nodes;
+    int count, capacity, line, where, failed; /* where: the node being parsed; failed: error holds a message, the first one */
+} olat__json;
+
+/* Records the first failure: file, line, keys from the root to the node, message. Returns 0, which callers pass on. */
+OLAT__PRINTF(3, 4) static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
+    const olat__node *chain[OLAT__MAX_DEPTH + 1], *n;
+    char keys[160] = "", what[160];
+    size_t used = 0;
+    int depth = 0;
+    va_list list;
+    if (j->failed) return 0;
+    va_start(list, format);
+    vsnprintf(what, sizeof what, format, list);
+    va_end(list);
+    for (n = node; n->parent >= 0; n = &j->nodes[n->parent]) chain[depth++] = n;
+    while (depth-- > 0 && used < sizeof keys) {
+        n = chain[depth];
+        if (n->key) snprintf(keys + used, sizeof keys - used, "%s%.60s", used ? "." : "", n->key);
+        else snprintf(keys + used, sizeof keys - used, "[%d]", n->index);
+        used = strlen(keys);
+    }
+    j->failed = olat__fail(j->error, "%s: line %d: %s%s%s", olat__tail(j->path), node->line, keys, used ? ": " : "", what);
+    return 0;
+}
+
+static int olat__is_digit(char c) { return c >= '0' && c <= '9'; }
+
+static int olat__same_letters(const char *text, const char *lower, size_t length) {
+    size_t i = 0;
+    while (i < length && (text[i] >= 'A' && text[i] <= 'Z' ? text[i] + 32 : text[i]) == lower[i]) i++;
+    return i == length;
+}
+
+/* Reads the JSON number at text; returns its length, 0 if there is none. strtod is given whole digits and an exponent, which
+   read the same in every locale, and today's C libraries round them correctly. 767 digits decide every double: of those
+   beyond 780 it matters only whether one is not zero. */
+static size_t olat__parse_number(const char *text, double *value) {
+    enum { KEPT = 780 };
+    char digits[KEPT + 32];
+    const char *p = text + (*text == '-');
+    int kept = 0, sticky = 0, point = 0, negative;
+    int64_t exponent = 0, written = 0;
+    if (!olat__is_digit(*p) || (*p == '0' && olat__is_digit(p[1]))) return 0;
+    for (; olat__is_digit(*p) || (*p == '.' && !point && olat__is_digit(p[1])); p++) {
+        if (*p == '.') point = 1;
+        else if (kept < KEPT) {
+            if (kept || *p != '0') digits[kept++] = *p;
+            exponent -= point;
+        } else {
+            sticky |= *p != '0';
+            exponent += !point;
+        }
+    }
+    if (*p == '.') return 0;
+    if (*p == 'e' || *p == 'E') {
+        negative = p[1] == '-';
+        p += p[1] == '-' || p[1] == '+' ? 2 : 1;
+        if (!olat__is_digit(*p)) return 0;
+        for (; olat__is_digit(*p); p++) written = written < 1000000000000 ? 10 * written + (*p - '0') : written;
+        exponent += negative ? -written : written;
+    }
+    exponent = exponent > 99999 ? 99999 : exponent < -99999 ? -99999 : exponent;
+    if (kept == 0) digits[kept++] = '0';
+    snprintf(digits + kept, sizeof digits - (size_t)kept, "%se%d", sticky ? "1" : "", (int)exponent - sticky);
+    *value = strtod(digits, NULL);
+    if (*text == '-') *value = -*value;
+    return (size_t)(p - text);
+}
+
+/* Length of the UTF-8 sequence at p, 0 if it is malformed. A NUL ends every text, so nothing beyond it is read. */
+static int olat__utf8_length(const char *p) {
+    unsigned c = (unsigned char)p[0], code;
+    int i, n = c < 0x80 ? 1 : c < 0xC2 ? 0 : c < 0xE0 ? 2 : c < 0xF0 ? 3 : c < 0xF5 ? 4 : 0;
+    for (i = 1, code = c & (0xFFu >> (n + 1)); i < n; i++) {
+        if (((unsigned char)p[i] & 0xC0) != 0x80) return 0;
+        code = code << 6 | ((unsigned char)p[i] & 0x3F);
+    }
+    if (n == 3 && (code < 0x800 || (code >= 0xD800 && code <= 0xDFFF))) return 0;
+    return n == 4 && (code < 0x10000 || code > 0x10FFFF) ? 0 : n;
+}
+
+/* The value of "\uXXXX" at p, 0xFFFFFFFF if there is none. */
+static uint32_t olat__hex_escape(const char *p) {
+    uint32_t code = 0;
+    int i;
+    if (p[0] != '\\' || p[1] != 'u') return 0xFFFFFFFFu;
+    for (i = 2; i < 6; i++) {
+        char letter = (char)(p[i] | 32);
+        if (!olat__is_digit(p[i]) && (letter < 'a' || letter > 'f')) return 0xFFFFFFFFu;
+        code = code << 4 | (uint32_t)(olat__is_digit(p[i]) ? p[i] - '0' : letter - 'a' + 10);
+    }
+    return code;
+}
+
+/* Decodes the escape at p, surrogate pairs included; returns its length, 0 if it is malformed. */
+static int olat__escape(const char *p, uint32_t *code) {
+    static const char names[] = "\"\\/bfnrt", values[] = "\"\\/\b\f\n\r\t";
+    const char *name = p[1] ? strchr(names, p[1]) : NULL;
+    uint32_t low;
+    *code = name ? (uint32_t)values[name - names] : olat__hex_escape(p);
+    if (name) return 2;
+    if (*code < 0xD800 || (*code > 0xDFFF && *code <= 0xFFFF)) return 6;
+    if (*code > 0xDBFF || (low = olat__hex_escape(p + 6)) < 0xDC00 || low > 0xDFFF) return 0;
+    *code = 0x10000 + ((*code - 0xD800) << 10) + (low - 0xDC00);
+    return 12;
+}
+
+/* Decodes the string at j->at in place: no escape is shorter than what it stands for. */
+static const char *olat__json_string(olat__json *j, const char **text, size_t *length) {
+    char *start = ++j->at, *out = start;
+    while (*j->at != '"') {
+        uint32_t code;
+        int n = *j->at == '\\' ? olat__escape(j->at, &code) : olat__utf8_length(j->at);
+        if (j->at == j->end) return "the file ends inside a string";
+        if ((unsigned char)*j->at < 32) return "a control character inside a string";
+        if (n == 0) return *j->at == '\\' ? "a bad escape inside a string" : "a string is not UTF-8";
+        if (out - start > OLAT__MAX_STRING) return "a string is longer than 2^20 bytes";
+        if (*j->at != '\\') {
+            for (; n > 0; n--) *out++ = *j->at++;
+            continue;
+        }
+        j->at += n;
+        n = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3; /* bytes after the first */
+        *out++ = (char)(unsigned char)(n ? (0xF00u >> n & 0xFF) | code >> 6 * n : code);
+        while (n-- > 0) *out++ = (char)(unsigned char)(0x80 | (code >> 6 * n & 0x3F));
+    }
+    j->at++;
+    *out = 0;
+    *text = start;
+    *length = (size_t)(out - start);
+    return NULL;
+}
+
+static const char *olat__json_scalar(olat__json *j, olat__node *node) {
+    static const char *const words[] = {"null", "false", "true"};
+    const char *letters = j->at + (*j->at == '-');
+    size_t i, length;
+    uint64_t bits;
+    node->type = OLAT__STRING;
+    if (*j->at == '"') return olat__json_string(j, &node->text, &node->text_length);
+    for (i = 0; i < 3; i++) {
+        if (strncmp(j->at, words[i], strlen(words[i])) != 0) continue;
+        node->type = (olat__type)i;
+        j->at += strlen(words[i]);
+        return NULL;
+    }
+    node->type = OLAT__NUMBER;
+    if ((length = olat__parse_number(j->at, &node->number)) > 0) {
+        j->at += length;
+        memcpy(&bits, &node->number, sizeof bits); /* -ffast-math takes infinity for impossible */
+        return (bits >> 52 & 0x7ff) == 0x7ff ? "the number is too large" : NULL;
+    }
+    if (olat__same_letters(letters, "nan", 3) || olat__same_letters(letters, "inf", 3)) {
+        return "NaN and Infinity are not JSON: whatever wrote this file computed a number that is not finite";
+    }
+    return j->at == j->end ? "the file ends early" : "a value was expected";
+}
+
+static void olat__skip_space(olat__json *j) {
+    for (; *j->at == ' ' || *j->at == '\t' || *j->at == '\n' || *j->at == '\r'; j->at++) j->line += *j->at == '\n';
+}
+
+/* Appends a node to the container, after its child `last` (0: none yet); returns its index, -1 when no more fit. */
+static int olat__json_add(olat__json *j, int container, int last) {
+    olat__node *node;
+    if (j->count == j->capacity) {
+        int capacity = j->capacity ? 2 * j->capacity : 256;
+        node = capacity > OLAT__MAX_NODES ? NULL : (olat__node *)realloc(j->nodes, (size_t)capacity * sizeof *node);
+        if (!node) return -1;
+        j->nodes = node;
+        j->capacity = capacity;
+    }
+    node = &j->nodes[j->count];
+    memset(node, 0, sizeof *node);
+    node->parent = container;
+    if (container >= 0) node->index = j->nodes[container].size++;
+    if (last) j->nodes[last].next = j->count;
+    else if (container >= 0) j->nodes[container].child = j->count;
+    return j->count++;
+}
+
+/* Parses everything into j->nodes; returns NULL or what is wrong at j->where. */
+static const char *olat__json_values(olat__json *j) {
+    int last[OLAT__MAX_DEPTH + 1] = {0}, depth = 0, container = -1; /* last: the newest child of every open container */
+    for (;;) { /* a value each time */
+        const char *problem;
+        olat__node *node;
+        int self, is_member = container >= 0 && j->nodes[container].type == OLAT__OBJECT;
+        if (is_member && *j->at != '"') return "a key was expected";
+        self = olat__json_add(j, container, last[depth]);
+        if (self < 0) return "out of memory, or more than 2^24 values";
+        last[depth] = self;
+        node = &j->nodes[self];
+        if (is_member) {
+            j->where = container;
+            if ((problem = olat__json_string(j, &node->key, &node->key_length)) != NULL) return problem;
+            olat__skip_space(j);
+            if (*j->at != ':') return "':' was expected";
+            j->at++;
+            olat__skip_space(j);
+        }
+        j->where = self;
+        node->line = j->line;
+        if (*j->at == '[' || *j->at == '{') {
+            node->type = *j->at == '[' ? OLAT__ARRAY : OLAT__OBJECT;
+            if (depth == OLAT__MAX_DEPTH) return "more than 64 levels";
+            last[++depth] = 0;
+            container = self;
+            j->at++;
+            olat__skip_space(j);
+            if (*j->at != (node->type == OLAT__ARRAY ? ']' : '}')) continue;
+        } else if ((problem = olat__json_scalar(j, node)) != NULL) return problem;
+        for (;; j->at++) { /* then closing brackets, up to a comma or the end */
+            olat__skip_space(j);
+            if (depth == 0) return j->at == j->end ? NULL : "text after the end of the value";
+            if (*j->at == ',') break;
+            if (j->at == j->end) return "the file ends early";
+            if (*j->at != (j->nodes[container].type == OLAT__ARRAY ? ']' : '}')) return "a comma or closing bracket was expected";
+            j->where = container;
+            container = j->nodes[container].parent;
+            depth--;
+        }
+        j->at++;
+        olat__skip_space(j);
+    }
+}
+
+static int olat__compare_keys(const void *a, const void *b) {
+    const olat__node *x = *(const olat__node *const *)a, *y = *(const olat__node *const *)b;
+    int order = x->key_length == y->key_length ? memcmp(x->key, y->key, x->key_length) : x->key_length < y->key_length ? -1 : 1;
+    return order ? order : x->index - y->index;
+}
+
+static void olat__json_duplicates(olat__json *j) {
+    const olat__node **keys = (const olat__node **)malloc((size_t)j->count * sizeof *keys);
+    int i, k, child;
+    if (!keys) olat__json_fail(j, j->nodes, "out of memory");
+    for (i = 0; i < j->count && !j->failed; i++) {
+        if (j->nodes[i].type != OLAT__OBJECT) continue;
+        for (k = 0, child = j->nodes[i].child; child; child = j->nodes[child].next) keys[k++] = &j->nodes[child];
+        qsort(keys, (size_t)k, sizeof *keys, olat__compare_keys);
+        for (k--; k > 0; k--) {
+            size_t length = keys[k]->key_length;
+            if (length != keys[k - 1]->key_length || memcmp(keys[k]->key, keys[k - 1]->key, length) != 0) continue;
+            olat__json_fail(j, keys[k], "the key appears twice");
+        }
+    }
+    free(keys);
+}
+
+/* Parses j->text .. j->end, NUL-terminated; j->failed tells. */
+static void olat__json_parse(olat__json *j) {
+    const char *problem;
+    j->line = 1;
+    j->at = j->text + (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
+    olat__skip_space(j);
+    if ((problem = olat__json_values(j)) == NULL) olat__json_duplicates(j);
+    else if (!j->nodes) j->failed = olat__fail(j->error, "%s: %s", olat__tail(j->path), problem);
+    else {
+        j->nodes[j->where].line = j->line;
+        olat__json_fail(j, &j->nodes[j->where], "%s", problem);
+    }
+}
+
+/* ==== the dataset: after a failure readers return 0 and go on, since only the first one is reported ==== */
+
+static const olat__node *olat__find(const olat__json *j, const olat__node *object, const char *key) {
+    size_t length = strlen(key);
+    int i = object->child;
+    while (i && (j->nodes[i].key_length != length || memcmp(j->nodes[i].key, key, length) != 0)) i = j->nodes[i].next;
+    return i ? &j->nodes[i] : NULL;
+}
+
+/* Reads an array of count numbers; a single one may stand without brackets. Their limit keeps float arithmetic finite. */
+static int olat__numbers(olat__json *j, const olat__node *node, int count, double *out) {
+    const olat__node *n = node->type == OLAT__ARRAY && node->child ? &j->nodes[node->child] : node;
+    int i;
+    if (node->type == OLAT__ARRAY ? node->size != count : count != 1) {
+        return olat__json_fail(j, node, "%d number%s expected", count, count == 1 ? " was" : "s in an array were");
+    }
+    for (i = 0; i < count; i++, n = &j->nodes[n->next]) {
+        if (n->type != OLAT__NUMBER) return olat__json_fail(j, n, "a number was expected");
+        if (fabs(n->number) > 1e15) return olat__json_fail(j, n, "the number is out of range");
+        out[i] = n->number;
+    }
+    return 1;
+}
+
+/* The same for the member `key`; 0 if it is absent. */
+static int olat__get(olat__json *j, const olat__node *object, const char *key, int count, double *out) {
+    const olat__node *node = olat__find(j, object, key);
+    return node && olat__numbers(j, node, count, out);
+}
+
+static double olat__dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent. The axes must be
+   a rotation times a scale, and become exactly a rotation: rounded files then cannot shear the image. */
+static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale, double axes[3][3],
+                          double origin[3]) {
+    const olat__node *node = olat__find(j, object, key), *row;
+    double y[3], scale2 = 1, along, x_length, z_length;
+    int columns, i, k;
+    if (!node) return 0;
+    row = &j->nodes[node->child];
+    columns = row->size;
+    if (node->type != OLAT__ARRAY || columns < 3 || columns > 4 || node->size < 3 || node->size > columns) {
+        return olat__json_fail(j, node, "a matrix of 3 x 3, 3 x 4 or 4 x 4 numbers was expected");
+    }
+    for (i = 0; i < node->size; i++, row = &j->nodes[row->next]) {
+        double v[4] = {0, 0, 0, 0};
+        if (!olat__numbers(j, row, columns, v)) return 0;
+        for (k = 0; k < 3 && i < 3; k++) axes[k][i] = v[k];
+        if (i < 3) origin[i] = v[3];
+        else if (olat__dot(v, v) > 1e-12 || fabs(v[3] - 1) > 1e-6) return olat__json_fail(j, row, "this row must be 0 0 0 1");
+    }
+    if (any_scale) scale2 = (olat__dot(axes[0], axes[0]) + olat__dot(axes[1], axes[1]) + olat__dot(axes[2], axes[2])) / 3;
+    for (i = 0; i < 9; i++) {
+        if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 1e-3) continue;
+        return olat__json_fail(j, node, "the 3 x 3 part is not a rotation%s", any_scale ? " times a scale" : "");
+    }
+    z_length = sqrt(olat__dot(axes[2], axes[2]));
+    for (k = 0; k < 3; k++) axes[2][k] /= z_length;
+    along = olat__dot(axes[0], axes[2]);
+    for (k = 0; k < 3; k++) axes[0][k] -= along * axes[2][k];
+    x_length = sqrt(olat__dot(axes[0], axes[0]));
+    for (k = 0; k < 3; k++) axes[0][k] /= x_length;
+    for (k = 0; k < 3; k++) y[k] = axes[2][(k + 1) % 3] * axes[0][(k + 2) % 3] - axes[2][(k + 2) % 3] * axes[0][(k + 1) % 3];
+    if (olat__dot(y, axes[1]) < 0) return olat__json_fail(j, node, "the matrix mirrors: its determinant is negative");
+    memcpy(axes[1], y, sizeof y);
+    return 1;
+}
+
+typedef struct olat__lens {
+    double angle, fx, fy, cx, cy; /* 0 = not given; an angle replaces focal lengths */
+    int w, h, has_centre;
+} olat__lens;
+
+/* Reads what the object says about the lens over what is there already. */
+static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens *lens) {
+    static const char *const distortion[] = {"k1", "k2", "k3", "k4", "p1", "p2"};
+    double v[4];
+    int i, has_cx, has_cy;
+    for (i = 0; i < 6; i++) {
+        if (olat__get(j, object, distortion[i], 1, v) && fabs(v[0]) > 0) {
+            olat__json_fail(j, object, "%s: distorted lenses are not supported, undistort the images first", distortion[i]);
+        }
+    }
+    for (i = 0; i < 2; i++) {
+        const char *key = i ? "h" : "w";
+        if (!olat__get(j, object, key, 1, v)) continue;
+        if (!(v[0] >= 1 && v[0] <= 32768 && floor(v[0]) >= v[0])) olat__json_fail(j, object, "%s is not 1 to 32768", key);
+        else if (i) lens->h = (int)v[0];
+        else lens->w = (int)v[0];
+    }
+    if (olat__get(j, object, "camera_angle_x", 1, &lens->angle)) {
+        if (!(lens->angle > 1e-4 && lens->angle < 3.14)) olat__json_fail(j, object, "camera_angle_x is not between 0 and pi");
+        lens->fx = lens->fy = 0;
+    }
+    if (olat__get(j, object, "fl_x", 1, &lens->fx)) lens->fy = lens->fx;
+    olat__get(j, object, "fl_y", 1, &lens->fy);
+    has_cx = olat__get(j, object, "cx", 1, &lens->cx);
+    has_cy = olat__get(j, object, "cy", 1, &lens->cy);
+    if (has_cx != has_cy) olat__json_fail(j, object, "cx and cy come in pairs");
+    if (olat__get(j, object, "camera_intrinsics", 4, v)) {
+        lens->cx = v[0], lens->cy = v[1], lens->fx = v[2], lens->fy = v[3];
+        has_cx = 1;
+    }
+    lens->has_centre |= has_cx;
+    if (lens->fx < 0 || lens->fy < 0 || (lens->fx > 0) != (lens->fy > 0)) {
+        olat__json_fail(j, object, "focal lengths must be positive");
+    }
+}
+
+/* Fills the camera, whose size is known, from the lens and the frame's pose. */
+static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens, ssdgs_camera *camera) {
+    const double w = camera->width, h = camera->height;
+    double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, origin[3] = {0, 0, 0}, t[3], focal;
+    int refined = olat__find(j, node, "R_opt") != NULL, i, k;
+    int in_pixels = lens->fx > 0 || lens->has_centre;
+    if (in_pixels && ((lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height))) {
+        olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
+    }
+    if (!(lens->fx > 0 || lens->angle > 0)) olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
+    focal = lens->fx > 0 ? lens->fx : lens->angle > 0 ? 0.5 * w / tan(0.5 * lens->angle) : 0;
+    camera->fx = (ssdgs_real)focal;
+    camera->fy = (ssdgs_real)(lens->fx > 0 ? lens->fy : focal);
+    camera->cx = (ssdgs_real)(lens->has_centre ? lens->cx : 0.5 * w);
+    camera->cy = (ssdgs_real)(lens->has_centre ? lens->cy : 0.5 * h);
+    if (refined) {
+        olat__get_pose(j, node, "R_opt", 0, axes, origin);
+        if (!olat__get(j, node, "T_opt", 3, t)) olat__json_fail(j, node, "T_opt is missing");
+    } else if (!olat__get_pose(j, node, "transform_matrix", 1, axes, origin)) {
+        olat__json_fail(j, node, "transform_matrix or R_opt is missing");
+    }
+    for (i = 0; i < 3 && !j->failed; i++) { /* transform_matrix has y up and z backward, R_opt has our axes */
+        const double sign = i > 0 && !refined ? -1 : 1;
+        for (k = 0; k < 3; k++) camera->view[4 * i + k] = (ssdgs_real)(sign * axes[i][k]);
+        camera->view[4 * i + 3] = (ssdgs_real)(refined ? t[i] : -sign * olat__dot(axes[i], origin));
+    }
+}
+
+static void olat__read_light(olat__json *j, const olat__node *node, ssdgs_light *light) {
+    const olat__node *intensity = olat__find(j, node, "pl_intensity");
+    double v[3] = {0, 0, 0}, rgb[3] = {1, 1, 1}, length = 1;
+    int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v), i;
+    if (is_point == is_far) olat__json_fail(j, node, is_far ? "both pl_pos and pl_dir" : "pl_pos or pl_dir is missing");
+    if (is_far) length = sqrt(olat__dot(v, v));
+    if (!(fabs(length - 1) < 1e-3)) olat__json_fail(j, node, "pl_dir is not a unit vector");
+    if (intensity && intensity->type == OLAT__ARRAY && intensity->size != 1) olat__numbers(j, intensity, 3, rgb);
+    else if (intensity && olat__numbers(j, intensity, 1, rgb)) rgb[1] = rgb[2] = rgb[0];
+    if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
+    light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
+    for (i = 0; i < 3 && !j->failed; i++) {
+        light->position[i] = (ssdgs_real)(v[i] / length);
+        light->intensity[i] = (ssdgs_real)rgb[i];
+    }
+}
+
+/* What is wrong with a path out of a file, on any system; NULL if nothing. */
+static const char *olat__path_problem(const char *path, size_t length, int allow_parent) {
+    static const char *const devices[] = {"con", "prn", "aux", "nul", "com", "lpt"};
+    size_t i, start, end, stem, d;
+    if (length == 0 || length > OLAT__MAX_PATH) return length ? "the path is too long" : "the path is empty";
+    if (path[0] == '/' || path[0] == '\\' || (length > 1 && path[1] == ':')) return "the path is not relative";
+    for (i = 0; i < length; i++) {
+        if ((unsigned char)path[i] < 32 || path[i] == 127) return "the path holds a control character";
+    }
+    for (start = 0; start <= length; start = end + 1) {
+        const char *name = path + start;
+        for (end = start; end < length && path[end] != '/' && path[end] != '\\'; end++) {}
+        if (end == start) return "the path holds an empty name";
+        if (end - start == 1 && name[0] == '.') continue;
+        if (end - start == 2 && name[0] == '.' && name[1] == '.') {
+            if (!allow_parent) return "the path leaves the folder by '..'";
+            continue;
+        }
+        if (path[end - 1] == '.' || path[end - 1] == ' ') return "a name in the path ends in a dot or a space";
+        for (stem = 0; stem < end - start && name[stem] != '.'; stem++) {}
+        for (d = 0; d < 6; d++) { /* com and lpt take a digit */
+            if (stem != (d < 4 ? 3 : 4) || !olat__same_letters(name, devices[d], 3)) continue;
+            if (d < 4 || (name[3] >= '1' && name[3] <= '9')) return "the path names a device";
+        }
+    }
+    return NULL;
+}
+
+/* Checks the path of the frame's image and joins it to the folder; file stays NULL where the frame names none. */
+static void olat__read_path(olat__json *j, const olat__node *node, const char *folder, int flags, char **file) {
+    const olat__node *whole = olat__find(j, node, "img_path"), *path = whole ? whole : olat__find(j, node, "file_path");
+    const olat__node *ext = olat__find(j, node, "file_ext");
+    const char *problem, *suffix = ".png";
+    size_t used = strlen(folder), room, i;
+    if (!path) {
+        if (!(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
+        return;
+    }
+    if (ext && !whole) {
+        suffix = ext->text;
+        if (ext->type != OLAT__STRING || ext->text_length != 4 || !olat__same_letters(suffix, ".png", 4)) {
+            olat__json_fail(j, ext, "\".png\" was expected: other images cannot be read");
+        }
+    }
+    if (path->type != OLAT__STRING) olat__json_fail(j, path, "a string was expected");
+    else if ((problem = olat__path_problem(path->text, path->text_length, flags & OLAT_ALLOW_PARENT)) != NULL) {
+        olat__json_fail(j, path, "%s", problem);
+    }
+    if (j->failed) return;
+    if (whole || (path->text_length >= 4 && olat__same_letters(path->text + path->text_length - 4, ".png", 4))) suffix = "";
+    room = used + path->text_length + 8;
+    if ((*file = (char *)malloc(room)) == NULL) {
+        olat__json_fail(j, path, "out of memory");
+        return;
+    }
+    snprintf(*file, room, "%s%s%s%s", folder, used ? "/" : "", path->text, suffix);
+    for (i = used; (*file)[i]; i++) {
+        if ((*file)[i] == '\\') (*file)[i] = '/'; /* datasets made on Windows */
+    }
+}
+
+static void olat__read_frames(olat__json *j, const char *folder, int flags, olat_dataset *out) {
+    const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames"), *node;
+    olat__lens top, lens;
+    int i;
+    memset(&top, 0, sizeof top);
+    olat__read_lens(j, root, &top);
+    if (root->type != OLAT__OBJECT || !frames) olat__json_fail(j, root, "frames is missing");
+    else if (frames->type != OLAT__ARRAY) olat__json_fail(j, frames, "an array was expected");
+    else if (frames->size < 1 || frames->size > OLAT__MAX_FRAMES) olat__json_fail(j, frames, "there must be 1 to 2^20 frames");
+    if (j->failed) return;
+    out->frames = (olat_frame *)calloc((size_t)frames->size, sizeof *out->frames);
+    if (!out->frames) olat__json_fail(j, frames, "out of memory");
+    else out->count = frames->size;
+    for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed; i++, node = &j->nodes[node->next]) {
+        olat_frame *frame = &out->frames[i];
+        ssdgs_camera *camera = &frame->camera;
+        if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
+        lens = top;
+        olat__read_lens(j, node, &lens);
+        olat__read_light(j, node, &frame->light);
+        olat__read_path(j, node, folder, flags, &frame->file);
+        camera->width = lens.w ? lens.w : 256;
+        camera->height = lens.h ? lens.h : 256;
+        if (!(flags & OLAT_NO_IMAGES) && !j->failed) {
+            j->failed = olat_read_png(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, j->error);
+            frame->has_image = 1;
+        }
+        olat__read_camera(j, node, &lens, camera);
+    }
+}
+
+/* Frees what olat_load made. */
+OLAT__API void olat_free(olat_dataset *set) {
+    int i;
+    for (i = 0; i < set->count; i++) {
+        free(set->frames[i].file);
+        free(set->frames[i].pixels);
+    }
+    free(set->frames);
+    memset(set, 0, sizeof *set);
+}
+
+/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure. */
+OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out, char error[512]) {
+    olat__json j;
+    unsigned char *text = NULL;
+    size_t size = 0, room = strlen(folder) + strlen(split_json) + 2;
+    memset(out, 0, sizeof *out);
+    memset(&j, 0, sizeof j);
+    j.error = error;
+    if ((j.path = (char *)malloc(room)) == NULL) return olat__fail(error, "%s: out of memory", olat__tail(split_json));
+    snprintf(j.path, room, "%s%s%s", folder, folder[0] ? "/" : "", split_json);
+    j.failed = olat__read_file(j.path, &text, &size, error);
+    if (!j.failed) {
+        j.text = (char *)text;
+        j.end = j.text + size;
+        olat__json_parse(&j);
+    }
+    if (!j.failed) olat__read_frames(&j, folder, flags, out);
+    if (j.failed) olat_free(out);
+    free(j.nodes);
+    free(text);
+    free(j.path);
+    return j.failed;
+}
+
+/* The frames as ssdgs_photo structs that share the dataset's pixels: (count), to be freed; NULL if out of memory. */
+OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
+    ssdgs_photo *photos = (ssdgs_photo *)calloc((size_t)set->count, sizeof *photos);
+    int i;
+    for (i = 0; photos && i < set->count; i++) {
+        photos[i].camera = set->frames[i].camera;
+        photos[i].light = set->frames[i].light;
+        photos[i].pixels = set->frames[i].pixels;
+        photos[i].format = set->frames[i].format;
+    }
+    return photos;
+}
+
+#endif /* OLAT_H */

@@ -1,0 +1,494 @@
+/* cc -O2 examples/relight.c -o relight -lm -lpthread: renders a model in the views and lights of a dataset, or on a path */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "olat.h"
+#include <errno.h>
+#include <sys/stat.h>
+#ifdef _WIN32
+#include <direct.h>
+#define make_directory(path) _mkdir(path)
+#else
+#define make_directory(path) mkdir(path, 0777)
+#endif
+
+#define PI 3.14159265358979323846
+enum { SPLIT, OUT, BACKGROUND, SHEET, THREADS, ISA, TRAJECTORY, COMPONENTS, OPTION_COUNT };
+static const char *const option_names[OPTION_COUNT] = {
+    "--split", "--out", "--background", "--sheet", "--threads", "--isa", "--trajectory", "--components"
+};
+
+static int usage(const char *problem, const char *what)
+{
+    fprintf(stderr, "relight: %s %s\n"
+            "usage: relight MODEL.ply DATASET --out DIR [--split test|train|valid] [--trajectory] [--components]\n"
+            "               [--sheet FILE.png] [--background black|white] [--threads N] [--isa NAME]\n", problem, what);
+    return 2;
+}
+
+static int fail(const char *message)
+{
+    fprintf(stderr, "relight: %s\n", message);
+    return 1;
+}
+
+/* What is written for a view; the first columns of the sheet come first. */
+enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
+enum { SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4 };
+static const char *const suffixes[OUTPUT_COUNT] = {
+    "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"
+};
+
+/* Everything the program holds; main releases it. */
+typedef struct job {
+    const char *given[OPTION_COUNT], *model_path, *dataset, *out;
+    ssdgs_context_desc desc;
+    ssdgs_real background[3];
+    ssdgs_context *context;
+    ssdgs_model *model;
+    olat_dataset data;
+    ssdgs_metrics *metrics;          /* of each frame that has an image */
+    ssdgs_image planes;              /* of the view at hand; color is scratch once image is made */
+    ssdgs_real *memory, *image;      /* what planes point into; (h,w,3) stored values */
+    unsigned char *bytes, *sheet;    /* (h,w,3) */
+    int sheet_rows, cell_width, cell_height;
+} job;
+
+static int parse(job *j, int argc, char **argv)
+{
+    int i, option, isa = 0;
+    const char *value;
+    char *end = NULL;
+    for (i = 1; i < argc; i++) {
+        if (argv[i][0] != '-') {
+            if (j->dataset) return usage("a third file:", argv[i]);
+            if (j->model_path) j->dataset = argv[i];
+            else j->model_path = argv[i];
+            continue;
+        }
+        for (option = 0; option < OPTION_COUNT && strcmp(argv[i], option_names[option]); option++) {}
+        if (option == OPTION_COUNT) return usage("no such option:", argv[i]);
+        if (option < TRAJECTORY && i + 1 == argc) return usage("a value is missing after", argv[i]);
+        j->given[option] = option < TRAJECTORY ? argv[++i] : "";
+    }
+    j->out = j->given[OUT];
+    if (!j->dataset || !j->out) return usage("needs MODEL.ply, DATASET and", "--out DIR");
+    value = j->given[SPLIT];
+    if (!value) j->given[SPLIT] = "test";
+    else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid")) return usage("no such split:", value);
+    value = j->given[BACKGROUND];
+    if (value && !strcmp(value, "white")) j->background[0] = j->background[1] = j->background[2] = 1;
+    else if (value && strcmp(value, "black")) return usage("no such background:", value);
+    value = j->given[THREADS];
+    if (value) {
+        long threads = strtol(value, &end, 10);
+        if (end == value || *end || threads < 0 || threads > 1024)
+            return usage("--threads needs a number from 0 to 1024, not", value);
+        j->desc.threads = (int)threads;
+    }
+    value = j->given[ISA];
+    while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
+    if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
+    j->desc.isa = (ssdgs_isa)isa;
+    return 0;
+}
+
+/* ---- files ---- */
+
+/* Makes the folder and those above it; what goes wrong shows when files are written. */
+static void make_folders(const char *path)
+{
+    char *part = (char *)malloc(strlen(path) + 1);
+    size_t i;
+    for (i = 0; part; i++) {
+        if (i > 0 && (path[i] == '/' || path[i] == '\\' || !path[i])) {
+            memcpy(part, path, i);
+            part[i] = 0;
+            if (make_directory(part) && errno != EEXIST && !path[i]) fprintf(stderr, "relight: cannot make %s\n", part);
+        }
+        if (!path[i]) break;
+    }
+    free(part);
+}
+
+/* A frame's file name without its folder. */
+static const char *base_name(const olat_frame *frame)
+{
+    const char *slash = strrchr(frame->file, '/');
+    return slash ? slash + 1 : frame->file;
+}
+
+/* Writes OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension. */
+static int write_image(const job *j, const olat_frame *frame, const char *suffix)
+{
+    const char *name = base_name(frame), *dot = strrchr(name, '.');
+    size_t length = dot ? (size_t)(dot - name) : strlen(name);
+    char *path, error[512] = "";
+    int ok;
+    path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
+    if (!path) return !fail("out of memory");
+    sprintf(path, "%s/%.*s%s.png", j->out, (int)length, name, suffix);
+    ok = !olat_write_png(path, frame->camera.width, frame->camera.height, 3, j->bytes, error);
+    if (!ok) fail(error);
+    free(path);
+    return ok;
+}
+
+static void write_escaped(FILE *file, const char *text)
+{
+    for (; *text; text++) {
+        unsigned char c = (unsigned char)*text;
+        if (c == '"' || c == '\\') fprintf(file, "\\%c", c);
+        else if (c < 32) fprintf(file, "\\u%04x", (unsigned)c);
+        else fputc(c, file);
+    }
+}
+
+/* No setlocale is called, so that numbers have a point. */
+static void write_numbers(FILE *file, const ssdgs_metrics *m)
+{
+    fprintf(file, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", m->psnr, m->ssim, m->flip);
+}
+
+static int write_metrics(const job *j, const ssdgs_metrics *mean)
+{
+    char *path = (char *)malloc(strlen(j->out) + 16);
+    const char *separator = "";
+    FILE *file;
+    int i, failed;
+    if (!path) return !fail("out of memory");
+    sprintf(path, "%s/metrics.json", j->out);
+    file = fopen(path, "wb");
+    free(path);
+    if (!file) return !fail("cannot write metrics.json");
+    fprintf(file, "{\n \"mean\": {");
+    write_numbers(file, mean);
+    fprintf(file, ",\n \"views\": [");
+    for (i = 0; i < j->data.count; i++) {
+        if (!j->data.frames[i].has_image) continue;
+        fprintf(file, "%s\n  {\"file\": \"", separator);
+        write_escaped(file, base_name(&j->data.frames[i]));
+        fprintf(file, "\", ");
+        write_numbers(file, &j->metrics[i]);
+        separator = ",";
+    }
+    fprintf(file, "\n ]\n}\n");
+    failed = ferror(file);
+    return (!fclose(file) && !failed) || !fail("cannot write metrics.json");
+}
+
+/* ---- the path of the paper's Appendix D ---- */
+
+/* A circle round the z axis of `axes`: a mean distance and a mean height, as seen from the centre. */
+typedef struct orbit { double centre[3], radius, height, azimuth; } orbit;
+
+static void orbit_add(orbit *o, double axes[3][3], const ssdgs_real point[3], double share, int is_first)
+{
+    double local[3];
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0, local[i] = 0; k < 3; k++) local[i] += axes[i][k] * ((double)point[k] - o->centre[k]);
+    o->radius += share * sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2]);
+    o->height += share * local[2];
+    if (is_first) o->azimuth = atan2(local[1], local[0]);
+}
+
+static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real point[3])
+{
+    double angle = o->azimuth + turn * PI / 180, around = sqrt(fmax(0, o->radius * o->radius - o->height * o->height));
+    double local[3] = {around * cos(angle), around * sin(angle), o->height};
+    int i, k;
+    for (k = 0; k < 3; k++) {
+        double sum = o->centre[k];
+        for (i = 0; i < 3; i++) sum += local[i] * axes[i][k];
+        point[k] = (ssdgs_real)sum;
+    }
+}
+
+static void camera_eye(const ssdgs_camera *camera, ssdgs_real eye[3])
+{
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
+}
+
+/* World axes with up last: z, unless the cameras' mean upward direction lies clearly along another one. */
+static void find_axes(const olat_dataset *data, double axes[3][3])
+{
+    double up[3] = {0, 0, 0};
+    int i, k, best = 2, sign;
+    for (i = 0; i < data->count; i++)
+        for (k = 0; k < 3; k++) up[k] -= (double)data->frames[i].camera.view[4 + k] / data->count;
+    for (k = 0; k < 3; k++)
+        if (fabs(up[k]) > 1.5 * fabs(up[best]) && fabs(up[k]) > 0.2) best = k;
+    sign = up[best] < -0.2 ? -1 : 1;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++) axes[i][k] = k == (best + 1 + i) % 3 ? (i > 0 ? sign : 1) : 0;
+}
+
+/* Replaces the frames of data, from which it takes its measures, by those of the path: the light goes round in steps of 2.4
+   degrees, the camera goes to the back in steps of 2, the light goes round again, the camera returns. */
+static int make_trajectory(job *j)
+{
+    const ssdgs_settings *settings = ssdgs_model_settings(j->model);
+    olat_dataset *data = &j->data;
+    olat_frame *frames;
+    ssdgs_camera first;
+    ssdgs_light light;
+    double axes[3][3], intensity[3] = {0, 0, 0};
+    orbit camera_orbit, light_orbit;
+    ssdgs_real eye[3], centre[3], up[3];
+    int i, k, count = 2 * (150 + 90);
+    if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
+    first = data->frames[0].camera;
+    light = data->frames[0].light;
+    find_axes(data, axes);
+    memset(&camera_orbit, 0, sizeof camera_orbit);
+    memset(&light_orbit, 0, sizeof light_orbit);
+    for (k = 0; k < 3; k++) {
+        centre[k] = settings->centre[k];
+        up[k] = (ssdgs_real)axes[2][k];
+        camera_orbit.centre[k] = (double)centre[k];
+        light_orbit.centre[k] = light.kind == SSDGS_LIGHT_POINT ? (double)centre[k] : 0;
+    }
+    for (i = 0; i < data->count; i++) {
+        const ssdgs_light *l = &data->frames[i].light;
+        camera_eye(&data->frames[i].camera, eye);
+        orbit_add(&camera_orbit, axes, eye, 1.0 / data->count, i == 0);
+        orbit_add(&light_orbit, axes, l->position, 1.0 / data->count, 0);
+        for (k = 0; k < 3; k++) intensity[k] += (double)l->intensity[k] / data->count;
+    }
+    light_orbit.azimuth = camera_orbit.azimuth; /* starts at the viewer */
+    frames = (olat_frame *)calloc((size_t)count, sizeof *frames);
+    if (!frames) return !fail("out of memory");
+    for (i = 0; i < count; i++) {
+        int half = i / 240, step = i % 240 + 1;
+        double light_turn = step < 150 ? 2.4 * step : 0, camera_turn = (step > 150 ? 2.0 * (step - 150) : 0) + 180 * half;
+        ssdgs_camera *camera = &frames[i].camera;
+        orbit_at(&camera_orbit, axes, camera_turn, eye);
+        *camera = ssdgs_camera_look_at(eye, centre, up, (ssdgs_real)(2 * atan(0.5 * first.width / (double)first.fx)), first.width,
+                                       first.height);
+        camera->fy = first.fy;
+        frames[i].light = light;
+        orbit_at(&light_orbit, axes, light_turn, frames[i].light.position);
+        for (k = 0; k < 3; k++) frames[i].light.intensity[k] = (ssdgs_real)intensity[k];
+    }
+    olat_free(data);
+    data->frames = frames;
+    data->count = count;
+    return 1;
+}
+
+/* ---- one view ---- */
+
+static int make_planes(job *j)
+{
+    ssdgs_real *next;
+    size_t most = 0, pixels;
+    int i;
+    for (i = 0; i < j->data.count; i++) {
+        pixels = (size_t)j->data.frames[i].camera.width * (size_t)j->data.frames[i].camera.height;
+        if (pixels > most) most = pixels;
+    }
+    j->metrics = (ssdgs_metrics *)calloc((size_t)j->data.count + 1, sizeof *j->metrics);
+    j->memory = next = (ssdgs_real *)malloc(most * 21 * sizeof *next + 1);
+    j->bytes = (unsigned char *)malloc(most * 3 + 1);
+    if (j->given[SHEET] && j->data.count > 0) {
+        j->sheet_rows = j->data.count < SHEET_ROWS ? j->data.count : SHEET_ROWS;
+        j->cell_width = j->data.frames[0].camera.width;
+        j->cell_height = j->data.frames[0].camera.height;
+        j->sheet = (unsigned char *)calloc(most * SHEET_COLUMNS, (size_t)j->sheet_rows * 3);
+    }
+    if (!j->metrics || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet)) return !fail("out of memory");
+    j->image = next;
+    j->planes.color = next += 3 * most;
+    j->planes.diffuse = next += 3 * most;
+    j->planes.specular = next += 3 * most;
+    j->planes.scattering = next += 3 * most;
+    j->planes.normal = next += 3 * most;
+    j->planes.depth = next += 3 * most;
+    j->planes.alpha = next += most;
+    j->planes.shadow = next + most;
+    return 1;
+}
+
+/* The image, and its metrics when there is a photograph, into job; with the components when they are asked for. */
+static ssdgs_result render(job *j, int index, int components)
+{
+    const olat_frame *frame = &j->data.frames[index];
+    size_t i, count = (size_t)frame->camera.width * (size_t)frame->camera.height * 3;
+    int transfer = ssdgs_model_settings(j->model)->transfer;
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_image planes = j->planes;
+    ssdgs_result result;
+    if (frame->has_image) {
+        ssdgs_photo photo;
+        photo.camera = frame->camera;
+        photo.light = frame->light;
+        photo.pixels = frame->pixels;
+        photo.format = frame->format;
+        result = ssdgs_evaluate(j->model, &photo, j->background, j->image, &j->metrics[index]);
+        if (result || !components) return result;
+    }
+    if (!components) {
+        memset(&planes, 0, sizeof planes);
+        planes.color = j->planes.color;
+    }
+    memcpy(options.background, j->background, sizeof options.background); /* 0 and 1 are the same in linear light */
+    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, NULL);
+    for (i = 0; !result && !frame->has_image && i < count; i++)
+        j->image[i] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_encode(planes.color[i]) : planes.color[i];
+    return result;
+}
+
+/* The photograph over the background, composited as the model's transfer says. */
+static void show_photo(const job *j, const olat_frame *frame, ssdgs_real *out, size_t pixels)
+{
+    int linear = ssdgs_model_settings(j->model)->transfer == SSDGS_TRANSFER_SRGB;
+    size_t i, k;
+    for (i = 0; i < pixels * 3; i++) out[i] = 0;
+    for (i = 0; frame->has_image && i < pixels; i++) {
+        ssdgs_real v[4];
+        for (k = 0; k < 4; k++)
+            v[k] = frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)((const uint16_t *)frame->pixels)[4 * i + k] / 65535
+                                                        : (ssdgs_real)((const unsigned char *)frame->pixels)[4 * i + k] / 255;
+        for (k = 0; k < 3; k++) {
+            out[3 * i + k] = v[3] * (linear ? ssdgs_srgb_decode(v[k]) : v[k]) + (1 - v[3]) * j->background[k];
+            if (linear) out[3 * i + k] = ssdgs_srgb_encode(out[3 * i + k]);
+        }
+    }
+}
+
+/* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as they are. */
+static void show(job *j, const olat_frame *frame, int output)
+{
+    size_t i, pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const ssdgs_image *p = &j->planes;
+    ssdgs_real *out = p->color, nearest = (ssdgs_real)1e30, farthest = 0;
+    int transfer = SSDGS_TRANSFER_NONE;
+    if (output >= DIFFUSE && output <= SCATTERING) {
+        out = output == DIFFUSE ? p->diffuse : output == SPECULAR ? p->specular : p->scattering;
+        transfer = ssdgs_model_settings(j->model)->transfer;
+    } else if (output == PHOTO) {
+        show_photo(j, frame, out, pixels);
+    } else if (output == IMAGE) {
+        out = j->image;
+    } else if (output == NORMAL) { /* -1 .. 1 to 0 .. 1, nothing to black */
+        for (i = 0; i < 3 * pixels; i++) out[i] = (p->normal[i] + p->alpha[i / 3]) / 2;
+    } else if (output == DEPTH) { /* nearest white, farthest dark, nothing black */
+        for (i = 0; i < pixels; i++) {
+            ssdgs_real depth = p->depth[i] / (p->alpha[i] + (ssdgs_real)1e-6);
+            if (p->alpha[i] < (ssdgs_real)0.5) continue;
+            if (depth < nearest) nearest = depth;
+            if (depth > farthest) farthest = depth;
+        }
+        for (i = 0; i < 3 * pixels; i++) {
+            ssdgs_real a = p->alpha[i / 3], depth = p->depth[i / 3] / (a + (ssdgs_real)1e-6);
+            out[i] = a * (1 - (ssdgs_real)0.8 * (depth - nearest) / (farthest - nearest + (ssdgs_real)1e-6));
+        }
+    } else {
+        for (i = 0; i < 3 * pixels; i++) out[i] = output == SHADOW ? p->shadow[i / 3] : p->alpha[i / 3];
+    }
+    ssdgs_to_bytes(out, 3 * pixels, transfer, j->bytes);
+}
+
+/* Puts the bytes into a cell of the sheet, cut to its size. */
+static void paste(job *j, const olat_frame *frame, int row, int column)
+{
+    int y, width = frame->camera.width < j->cell_width ? frame->camera.width : j->cell_width;
+    for (y = 0; y < j->cell_height && y < frame->camera.height; y++)
+        memcpy(j->sheet + 3 * (size_t)j->cell_width * ((size_t)(row * j->cell_height + y) * SHEET_COLUMNS + (size_t)column),
+               j->bytes + 3 * (size_t)frame->camera.width * (size_t)y, 3 * (size_t)width);
+}
+
+/* Frames of a path may have no file: they are numbered. */
+static int name_frames(olat_dataset *data)
+{
+    int i;
+    for (i = 0; i < data->count; i++) {
+        olat_frame *frame = &data->frames[i];
+        if (frame->file) continue;
+        frame->file = (char *)malloc(16);
+        if (!frame->file) return !fail("out of memory");
+        sprintf(frame->file, "%04d", i);
+    }
+    return 1;
+}
+
+static int load_frames(job *j)
+{
+    char error[512] = "", name[64], *path = (char *)malloc(strlen(j->dataset) + 64);
+    const char *split = j->given[SPLIT];
+    int valid = !strcmp(split, "valid"), path_wanted = j->given[TRAJECTORY] != NULL;
+    FILE *file;
+    if (!path) return !fail("out of memory");
+    if (valid) { /* the dataset's own path, or the one made here */
+        sprintf(path, "%s/transforms_valid.json", j->dataset);
+        file = fopen(path, "rb");
+        if (file) fclose(file);
+        else path_wanted = 1;
+    }
+    free(path);
+    snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
+    if (olat_load(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, &j->data, error)) return !fail(error);
+    return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
+}
+
+static int relight(job *j)
+{
+    ssdgs_metrics mean = {0, 0, 0};
+    ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
+    int i, output, row = 0, scored = 0;
+    char error[512] = "";
+    if (result) return fail(ssdgs_result_string(result));
+    if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL)) return fail(ssdgs_error_message(j->context));
+    if (!load_frames(j) || !make_planes(j)) return 1;
+    make_folders(j->out);
+    for (i = 0; i < j->data.count; i++) {
+        const olat_frame *frame = &j->data.frames[i];
+        int components = j->given[COMPONENTS] != NULL;
+        int on_sheet = row < j->sheet_rows && i == (2 * row + 1) * j->data.count / (2 * j->sheet_rows);
+        if (render(j, i, components || on_sheet)) return fail(ssdgs_error_message(j->context));
+        for (output = PHOTO; output < OUTPUT_COUNT; output++) {
+            int written = output == IMAGE || (components && output != PHOTO), pasted = on_sheet && output < SHEET_COLUMNS;
+            if (!written && !pasted) continue;
+            show(j, frame, output);
+            if (written && !write_image(j, frame, suffixes[output])) return 1;
+            if (pasted) paste(j, frame, row, output);
+        }
+        row += on_sheet;
+        if (!frame->has_image) continue;
+        scored++;
+        mean.psnr += j->metrics[i].psnr;
+        mean.ssim += j->metrics[i].ssim;
+        mean.flip += j->metrics[i].flip;
+    }
+    if (j->sheet && olat_write_png(j->given[SHEET], SHEET_COLUMNS * j->cell_width, j->sheet_rows * j->cell_height, 3, j->sheet,
+                                   error))
+        return fail(error);
+    if (scored) {
+        mean.psnr /= scored;
+        mean.ssim /= scored;
+        mean.flip /= scored;
+        if (!write_metrics(j, &mean)) return 1;
+        printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT], mean.psnr, mean.ssim, mean.flip, scored);
+    }
+    printf("%d images in %s\n", j->data.count, j->out);
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    job j;
+    int status;
+    memset(&j, 0, sizeof j);
+    status = parse(&j, argc, argv);
+    if (!status) status = relight(&j);
+    ssdgs_model_destroy(j.model);
+    ssdgs_context_destroy(j.context);
+    olat_free(&j.data);
+    free(j.metrics);
+    free(j.memory);
+    free(j.bytes);
+    free(j.sheet);
+    return status;
+}

@@ -1,0 +1,318 @@
+/* cc -O2 examples/train.c -o train -lm -lpthread: trains a relightable model from a folder of OLAT photographs */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "olat.h"
+#include <signal.h>
+#include <time.h>
+#ifdef _WIN32
+#include <io.h>
+#define on_terminal() _isatty(2)
+#else
+#include <sys/resource.h>
+#include <sys/time.h>
+#include <unistd.h>
+#define on_terminal() isatty(2)
+#endif
+
+enum {
+    OUTPUT, ITERATIONS, BACKGROUND, PRESET, TRANSFER, SCHEDULE, TERMS, SEED, THREADS, MAX_GAUSSIANS, POINTS, CHECKPOINT_EVERY,
+    ISA, TRAIN_JSON, RESUME, REFINE, OPTION_COUNT /* the flags, RESUME and on, take no value */
+};
+static const char *const option_names[OPTION_COUNT] = {
+    "-o", "--iterations", "--background", "--preset", "--transfer", "--schedule", "--terms", "--seed", "--threads",
+    "--max-gaussians", "--points", "--checkpoint-every", "--isa", "--train-json", "--resume", "--refine"
+};
+
+static int usage(const char *problem, const char *what)
+{
+    fprintf(stderr, "train: %s %s\n"
+            "usage: train DATASET -o MODEL.ply [--iterations N] [--background black|white] [--preset default|published]\n"
+            "             [--transfer srgb|none] [--schedule progressive|joint|swapped|merged] [--resume] [--refine]\n"
+            "             [--terms diffuse,specular,shadow,scattering] [--max-gaussians N] [--points N] [--seed N]\n"
+            "             [--checkpoint-every N] [--train-json FILE] [--threads N] [--isa NAME]\n", problem, what);
+    return 2;
+}
+
+/* The place of word[0 .. length) in a list like "black|white", or -1. */
+static int choice(const char *list, const char *word, size_t length)
+{
+    int index = 0;
+    for (;; index++) {
+        size_t n = strcspn(list, "|");
+        if (n == length && !memcmp(list, word, n)) return index;
+        if (!list[n]) return -1;
+        list += n + 1;
+    }
+}
+
+/* An option's choice into value, when it was given. */
+static int choose(const char *const *given, int option, const char *list, int *value)
+{
+    int index = given[option] ? choice(list, given[option], strlen(given[option])) : *value;
+    if (index < 0) return 0;
+    *value = index;
+    return 1;
+}
+
+static int number(const char *const *given, int option, int least, int *value)
+{
+    char *end;
+    long parsed;
+    if (!given[option]) return 1;
+    parsed = strtol(given[option], &end, 10);
+    if (end == given[option] || *end || parsed < least || parsed > 2000000000) {
+        char problem[64];
+        snprintf(problem, sizeof problem, "%s needs a number from %d up, not", option_names[option], least);
+        return usage(problem, given[option]), 0;
+    }
+    *value = (int)parsed;
+    return 1;
+}
+
+static double seconds_now(void)
+{
+#ifdef _WIN32
+    return (double)clock() / CLOCKS_PER_SEC; /* wall time there */
+#else
+    struct timeval now;
+    gettimeofday(&now, NULL);
+    return (double)now.tv_sec + 1e-6 * (double)now.tv_usec;
+#endif
+}
+
+static const char *clock_text(double seconds, char text[32])
+{
+    int s = seconds < 3e6 ? (int)(seconds + 0.5) : 3000000;
+    if (s >= 3600) snprintf(text, 32, "%d:%02d:%02d", s / 3600, s / 60 % 60, s % 60);
+    else snprintf(text, 32, "%d:%02d", s / 60, s % 60);
+    return text;
+}
+
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int signal_number)
+{
+    interrupted = 1;
+    signal(signal_number, SIG_DFL); /* a second Ctrl-C ends the program at once */
+}
+
+typedef struct run {
+    int iterations, checkpoint_every, terminal;
+    int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
+    double start, drawn, speed, psnr;
+} run;
+
+static int progress(void *user, const ssdgs_train_stats *stats)
+{
+    run *r = (run *)user;
+    int done = stats->iteration, total = r->iterations;
+    int percent = (int)(100.0 * done / total), finished = done >= total;
+    double now = seconds_now();
+    char left[32];
+    if (r->first < 0) { /* the first step also allocates: time starts after it */
+        r->first = r->drawn_at = done;
+        r->start = r->drawn = now;
+        r->percent = percent / 5;
+        r->psnr = stats->psnr;
+    }
+    r->psnr += 0.02 * (stats->psnr - r->psnr);
+    if (done == r->first + 50) {
+        r->speed = 50 / (now - r->start + 1e-9);
+        fprintf(stderr, "at this speed %s for the %d iterations left; it falls as Gaussians are added\n",
+                clock_text((total - done) / r->speed, left), total - done);
+    }
+    if (r->speed > 0 && (finished || (r->terminal ? now > r->drawn + 0.2 : percent / 5 > r->percent))) {
+        double weight = 1 - exp(-(now - r->drawn) / 5); /* the last seconds count */
+        if (done > r->drawn_at && now > r->drawn) r->speed += weight * ((done - r->drawn_at) / (now - r->drawn) - r->speed);
+        if (r->terminal) fprintf(stderr, "\r|%.*s%.*s| ", percent / 10, "##########", 10 - percent / 10, "----------");
+        fprintf(stderr, "%d/%d loss %.4f PSNR %.1f %d Gaussians %.1f/s %s left%s", done, total, stats->loss, r->psnr,
+                stats->gaussians, r->speed, clock_text((total - done) / r->speed, left),
+                r->terminal && !finished ? "   " : "\n");
+        r->drawn = now;
+        r->drawn_at = done;
+        r->percent = percent / 5;
+    }
+    return !interrupted && (finished || !r->checkpoint_every || done % r->checkpoint_every);
+}
+
+/* Everything the program holds; main releases it. */
+typedef struct job {
+    const char *given[OPTION_COUNT], *dataset;
+    ssdgs_settings settings;
+    ssdgs_train_options options;
+    ssdgs_context_desc desc;
+    run progress;
+    char *checkpoint;
+    olat_dataset train_set, test_set;
+    ssdgs_photo *photos, *test_photos;
+    ssdgs_context *context;
+    ssdgs_model *model;
+    ssdgs_trainer *trainer;
+} job;
+
+static int parse(job *j, int argc, char **argv)
+{
+    const char **given = j->given, *terms;
+    int i, option, white = 0, preset = 0, seed = 1, isa = 0;
+    for (i = 1; i < argc; i++) {
+        if (argv[i][0] != '-') {
+            if (j->dataset) return usage("a second dataset:", argv[i]);
+            j->dataset = argv[i];
+            continue;
+        }
+        for (option = 0; option < OPTION_COUNT && strcmp(argv[i], option_names[option]); option++) {}
+        if (option == OPTION_COUNT) return usage("no such option:", argv[i]);
+        if (option < RESUME && i + 1 == argc) return usage("a value is missing after", argv[i]);
+        given[option] = option < RESUME ? argv[++i] : "";
+    }
+    if (!j->dataset || !given[OUTPUT]) return usage("needs a DATASET and", "-o MODEL.ply");
+
+    if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
+    j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
+    j->options = ssdgs_train_options_default();
+    if (!choose(given, BACKGROUND, "black|white", &white)) return usage("no such background:", given[BACKGROUND]);
+    if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer)) return usage("no such transfer:", given[TRANSFER]);
+    if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))
+        return usage("no such schedule:", given[SCHEDULE]);
+    terms = given[TERMS];
+    if (terms) j->settings.terms = 0;
+    while (terms) {
+        size_t length = strcspn(terms, ",");
+        int term = choice("diffuse|specular|shadow|scattering", terms, length); /* in the order of the SSDGS_*_TERM bits */
+        if (term < 0) return usage("no such term in --terms", given[TERMS]);
+        j->settings.terms |= 1 << term;
+        terms = terms[length] ? terms + length + 1 : NULL;
+    }
+    while (given[ISA] && isa < SSDGS_ISA_COUNT && strcmp(given[ISA], ssdgs_isa_string((ssdgs_isa)isa))) isa++;
+    if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", given[ISA]);
+    if (!number(given, ITERATIONS, 1, &j->options.iterations) || !number(given, POINTS, 1, &j->options.initial_points) ||
+        !number(given, MAX_GAUSSIANS, 1, &j->options.max_gaussians) ||
+        !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) || !number(given, SEED, 0, &seed) ||
+        !number(given, THREADS, 0, &j->desc.threads))
+        return 2;
+    j->options.seed = (uint64_t)seed;
+    j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
+    j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
+    j->desc.isa = (ssdgs_isa)isa;
+    return 0;
+}
+
+static int fail(const char *message)
+{
+    fprintf(stderr, "train: %s\n", message);
+    return 1;
+}
+
+/* Prints the means over the test photographs, each one's pose and light first fitted by so many steps. */
+static ssdgs_result evaluate(job *j, int fit_steps, const char *label)
+{
+    ssdgs_metrics m, mean = {0, 0, 0};
+    int i, count = j->test_set.count;
+    for (i = 0; i < count; i++) {
+        ssdgs_photo photo = j->test_photos[i];
+        ssdgs_result result = fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
+        if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, NULL, &m);
+        if (result) return result;
+        mean.psnr += m.psnr / count;
+        mean.ssim += m.ssim / count;
+        mean.flip += m.flip / count;
+    }
+    printf("test%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, mean.psnr, mean.ssim, mean.flip, count);
+    return SSDGS_OK;
+}
+
+static void print_peak_memory(void)
+{
+#ifndef _WIN32
+    struct rusage used;
+#ifdef __APPLE__
+    double unit = 1; /* bytes there, KiB elsewhere */
+#else
+    double unit = 1024;
+#endif
+    if (!getrusage(RUSAGE_SELF, &used)) printf(", peak memory %.0f MiB", (double)used.ru_maxrss * unit / 1048576);
+#endif
+}
+
+static int train(job *j)
+{
+    const char *output = j->given[OUTPUT], *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
+    char error[512] = "", text[32], *test_json = (char *)malloc(strlen(j->dataset) + 32);
+    int i, width = 0, height = 0, has_test;
+    double start = seconds_now();
+    ssdgs_result result;
+    FILE *file;
+
+    j->checkpoint = (char *)malloc(strlen(output) + 8);
+    if (!j->checkpoint || !test_json) return free(test_json), fail("out of memory");
+    sprintf(j->checkpoint, "%s.ckpt", output);
+    sprintf(test_json, "%s/transforms_test.json", j->dataset);
+    file = fopen(test_json, "rb");
+    has_test = file != NULL;
+    if (file) fclose(file);
+    free(test_json);
+
+    if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
+    if (has_test && olat_load(j->dataset, "transforms_test.json", 0, &j->test_set, error)) return fail(error);
+    j->photos = olat_photos(&j->train_set);
+    if (!j->photos) return fail("out of memory");
+    for (i = 0; i < j->train_set.count; i++) {
+        if (j->photos[i].camera.width > width) width = j->photos[i].camera.width;
+        if (j->photos[i].camera.height > height) height = j->photos[i].camera.height;
+    }
+    result = ssdgs_context_create(&j->desc, &j->context);
+    if (result) return fail(ssdgs_result_string(result));
+    fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s; at most %.0f MiB beside the photographs\n", j->dataset,
+            j->train_set.count, width, height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)),
+            (double)ssdgs_train_memory(&j->settings, &j->options, width, height) / 1048576);
+    if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
+        ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer) ||
+        (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)))
+        return fail(ssdgs_error_message(j->context));
+
+    j->progress.iterations = j->options.iterations;
+    j->progress.terminal = on_terminal();
+    j->progress.first = -1;
+    signal(SIGINT, on_interrupt);
+    while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
+        if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
+        if (interrupted) {
+            fprintf(stderr, "\nstopped; the same command with --resume goes on from %s\n", j->checkpoint);
+            return 130;
+        }
+    }
+    if (result || ssdgs_model_save(j->model, output)) return fail(ssdgs_error_message(j->context));
+    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
+    print_peak_memory();
+    printf("\n");
+
+    ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
+    ssdgs_model_destroy(j->model);
+    j->trainer = NULL;
+    j->model = NULL;
+    if (ssdgs_model_load(j->context, output, &j->model, NULL)) return fail(ssdgs_error_message(j->context));
+    if (!has_test) return 0;
+    j->test_photos = olat_photos(&j->test_set);
+    if (!j->test_photos) return fail("out of memory");
+    if (evaluate(j, 0, "") || (j->given[REFINE] && evaluate(j, 200, " (each photograph's pose and light fitted to it)")))
+        return fail(ssdgs_error_message(j->context));
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    job j;
+    int status;
+    memset(&j, 0, sizeof j);
+    status = parse(&j, argc, argv);
+    if (!status) status = train(&j);
+    ssdgs_trainer_destroy(j.trainer);
+    ssdgs_model_destroy(j.model);
+    ssdgs_context_destroy(j.context);
+    free(j.photos);
+    free(j.test_photos);
+    olat_free(&j.train_set);
+    olat_free(&j.test_set);
+    free(j.checkpoint);
+    return status;
+}

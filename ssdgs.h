@@ -1,0 +1,6429 @@
+/* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end */
+
+/* ==== the interface ==== */
+
+#if !defined(SSDGS__ISA)
+#ifndef SSDGS_H
+#define SSDGS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define SSDGS_VERSION 100 /* 0.1.0; written into files */
+
+#ifndef SSDGS_API
+#ifdef SSDGS_STATIC
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS_API static __attribute__((unused))
+#else
+#define SSDGS_API static
+#endif
+#else
+#define SSDGS_API extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* All arithmetic. The tests build the whole library in double by defining SSDGS_REAL64. */
+#ifdef SSDGS_REAL64
+typedef double ssdgs_real;
+#else
+typedef float ssdgs_real;
+#endif
+
+/* One list makes the enum, ssdgs_result_string() and the codes the log sees. */
+#define SSDGS_RESULTS(X)                                                      \
+    X(OK, "ok")                                                               \
+    X(ERR_ARGUMENT, "an argument is out of range")                            \
+    X(ERR_OPTIONS, "the options were not made by their _default() function")  \
+    X(ERR_MEMORY, "out of memory")                                            \
+    X(ERR_IO, "a file could not be read or written")                          \
+    X(ERR_FORMAT, "a file does not hold what it should")                      \
+    X(ERR_LIMIT, "a size is over its limit")                                  \
+    X(ERR_CANCELLED, "cancelled by the progress callback")                    \
+    X(ERR_NONFINITE, "a value is not finite")                                 \
+    X(ERR_ISA, "this CPU or build lacks the instruction set asked for")
+
+#define SSDGS__RESULT_ENUM(name, text) SSDGS_##name,
+typedef enum ssdgs_result { SSDGS_RESULTS(SSDGS__RESULT_ENUM) SSDGS_RESULT_COUNT } ssdgs_result;
+#undef SSDGS__RESULT_ENUM
+
+typedef enum ssdgs_isa {
+    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON, SSDGS_ISA_COUNT
+} ssdgs_isa;
+
+typedef struct ssdgs_context ssdgs_context; /* allocator, log, threads, kernels, GPU hook */
+typedef struct ssdgs_model ssdgs_model;     /* Gaussians, ASG bases, both networks, settings */
+typedef struct ssdgs_trainer ssdgs_trainer; /* optimiser state of one training run */
+
+/* ---- the context ---- */
+
+typedef struct ssdgs_allocator { /* both or none */
+    void *(*allocate)(void *user, size_t bytes);
+    void (*release)(void *user, void *memory);
+    void *user;
+} ssdgs_allocator;
+
+typedef struct ssdgs_logger {
+    void (*write)(void *user, ssdgs_result code, const char *message);
+    void *user;
+} ssdgs_logger;
+
+/* Runs task(data, 0) .. task(data, count - 1), in any order, on any threads, and returns when all are done.
+   Results never depend on how. */
+typedef struct ssdgs_parallel {
+    void (*run)(void *user, int count, void (*task)(void *data, int index), void *data);
+    void *user;
+} ssdgs_parallel;
+
+/* The stages of a frame, in order. A hook replaces any of them; NULL runs the CPU's. */
+typedef enum ssdgs_stage {
+    SSDGS_STAGE_PROJECT = 0,        /* Gaussians -> records and depths of every view */
+    SSDGS_STAGE_SORT,               /* -> order, nearest first */
+    SSDGS_STAGE_BIN,                /* -> instances and tile lists */
+    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
+    SSDGS_STAGE_SHADE,              /* -> color and the components asked for */
+    SSDGS_STAGE_COMPOSITE,          /* -> image, transmittance */
+    SSDGS_STAGE_COMPOSITE_BACKWARD, /* image_gradient -> splat_gradient, color_gradient */
+    SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient -> gradient, global_gradient, light and eye gradients */
+    SSDGS_STAGE_PROJECT_BACKWARD,   /* splat_gradient -> gradient, view_gradient */
+    SSDGS_STAGE_COUNT
+} ssdgs_stage;
+
+struct ssdgs_frame;
+typedef struct ssdgs_gpu_hook {
+    ssdgs_result (*stage[SSDGS_STAGE_COUNT])(void *user, struct ssdgs_frame *frame);
+    void *user;
+} ssdgs_gpu_hook;
+
+typedef struct ssdgs_context_desc { /* all zero = defaults */
+    ssdgs_allocator allocator; /* malloc, free */
+    ssdgs_logger logger;       /* none */
+    ssdgs_parallel parallel;   /* the context's own thread pool */
+    ssdgs_gpu_hook gpu;        /* none */
+    int threads;               /* 0 = one per CPU; the pool's size */
+    ssdgs_isa isa;             /* the best this CPU has; another one fails with SSDGS_ERR_ISA if absent */
+} ssdgs_context_desc;
+
+/* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
+SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
+/* Joins the threads. Models and trainers of the context must be gone. NULL is fine. */
+SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
+/* What the last failure on this context was about: names the file, key, byte or parameter. Never NULL. */
+SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
+SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
+SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa);
+/* The instruction set in use; with the number of threads. */
+SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context);
+SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
+
+/* ---- the model ---- */
+
+typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY } ssdgs_dipole;
+typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR } ssdgs_asg; /* eq. 12, or the released angular form */
+typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
+typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur; /* +0.3 px^2, or a floor of 0.2 px^2 with opacity compensation */
+
+enum { /* terms of eq. 3; a mask */
+    SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8, SSDGS_ALL_TERMS = 15
+};
+
+#define SSDGS_ASG_COUNT 8
+#define SSDGS_MATERIAL_COUNT 6
+#define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
+
+/* Raw parameters of a Gaussian, one plane each, and their first plane. Activations: ../spec in the manual. */
+enum {
+    SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
+    SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
+};
+
+/* What a model computes; stored in its file. */
+typedef struct ssdgs_settings {
+    int version;              /* stamped by ssdgs_settings_default / _published */
+    int terms;                /* SSDGS_*_TERM mask */
+    int baked;                /* 1: softplus(diffuse) is the colour itself, lights are ignored (a plain splat file) */
+    int transfer;             /* ssdgs_transfer: how stored images relate to the colours splatted */
+    int dipole;               /* ssdgs_dipole */
+    int asg;                  /* ssdgs_asg */
+    int per_channel_optics;   /* 1: sigma_s, sigma_a for each colour channel */
+    int depth_cue;            /* 1: the scattering network sees the depth cue; positions are in length units */
+    int residual_shadow;      /* 1: the shadow network corrects the logit of the visibility; positions in length units */
+    int shadow_on_scattering; /* 1: eq. 14, the ablation */
+    int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
+    int scattering_width;     /* hidden width */
+    int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
+    int shadow_width;
+    int light_blur;           /* ssdgs_blur of the light pass */
+    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide */
+    ssdgs_real light_bias;    /* world units: what lies nearer to the light by less than this does not shadow */
+    ssdgs_real eta;           /* index of refraction, 1 .. 2.5 */
+    ssdgs_real centre[3];     /* origin of the networks' positions */
+    ssdgs_real length_unit;   /* world units in one network unit */
+    ssdgs_real light_scale;   /* factor from the dataset's intensities to the model's */
+} ssdgs_settings;
+
+SSDGS_API ssdgs_settings ssdgs_settings_default(void);
+SSDGS_API ssdgs_settings ssdgs_settings_published(void);
+
+/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in code. */
+typedef struct ssdgs_model_view {
+    int count;               /* Gaussians */
+    size_t stride;           /* floats from one plane to the next */
+    ssdgs_real *gaussians;   /* (SSDGS_CHANNELS, stride) */
+    ssdgs_real *asg_basis;   /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
+    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u */
+    ssdgs_real *asg_sigma;   /* (SSDGS_ASG_COUNT) raw sigma of the angular form */
+    ssdgs_real *scattering;  /* per layer: (out, in) weights, then (out) biases */
+    size_t scattering_count;
+    ssdgs_real *shadow;
+    size_t shadow_count;
+} ssdgs_model_view;
+
+/* A model of count Gaussians with neutral parameters (grey, opacity 0.1, networks at their start).
+   settings NULL = default. ERR_OPTIONS, ERR_ARGUMENT, ERR_LIMIT, ERR_MEMORY. */
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out);
+SSDGS_API void ssdgs_model_destroy(ssdgs_model *model);
+SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
+SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
+
+/* What reading a file had to mend. */
+typedef struct ssdgs_load_stats {
+    int zero_rotations;      /* replaced by the identity */
+    int clamped_opacities;   /* infinite or beyond +-20 */
+    int clamped_scales;      /* beyond +-20 */
+    int dropped;             /* Gaussians with other non-finite values */
+    int plain;               /* 1: no SSD-GS properties, loaded as baked colours */
+} ssdgs_load_stats;
+
+#ifndef SSDGS_NO_STDIO
+/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact.
+   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY. */
+SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
+SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
+#endif
+/* The same from bytes in memory (not kept). */
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out, ssdgs_load_stats *stats);
+
+/* ---- rendering ---- */
+
+typedef struct ssdgs_camera {
+    int width, height;         /* px */
+    ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
+    ssdgs_real view[12];       /* (3,4) row-major world to camera; x right, y down, z forward */
+    ssdgs_real near_plane;     /* world units; 0 = 0.01 */
+} ssdgs_camera;
+
+typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
+typedef struct ssdgs_light {
+    ssdgs_light_kind kind;
+    ssdgs_real position[3];  /* world; directional: unit vector towards the light */
+    ssdgs_real intensity[3]; /* RGB, in the units of the training data; directional: irradiance */
+} ssdgs_light;
+
+/* Camera at eye looking at target; focal length for a horizontal field of view in radians. up may be any vector. */
+SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3], const ssdgs_real up[3],
+                                            ssdgs_real fov_x, int width, int height);
+
+/* Where results go. The caller owns every plane; NULL = not computed. Colours are linear (settings.transfer none: stored
+   values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha) background = color. */
+typedef struct ssdgs_image {
+    int stride;             /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;      /* (h,w,3) */
+    ssdgs_real *alpha;      /* (h,w) */
+    ssdgs_real *depth;      /* (h,w) expected camera depth, sum of weight x depth, not divided by alpha */
+    ssdgs_real *normal;     /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;    /* (h,w,3) */
+    ssdgs_real *specular;   /* (h,w,3) */
+    ssdgs_real *scattering; /* (h,w,3) */
+    ssdgs_real *shadow;     /* (h,w) sum of weight x S, S averaged over the lights */
+} ssdgs_image;
+
+typedef struct ssdgs_render_options {
+    int version;                  /* stamped by ssdgs_render_options_default */
+    int terms;                    /* of the model's terms, those to render */
+    int antialias;                /* 1: opacity compensated for the 0.3 px^2 blur (Mip-Splatting) */
+    ssdgs_real background[3];     /* linear; transfer none: stored values */
+    ssdgs_real stop;              /* a pixel is done when its transmittance falls below; 0 = never */
+    ssdgs_real alpha_threshold;   /* splats fainter than this at a pixel are not drawn */
+} ssdgs_render_options;
+
+SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
+
+typedef struct ssdgs_render_stats {
+    int gaussians;      /* in the model */
+    int visible;        /* inside the camera's frustum */
+    int shaded;         /* contributing to a pixel */
+    int rejected;       /* dropped for a non-finite projection */
+    int light_views;    /* light maps rendered */
+    size_t instances;   /* (tile, splat) pairs of the camera */
+} ssdgs_render_stats;
+
+/* Renders model seen by camera, lit by lights[0 .. light_count). After the first frame of a size nothing is allocated. */
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                    const ssdgs_image *image);
+/* The same with options (NULL = default) and statistics (may be NULL). */
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats);
+
+/* sRGB transfer curve and its inverse (IEC 61966-2-1). */
+SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear);
+SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
+/* Clamps, encodes by the model's transfer and rounds (count) values to bytes. */
+SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
+
+/* ---- training ---- */
+
+typedef enum ssdgs_pixels { SSDGS_PIXELS_RGBA8 = 0, SSDGS_PIXELS_RGBA16 } ssdgs_pixels; /* native-endian 16 bit */
+
+/* One photograph. The pixels stay the caller's and must outlive the trainer. */
+typedef struct ssdgs_photo {
+    ssdgs_camera camera;
+    ssdgs_light light;
+    const void *pixels;  /* (h,w,4), tightly packed, straight alpha, stored values */
+    ssdgs_pixels format;
+} ssdgs_photo;
+
+typedef enum ssdgs_schedule { /* the paper's orders H to K */
+    SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
+} ssdgs_schedule;
+
+typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rate, first and last */
+
+/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations`. */
+typedef struct ssdgs_train_options {
+    int version;               /* stamped by ssdgs_train_options_default */
+    int iterations;            /* 60000 */
+    uint64_t seed;             /* 1 */
+    int schedule;              /* ssdgs_schedule */
+    ssdgs_real background[3];  /* stored values */
+    ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
+    int initial_points;        /* random Gaussians when the model is empty */
+    ssdgs_real bounds_min[3], bounds_max[3]; /* where they start */
+    int max_gaussians;         /* cap of the density control */
+    int densify_every, densify_from, densify_until; /* 100, 500, 50000* */
+    int opacity_reset_every;   /* 3000; 0 = never */
+    ssdgs_real densify_gradient; /* 2e-4, screen gradient in half images */
+    ssdgs_real densify_size;   /* 0.01: clone below, split above, of the scene extent */
+    ssdgs_real prune_opacity;  /* 0.005 */
+    ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
+    int refine_camera, refine_light; /* 1: fit each photograph's pose, light position */
+    ssdgs_rate camera_rate, light_rate;
+} ssdgs_train_options;
+
+SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
+
+typedef struct ssdgs_train_stats {
+    int iteration;        /* done so far */
+    int gaussians;
+    int shaded;           /* in this step */
+    int skipped_steps;    /* refused for non-finite gradients, so far */
+    double loss, psnr;    /* of this step's image */
+} ssdgs_train_stats;
+
+/* Returns 0 to stop: ssdgs_trainer_run then returns SSDGS_ERR_CANCELLED, the state is whole. */
+typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
+
+/* Trains model (made with 0 Gaussians: starts from random points) on photos; both must outlive the trainer, the photo
+   structs are copied. options NULL = default. */
+SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
+                                            const ssdgs_train_options *options, ssdgs_trainer **out);
+SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
+/* One iteration. A step with non-finite gradients changes nothing, is counted and returns SSDGS_ERR_NONFINITE. */
+SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
+/* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are skipped, ten in a
+   row end the run. */
+SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
+/* The training camera and light of photo index as refined so far. */
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light);
+/* Bytes a run will hold at most, before it starts. */
+SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height);
+
+#ifndef SSDGS_NO_STDIO
+/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings. */
+SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
+SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
+#endif
+
+typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
+
+/* Compares (h,w,3) images of stored values, clamped to [0,1]. */
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                     int width, int height, ssdgs_metrics *metrics);
+/* Renders a photograph's camera and light and compares. image (h,w,3, stored values) may be NULL. background: stored values. */
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
+                                      ssdgs_real *image, ssdgs_metrics *metrics);
+/* Fits photo's camera and light position to its pixels by `iterations` steps of Adam, the model fixed. */
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations);
+
+/* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own ---- */
+
+#define SSDGS_SPLAT_SUMS 12  /* per instance, both directions */
+#define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, unused */
+
+/* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
+typedef struct ssdgs_splat_view {
+    int light;                  /* -1: the camera */
+    int width, height;          /* px */
+    int tiles_x, tiles_y;       /* of 16x16 px */
+    int orthographic;
+    int by_distance;            /* order by distance, not by depth */
+    int compensate;             /* opacity compensated for the blur */
+    int blur;                   /* ssdgs_blur */
+    ssdgs_real fx, fy, cx, cy, view[12], near_plane;
+    /* SSDGS_STAGE_PROJECT */
+    ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
+    ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn */
+    /* SSDGS_STAGE_SORT */
+    uint32_t *order;            /* (visible) Gaussians, nearest first, ties by index */
+    int visible;
+    /* SSDGS_STAGE_BIN: an instance is one Gaussian in one tile; a Gaussian's instances are neighbours, tiles ascending */
+    size_t instance_room;       /* indices in use, with gaps */
+    size_t instances;           /* instances without the gaps */
+    uint32_t *first_instance;   /* (visible + 1) per rank in order */
+    uint32_t *instance_count;   /* (visible) */
+    uint32_t *instance_owner;   /* (instance_room) Gaussian */
+    uint32_t *instance_tile;    /* (instance_room) */
+    uint16_t *instance_mask;    /* (instance_room) which of the tile's 4x4 micro-tiles it can touch */
+    uint32_t *tile_start;       /* (tiles + 1) */
+    uint32_t *tile_list;        /* (instances) per tile, nearest first */
+    /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
+    unsigned char *instance_seen; /* (instance_room), camera */
+    ssdgs_real *instance_sums;  /* (instance_room, SSDGS_SPLAT_SUMS) */
+} ssdgs_splat_view;
+
+typedef struct ssdgs_frame {
+    ssdgs_context *context;
+    ssdgs_model *model;
+    ssdgs_settings settings;
+    ssdgs_model_view gaussians;
+    ssdgs_camera camera;
+    ssdgs_render_options options;
+    ssdgs_real eye[3];          /* the camera's centre */
+    const ssdgs_light *lights;
+    int light_count;
+    int terms;                  /* to render, after settings and options */
+    int components;             /* 1: per-Gaussian components are wanted */
+    int training;               /* 1: network activations are kept for the backward */
+    ssdgs_splat_view *views;
+    int view_count;
+    /* SSDGS_STAGE_WALK */
+    unsigned char *seen;        /* (n) a pixel blends it */
+    ssdgs_real *visibility;     /* (lights, n) eq. 7 */
+    ssdgs_real *depth_cue;      /* (lights, n) world units */
+    ssdgs_real *flux;           /* (lights, n) sr per unit intensity intercepted */
+    /* SSDGS_STAGE_SHADE */
+    uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
+    int shaded_count;
+    ssdgs_real *color;          /* (n, 4) */
+    ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
+    /* SSDGS_STAGE_COMPOSITE */
+    ssdgs_real *pixels;         /* (3, h, w) without background */
+    ssdgs_real *transmittance;  /* (h, w) */
+    /* backward */
+    ssdgs_real *pixel_gradient; /* (3, h, w) dL/d(pixels + transmittance x background) */
+    ssdgs_real *splat_gradient; /* (n, SSDGS_SPLAT_GRADIENTS) */
+    ssdgs_real *color_gradient; /* (n, 4) */
+    ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
+    ssdgs_real *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
+    ssdgs_real light_gradient[3]; /* position of light 0 */
+    ssdgs_real view_gradient[12]; /* camera.view */
+    struct ssdgs__frame_memory *memory;
+} ssdgs_frame;
+
+/* Runs the CPU's version of a stage: what a hook calls for the stages it does not replace. */
+SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSDGS_H */
+
+/* Stop here if you only want the interface. */
+
+#if defined(SSDGS_IMPLEMENTATION) && !defined(SSDGS__IMPLEMENTED)
+#define SSDGS__IMPLEMENTED
+
+/* ==== >>config  what this compiler and CPU can do ==== */
+
+#include <float.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#ifndef SSDGS_NO_STDIO
+#include <stdio.h>
+#endif
+
+#ifndef SSDGS_SELF
+#define SSDGS_SELF "ssdgs.h" /* how this file includes itself: keep its name, or define this */
+#endif
+#ifndef SSDGS_ASSERT
+#define SSDGS_ASSERT(condition) ((void)0) /* own invariants only, never input */
+#endif
+
+/* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && !defined(__TINYC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS__INLINE inline __attribute__((always_inline))
+#define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
+#if __GNUC__ >= 8 || defined(__clang__)
+#define SSDGS__UNROLL _Pragma("GCC unroll 16")
+#endif
+#elif defined(_MSC_VER)
+#define SSDGS__INLINE __forceinline
+#define SSDGS__ATTRIBUTE(target_string)
+#else
+#define SSDGS__INLINE inline
+#define SSDGS__ATTRIBUTE(target_string)
+#endif
+#ifndef SSDGS__UNROLL
+#define SSDGS__UNROLL
+#endif
+
+#define SSDGS__ISA_SCALAR 1
+#define SSDGS__ISA_SSE2 2
+#define SSDGS__ISA_AVX2 3
+#define SSDGS__ISA_AVX512 4
+#define SSDGS__ISA_NEON 5
+
+#if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && !defined(__TINYC__)
+#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)) && (defined(__GNUC__) || defined(_MSC_VER))
+#if defined(__MINGW32__) && !defined(__clang__) && !defined(__OPTIMIZE__)
+#define SSDGS__X86 1 /* its 16-byte stack cannot hold spilled AVX vectors: SSE2 alone */
+#elif defined(SSDGS_NO_AVX2)
+#define SSDGS__X86 1
+#elif defined(SSDGS_NO_AVX512)
+#define SSDGS__X86 2
+#else
+#define SSDGS__X86 3
+#endif
+#elif defined(__aarch64__) || defined(_M_ARM64)
+#define SSDGS__NEON 1
+#endif
+#endif
+#ifndef SSDGS__X86
+#define SSDGS__X86 0
+#endif
+#ifndef SSDGS__NEON
+#define SSDGS__NEON 0
+#endif
+
+#if SSDGS__X86
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* g++ on its own avx512fintrin.h */
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#endif
+#include <immintrin.h>
+#if defined(__clang__) && defined(_MSC_VER) /* clang-cl hides these without -mavx */
+#include <avxintrin.h>
+#include <avx2intrin.h>
+#include <fmaintrin.h>
+#include <avx512fintrin.h>
+#endif
+#if defined(_MSC_VER)
+#include <intrin.h>
+#else
+#include <cpuid.h>
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+#endif
+#if SSDGS__NEON
+#include <arm_neon.h>
+#endif
+
+#if defined(_WIN32)
+#ifndef WIN32_LEAN_AND_MEAN
+#define WIN32_LEAN_AND_MEAN
+#endif
+#include <windows.h>
+#elif !defined(SSDGS_NO_THREADS)
+#include <pthread.h>
+#include <unistd.h>
+#endif
+
+#ifdef SSDGS_REAL64
+#define SSDGS__SQRT(x) sqrt(x)
+#else
+#define SSDGS__SQRT(x) sqrtf(x)
+#endif
+
+#define SSDGS__BLOCK 64      /* Gaussians shaded together */
+#define SSDGS__BATCH 64      /* tile entries walked together; an entry code is index | SAMPLE | APPLY in a byte */
+#define SSDGS__SAMPLE 64
+#define SSDGS__APPLY 128
+#define SSDGS__SUMS SSDGS_SPLAT_SUMS
+#define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
+#define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
+#define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
+#define SSDGS__TV 4          /* vectors in a dense tile */
+#define SSDGS__ALPHA_MAX 0.999
+#define SSDGS__F0 0.04       /* Schlick */
+#define SSDGS__MAX_GAUSSIANS (1 << 28)
+#define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
+
+enum { /* rows of a block's geometry */
+    SSDGS__WI = 0, SSDGS__WO = 3, SSDGS__NORMAL = 6, SSDGS__IRRADIANCE = 9, SSDGS__COSINE, SSDGS__GLOSS, SSDGS__ROWS,
+    SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
+};
+
+/* ---- what the kernels are called with ---- */
+
+typedef struct ssdgs__projection {
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold;
+    int width, height, orthographic, by_distance, compensate, blur;
+} ssdgs__projection;
+
+typedef struct ssdgs__tile {
+    const ssdgs_real *record, *depth;
+    const uint32_t *list, *owner;
+    const uint16_t *mask;
+    uint32_t count;
+    int x, y, width, height;
+    ssdgs_real log2_threshold, stop, bias, depth_origin, cx, cy, inverse_focal;
+} ssdgs__tile;
+
+typedef struct ssdgs__product {
+    ssdgs_real *out;
+    const ssdgs_real *a, *b, *bias;
+    size_t out_stride, a_row, a_k, b_stride;
+    int rows, columns, depth, accumulate, relu;
+} ssdgs__product;
+
+typedef struct ssdgs__lighting {
+    ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
+    int directional, angular, dipole, diffuse, specular, shadow, scattering;
+    int residual_shadow, per_channel_optics, shadow_on_scattering;
+} ssdgs__lighting;
+
+typedef struct ssdgs__kernels {
+    void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *, ssdgs_real *);
+    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *, ssdgs_real *, size_t, ssdgs_real *);
+    void (*row_spans)(const ssdgs_real *, ssdgs_real, int, int, int, int16_t *, int16_t *);
+    void (*walk_camera)(const ssdgs__tile *, unsigned char *);
+    void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
+    void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
+    void (*composite_backward)(const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
+    void (*dense)(const ssdgs__product *);
+    void (*relu_backward)(ssdgs_real *, const ssdgs_real *, int);
+    void (*row_sums)(ssdgs_real *, const ssdgs_real *, int);
+    void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
+    void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
+    void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
+    void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, ssdgs_real *, ssdgs_real *, size_t);
+    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
+    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
+    void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
+    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                              const ssdgs_real *, ssdgs_real, ssdgs_real, ssdgs_real *);
+    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real);
+} ssdgs__kernels;
+
+/* Pixel offsets of the lanes of a 4x4 micro-tile, and the lanes' numbers. */
+static const ssdgs_real ssdgs__lane_x[16] = {0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5};
+static const ssdgs_real ssdgs__lane_y[16] = {0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5, 2.5, 2.5, 2.5, 2.5, 3.5, 3.5, 3.5, 3.5};
+static const ssdgs_real ssdgs__count[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+/* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
+static const ssdgs_real ssdgs__window[11] = {
+    (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083, (ssdgs_real)0.10936068950970002,
+    (ssdgs_real)0.2130055377112537, (ssdgs_real)0.26601172486179436, (ssdgs_real)0.2130055377112537, (ssdgs_real)0.10936068950970002,
+    (ssdgs_real)0.03600077212843083, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
+
+static SSDGS__INLINE int ssdgs__lowest_bit(unsigned mask) {
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return __builtin_ctz(mask);
+#else
+    int bit = 0;
+    while (!(mask >> bit & 1u)) bit++;
+    return bit;
+#endif
+}
+
+/* A walk's first transmittance: pixels outside the image can blend nothing. */
+static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *tile, int micro, int lane) {
+    return tile->x + 4 * (micro & 3) + (lane & 3) < tile->width && tile->y + 4 * (micro >> 2) + (lane >> 2) < tile->height ? (ssdgs_real)1
+                                                                                                                        : (ssdgs_real)-1;
+}
+
+/* ---- scalar lanes ---- */
+
+static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties to even */
+    const ssdgs_real magic = sizeof(ssdgs_real) == 4 ? (ssdgs_real)12582912.0 : (ssdgs_real)6755399441055744.0;
+    volatile ssdgs_real shifted = x + magic; /* volatile: -ffast-math would fold it away */
+    return shifted - magic;
+}
+
+static SSDGS__INLINE float ssdgs__pow2(float n) {
+    const uint32_t bits = (uint32_t)((int)n + 127) << 23;
+    float x;
+    memcpy(&x, &bits, 4);
+    return x;
+}
+
+static SSDGS__INLINE float ssdgs__exponent(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, 4);
+    return (float)((int)(bits >> 23) - 127);
+}
+
+static int ssdgs__finite(ssdgs_real x) {
+#ifdef SSDGS_REAL64
+    uint64_t bits;
+    memcpy(&bits, &x, 8);
+    return (bits >> 52 & 0x7FF) != 0x7FF;
+#else
+    uint32_t bits;
+    memcpy(&bits, &x, 4);
+    return (bits >> 23 & 0xFF) != 0xFF;
+#endif
+}
+
+/* ---- the tables ---- */
+
+#define SSDGS__ISA SSDGS__ISA_SCALAR
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#if SSDGS__X86 >= 1
+#define SSDGS__ISA SSDGS__ISA_SSE2
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#endif
+#if SSDGS__X86 >= 2
+#define SSDGS__ISA SSDGS__ISA_AVX2
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#endif
+#if SSDGS__X86 >= 3
+#define SSDGS__ISA SSDGS__ISA_AVX512
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#endif
+#if SSDGS__NEON
+#define SSDGS__ISA SSDGS__ISA_NEON
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#endif
+
+/* ==== >>memory  contexts, errors, aligned allocation ==== */
+
+#define SSDGS__MESSAGE 512
+
+struct ssdgs_context {
+    ssdgs_allocator allocator;
+    ssdgs_logger logger;
+    ssdgs_parallel parallel;
+    ssdgs_gpu_hook gpu;
+    const ssdgs__kernels *k;
+    struct ssdgs__pool *pool;
+    struct ssdgs__frame_memory *frame; /* reused by every render on this context */
+    int isa, threads;
+    char message[SSDGS__MESSAGE];
+};
+
+static void ssdgs__append(char *text, size_t *at, const char *more) {
+    while (*more && *at + 1 < SSDGS__MESSAGE) text[(*at)++] = *more++;
+    text[*at] = 0;
+}
+
+static void ssdgs__append_number(char *text, size_t *at, double value) {
+    char digits[32];
+    int n = 31, i;
+    uint64_t whole, rest;
+    digits[n] = 0;
+    if (value < 0) {
+        ssdgs__append(text, at, "-");
+        value = -value;
+    }
+    if (!(value < 9e15)) {
+        ssdgs__append(text, at, "huge");
+        return;
+    }
+    whole = (uint64_t)value;
+    rest = (uint64_t)((value - (double)whole) * 1e6 + 0.5);
+    if (rest >= 1000000) {
+        whole++;
+        rest = 0;
+    }
+    if (rest) {
+        int shown = 0;
+        for (i = 0; i < 6; i++, rest /= 10) {
+            if (rest % 10 || shown) {
+                digits[--n] = (char)('0' + rest % 10);
+                shown = 1;
+            }
+        }
+        digits[--n] = '.';
+    }
+    do {
+        digits[--n] = (char)('0' + whole % 10);
+        whole /= 10;
+    } while (whole);
+    ssdgs__append(text, at, digits + n);
+}
+
+/* Records what went wrong (%s, %d int, %z size_t, %g double), tells the log, returns the code. */
+static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
+    size_t at = 0;
+    va_list arguments;
+    va_start(arguments, format);
+    context->message[0] = 0;
+    for (; *format; format++) {
+        char one[2];
+        one[0] = *format;
+        one[1] = 0;
+        if (*format != '%') ssdgs__append(context->message, &at, one);
+        else switch (*++format) {
+            case 's': ssdgs__append(context->message, &at, va_arg(arguments, const char *)); break;
+            case 'd': ssdgs__append_number(context->message, &at, (double)va_arg(arguments, int)); break;
+            case 'z': ssdgs__append_number(context->message, &at, (double)va_arg(arguments, size_t)); break;
+            default: ssdgs__append_number(context->message, &at, va_arg(arguments, double)); break;
+        }
+    }
+    va_end(arguments);
+    if (context->logger.write) context->logger.write(context->logger.user, code, context->message);
+    return code;
+}
+
+static int ssdgs__product_fits(size_t a, size_t b, size_t *product) {
+    if (b && a > SIZE_MAX / b) return 0;
+    *product = a * b;
+    return 1;
+}
+
+static void *ssdgs__default_allocate(void *user, size_t bytes) {
+    (void)user;
+    return malloc(bytes);
+}
+
+static void ssdgs__default_release(void *user, void *memory) {
+    (void)user;
+    free(memory);
+}
+
+/* 64-byte aligned and zeroed; the distance to the allocator's pointer stands in front. */
+static void *ssdgs__allocate_from(const ssdgs_allocator *allocator, size_t bytes) {
+    unsigned char *raw, *memory;
+    if (bytes > SIZE_MAX - 128) return NULL;
+    raw = (unsigned char *)allocator->allocate(allocator->user, bytes + 128);
+    if (!raw) return NULL;
+    memory = raw + 128 - ((uintptr_t)raw & 63);
+    memory[-1] = (unsigned char)(memory - raw);
+    memset(memory, 0, bytes);
+    return memory;
+}
+
+static void ssdgs__release_to(const ssdgs_allocator *allocator, void *memory) {
+    unsigned char *bytes = (unsigned char *)memory;
+    if (bytes) allocator->release(allocator->user, bytes - bytes[-1]);
+}
+
+static void *ssdgs__allocate(ssdgs_context *context, size_t bytes) {
+    void *memory = ssdgs__allocate_from(&context->allocator, bytes);
+    if (!memory) ssdgs__fail(context, SSDGS_ERR_MEMORY, "out of memory: %z bytes", bytes);
+    return memory;
+}
+
+static void ssdgs__release(ssdgs_context *context, void *memory) { ssdgs__release_to(&context->allocator, memory); }
+
+/* A buffer that only grows: after the first frame of a size nothing is allocated. Contents are lost on growth. */
+typedef struct ssdgs__buffer {
+    void *memory;
+    size_t bytes;
+} ssdgs__buffer;
+
+static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
+    size_t bytes;
+    if (!ssdgs__product_fits(count, size, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes", count, size);
+    if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
+    ssdgs__release(context, buffer->memory);
+    buffer->bytes = 0;
+    buffer->memory = ssdgs__allocate(context, bytes + bytes / 8);
+    if (!buffer->memory) return SSDGS_ERR_MEMORY;
+    buffer->bytes = bytes + bytes / 8;
+    return SSDGS_OK;
+}
+
+/* ==== >>threads  a pool per context ====
+   Work is cut by the problem, never by the thread count; every task writes its own place. */
+
+typedef void (*ssdgs__task)(void *data, int index);
+
+#ifndef SSDGS_NO_THREADS
+#if defined(_WIN32)
+typedef CRITICAL_SECTION ssdgs__mutex;
+typedef CONDITION_VARIABLE ssdgs__condition;
+typedef HANDLE ssdgs__thread;
+#define SSDGS__THREAD_FUNCTION(name) static DWORD WINAPI name(LPVOID data)
+static int ssdgs__mutex_create(ssdgs__mutex *m) { InitializeCriticalSection(m); return 1; }
+static void ssdgs__mutex_destroy(ssdgs__mutex *m) { DeleteCriticalSection(m); }
+static void ssdgs__lock(ssdgs__mutex *m) { EnterCriticalSection(m); }
+static void ssdgs__unlock(ssdgs__mutex *m) { LeaveCriticalSection(m); }
+static int ssdgs__condition_create(ssdgs__condition *c) { InitializeConditionVariable(c); return 1; }
+static void ssdgs__condition_destroy(ssdgs__condition *c) { (void)c; }
+static void ssdgs__wait(ssdgs__condition *c, ssdgs__mutex *m) { SleepConditionVariableCS(c, m, INFINITE); }
+static void ssdgs__wake(ssdgs__condition *c) { WakeAllConditionVariable(c); }
+static int ssdgs__thread_create(ssdgs__thread *t, LPTHREAD_START_ROUTINE f, void *data) { return (*t = CreateThread(NULL, 0, f, data, 0, NULL)) != NULL; }
+static void ssdgs__thread_join(ssdgs__thread t) { WaitForSingleObject(t, INFINITE); CloseHandle(t); }
+static int ssdgs__cpu_count(void) { SYSTEM_INFO info; GetSystemInfo(&info); return (int)info.dwNumberOfProcessors; }
+#else
+typedef pthread_mutex_t ssdgs__mutex;
+typedef pthread_cond_t ssdgs__condition;
+typedef pthread_t ssdgs__thread;
+#define SSDGS__THREAD_FUNCTION(name) static void *name(void *data)
+static int ssdgs__mutex_create(ssdgs__mutex *m) { return pthread_mutex_init(m, NULL) == 0; }
+static void ssdgs__mutex_destroy(ssdgs__mutex *m) { pthread_mutex_destroy(m); }
+static void ssdgs__lock(ssdgs__mutex *m) { pthread_mutex_lock(m); }
+static void ssdgs__unlock(ssdgs__mutex *m) { pthread_mutex_unlock(m); }
+static int ssdgs__condition_create(ssdgs__condition *c) { return pthread_cond_init(c, NULL) == 0; }
+static void ssdgs__condition_destroy(ssdgs__condition *c) { pthread_cond_destroy(c); }
+static void ssdgs__wait(ssdgs__condition *c, ssdgs__mutex *m) { pthread_cond_wait(c, m); }
+static void ssdgs__wake(ssdgs__condition *c) { pthread_cond_broadcast(c); }
+static int ssdgs__thread_create(ssdgs__thread *t, void *(*f)(void *), void *data) { return pthread_create(t, NULL, f, data) == 0; }
+static void ssdgs__thread_join(ssdgs__thread t) { pthread_join(t, NULL); }
+static int ssdgs__cpu_count(void) {
+#ifdef _SC_NPROCESSORS_ONLN
+    return (int)sysconf(_SC_NPROCESSORS_ONLN);
+#else
+    return 1;
+#endif
+}
+#endif
+
+typedef struct ssdgs__pool {
+    ssdgs__mutex mutex;
+    ssdgs__condition start, done;
+    ssdgs__thread *threads;
+    int thread_count, stop;
+    unsigned generation;
+    ssdgs__task task;
+    void *data;
+    int count, next, running;
+} ssdgs__pool;
+
+/* Takes tasks until none is left; called with the mutex held. */
+static void ssdgs__pool_work(ssdgs__pool *pool) {
+    pool->running++;
+    while (pool->next < pool->count) {
+        const int index = pool->next++;
+        ssdgs__unlock(&pool->mutex);
+        pool->task(pool->data, index);
+        ssdgs__lock(&pool->mutex);
+    }
+    if (--pool->running == 0) ssdgs__wake(&pool->done);
+}
+
+SSDGS__THREAD_FUNCTION(ssdgs__pool_thread) {
+    ssdgs__pool *pool = (ssdgs__pool *)data;
+    unsigned seen = 0;
+    ssdgs__lock(&pool->mutex);
+    for (;;) {
+        while (!pool->stop && pool->generation == seen) ssdgs__wait(&pool->start, &pool->mutex);
+        if (pool->stop) break;
+        seen = pool->generation;
+        ssdgs__pool_work(pool);
+    }
+    ssdgs__unlock(&pool->mutex);
+    return 0;
+}
+
+static void ssdgs__pool_run(void *user, int count, ssdgs__task task, void *data) {
+    ssdgs__pool *pool = (ssdgs__pool *)user;
+    ssdgs__lock(&pool->mutex);
+    pool->task = task;
+    pool->data = data;
+    pool->count = count;
+    pool->next = 0;
+    pool->generation++;
+    ssdgs__wake(&pool->start);
+    ssdgs__pool_work(pool);
+    while (pool->running) ssdgs__wait(&pool->done, &pool->mutex);
+    ssdgs__unlock(&pool->mutex);
+}
+
+static void ssdgs__pool_destroy(const ssdgs_allocator *allocator, ssdgs__pool *pool) {
+    int i;
+    if (!pool) return;
+    ssdgs__lock(&pool->mutex);
+    pool->stop = 1;
+    ssdgs__wake(&pool->start);
+    ssdgs__unlock(&pool->mutex);
+    for (i = 0; i < pool->thread_count; i++) ssdgs__thread_join(pool->threads[i]);
+    ssdgs__condition_destroy(&pool->done);
+    ssdgs__condition_destroy(&pool->start);
+    ssdgs__mutex_destroy(&pool->mutex);
+    ssdgs__release_to(allocator, pool->threads);
+    ssdgs__release_to(allocator, pool);
+}
+
+/* A pool of `threads` workers, the caller counted; fewer where the system gives fewer. */
+static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int threads) {
+    ssdgs__pool *pool = (ssdgs__pool *)ssdgs__allocate_from(allocator, sizeof *pool);
+    if (!pool) return NULL;
+    pool->threads = (ssdgs__thread *)ssdgs__allocate_from(allocator, sizeof(ssdgs__thread) * (size_t)threads);
+    if (!pool->threads || !ssdgs__mutex_create(&pool->mutex)) {
+        ssdgs__release_to(allocator, pool->threads);
+        ssdgs__release_to(allocator, pool);
+        return NULL;
+    }
+    if (!ssdgs__condition_create(&pool->start) || !ssdgs__condition_create(&pool->done)) { /* never seen to fail: leak nothing but the lock */
+        ssdgs__mutex_destroy(&pool->mutex);
+        ssdgs__release_to(allocator, pool->threads);
+        ssdgs__release_to(allocator, pool);
+        return NULL;
+    }
+    while (pool->thread_count < threads - 1) {
+        if (!ssdgs__thread_create(&pool->threads[pool->thread_count], ssdgs__pool_thread, pool)) break;
+        pool->thread_count++;
+    }
+    return pool;
+}
+#endif
+
+static void ssdgs__serial_run(void *user, int count, ssdgs__task task, void *data) {
+    int i;
+    (void)user;
+    for (i = 0; i < count; i++) task(data, i);
+}
+
+static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
+    if (count > 0) context->parallel.run(context->parallel.user, count, task, data);
+}
+
+/* ==== >>cpu  which tables this machine can run ==== */
+
+#if SSDGS__X86
+static void ssdgs__cpuid(unsigned leaf, unsigned out[4]) {
+#if defined(_MSC_VER)
+    int r[4];
+    __cpuidex(r, (int)leaf, 0);
+    memcpy(out, r, sizeof r);
+#else
+    out[0] = out[1] = out[2] = out[3] = 0;
+    __get_cpuid_count(leaf, 0, &out[0], &out[1], &out[2], &out[3]);
+#endif
+}
+
+/* 1 = SSE2, 2 = and AVX2 with FMA, 3 = and AVX-512F; the operating system must save the registers too. */
+static int ssdgs__x86_level(void) {
+    unsigned a[4], b[4], saved;
+    ssdgs__cpuid(1, a);
+    ssdgs__cpuid(7, b);
+    if (!(a[3] >> 26 & 1)) return 0;
+    if (!(a[2] >> 27 & 1) || !(a[2] >> 28 & 1) || !(a[2] >> 12 & 1) || !(b[1] >> 5 & 1)) return 1;
+#if defined(_MSC_VER)
+    saved = (unsigned)_xgetbv(0);
+#else
+    {
+        unsigned high;
+        __asm__ volatile("xgetbv" : "=a"(saved), "=d"(high) : "c"(0));
+    }
+#endif
+    if ((saved & 6u) != 6u) return 1;
+    return (b[1] >> 16 & 1) && (saved & 0xE0u) == 0xE0u ? 3 : 2;
+}
+#endif
+
+static const ssdgs__kernels *ssdgs__table(int isa) {
+#if SSDGS__X86
+    const int level = ssdgs__x86_level();
+#endif
+    switch (isa) {
+        case SSDGS_ISA_SCALAR: return &ssdgs__kernels_scalar;
+#if SSDGS__X86 >= 1
+        case SSDGS_ISA_SSE2: return level >= 1 ? &ssdgs__kernels_sse2 : NULL;
+#endif
+#if SSDGS__X86 >= 2
+        case SSDGS_ISA_AVX2: return level >= 2 ? &ssdgs__kernels_avx2 : NULL;
+#endif
+#if SSDGS__X86 >= 3
+        case SSDGS_ISA_AVX512: return level >= 3 ? &ssdgs__kernels_avx512 : NULL;
+#endif
+#if SSDGS__NEON
+        case SSDGS_ISA_NEON: return &ssdgs__kernels_neon;
+#endif
+        default: return NULL;
+    }
+}
+
+SSDGS_API const char *ssdgs_result_string(ssdgs_result result) {
+#define SSDGS__RESULT_TEXT(name, text) text,
+    static const char *const texts[] = {SSDGS_RESULTS(SSDGS__RESULT_TEXT) "unknown"};
+#undef SSDGS__RESULT_TEXT
+    return texts[(int)result >= 0 && result < SSDGS_RESULT_COUNT ? (int)result : (int)SSDGS_RESULT_COUNT];
+}
+
+SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
+    static const char *const names[] = {"auto", "scalar", "sse2", "avx2", "avx512", "neon", "unknown"};
+    return names[(int)isa >= 0 && isa < SSDGS_ISA_COUNT ? (int)isa : (int)SSDGS_ISA_COUNT];
+}
+
+static void ssdgs__frame_memory_destroy(ssdgs_context *context, struct ssdgs__frame_memory *memory);
+
+SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out) {
+    ssdgs_context_desc zero;
+    ssdgs_context *context;
+    int isa;
+    if (!out) return SSDGS_ERR_ARGUMENT;
+    *out = NULL;
+    memset(&zero, 0, sizeof zero);
+    if (desc) zero = *desc;
+    if (!zero.allocator.allocate != !zero.allocator.release || zero.threads < 0 || zero.threads > 1024) return SSDGS_ERR_ARGUMENT;
+    if (!zero.allocator.allocate) {
+        zero.allocator.allocate = ssdgs__default_allocate;
+        zero.allocator.release = ssdgs__default_release;
+    }
+    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table(zero.isa))) return SSDGS_ERR_ISA;
+    context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
+    if (!context) return SSDGS_ERR_MEMORY;
+    context->allocator = zero.allocator;
+    context->logger = zero.logger;
+    context->gpu = zero.gpu;
+    context->isa = zero.isa;
+    for (isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
+        if (ssdgs__table(isa)) context->isa = isa;
+    context->k = ssdgs__table(context->isa);
+    context->threads = 1;
+    context->parallel = zero.parallel;
+    if (!context->parallel.run) {
+        context->parallel.run = ssdgs__serial_run;
+#ifndef SSDGS_NO_THREADS
+        context->threads = zero.threads ? zero.threads : ssdgs__cpu_count();
+        if (context->threads < 1) context->threads = 1;
+        if (context->threads > 1) {
+            context->pool = ssdgs__pool_create(&context->allocator, context->threads);
+            if (!context->pool) {
+                ssdgs__release_to(&zero.allocator, context);
+                return SSDGS_ERR_MEMORY;
+            }
+            context->parallel.run = ssdgs__pool_run;
+            context->parallel.user = context->pool;
+        }
+#endif
+    }
+    *out = context;
+    return SSDGS_OK;
+}
+
+SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
+    ssdgs_allocator allocator;
+    if (!context) return;
+    allocator = context->allocator;
+    ssdgs__frame_memory_destroy(context, context->frame);
+#ifndef SSDGS_NO_THREADS
+    ssdgs__pool_destroy(&allocator, context->pool);
+#endif
+    ssdgs__release_to(&allocator, context);
+}
+
+SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) { return context ? context->message : "no context"; }
+SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) { return (ssdgs_isa)context->isa; }
+SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return context->threads; }
+
+/* ==== >>model  Gaussians, ASG bases, networks, settings ==== */
+
+struct ssdgs_model {
+    ssdgs_context *context;
+    ssdgs_settings settings;
+    int count;
+    size_t capacity;      /* plane stride, a multiple of SSDGS__BLOCK */
+    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
+    size_t global_count;
+    ssdgs_real *globals;  /* the groups of ssdgs__global_groups, in order */
+};
+
+enum { SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET, SSDGS__GLOBAL_GROUPS };
+
+/* A counter-based generator: the value depends on the key and the counter alone, never on the order of use. */
+static uint64_t ssdgs__hash(uint64_t key, uint64_t counter) {
+    uint64_t x = key * UINT64_C(0x9E3779B97F4A7C15) + counter;
+    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
+    x ^= x >> 31;
+    x = (x + UINT64_C(0x9E3779B97F4A7C15)) * UINT64_C(0xD6E8FEB86659FD93);
+    return x ^ (x >> 32);
+}
+
+static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
+    return (double)(ssdgs__hash(key, counter) >> 11) * (1.0 / 9007199254740992.0);
+}
+
+/* Sum of twelve uniforms less six: normal enough to scatter split Gaussians, the same on every machine. */
+static double ssdgs__normal(uint64_t key, uint64_t counter) {
+    double sum = -6;
+    int i;
+    for (i = 0; i < 12; i++) sum += ssdgs__uniform(key, counter * 12 + (uint64_t)i);
+    return sum;
+}
+
+/* Layer sizes, inputs first; returns the number of linear layers. */
+static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
+    const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
+    int i;
+    sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT : 27 * 3 + 3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0);
+    for (i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
+    if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
+    return layers;
+}
+
+static size_t ssdgs__network_count(const ssdgs_settings *settings, int shadow) {
+    int sizes[SSDGS_MAX_LAYERS + 1], i;
+    const int layers = ssdgs__network_sizes(settings, shadow, sizes);
+    size_t count = 0;
+    for (i = 0; i < layers; i++) count += (size_t)(sizes[i] + 1) * (size_t)sizes[i + 1];
+    return count;
+}
+
+/* First value of each group of shared parameters; the last entry is their number. */
+static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SSDGS__GLOBAL_GROUPS + 1]) {
+    first[0] = 0;
+    first[1] = SSDGS_ASG_COUNT * 4;
+    first[2] = first[1] + SSDGS_ASG_COUNT * 2;
+    first[3] = first[2] + SSDGS_ASG_COUNT;
+    first[4] = first[3] + ssdgs__network_count(settings, 0);
+    first[5] = first[4] + ssdgs__network_count(settings, 1);
+}
+
+SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
+    ssdgs_settings s;
+    memset(&s, 0, sizeof s);
+    s.version = SSDGS_VERSION;
+    s.terms = SSDGS_ALL_TERMS;
+    s.transfer = SSDGS_TRANSFER_SRGB;
+    s.per_channel_optics = s.depth_cue = s.residual_shadow = 1;
+    s.scattering_layers = 3;
+    s.scattering_width = 64;
+    s.shadow_layers = 4;
+    s.shadow_width = 32;
+    s.light_blur = SSDGS_BLUR_FLOOR;
+    s.eta = (ssdgs_real)1.3;
+    s.length_unit = (ssdgs_real)0.5;
+    s.light_scale = 1;
+    return s;
+}
+
+SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
+    ssdgs_settings s = ssdgs_settings_default();
+    s.transfer = SSDGS_TRANSFER_NONE;
+    s.per_channel_optics = s.depth_cue = s.residual_shadow = 0;
+    s.scattering_layers = 6;
+    s.scattering_width = 256;
+    s.light_blur = SSDGS_BLUR_ADD;
+    s.length_unit = 1;
+    return s;
+}
+
+static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
+    if (s->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
+#define SSDGS__RANGE(field, low, high)                                                                                    \
+    if (!(s->field >= (low) && s->field <= (high)) || !ssdgs__finite((ssdgs_real)s->field))                               \
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s = %g is not within %g .. %g", #field, (double)s->field, (double)(low), (double)(high))
+    SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
+    SSDGS__RANGE(baked, 0, 1);
+    SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
+    SSDGS__RANGE(dipole, 0, SSDGS_DIPOLE_BURLEY);
+    SSDGS__RANGE(asg, 0, SSDGS_ASG_ANGULAR);
+    SSDGS__RANGE(per_channel_optics, 0, 1);
+    SSDGS__RANGE(depth_cue, 0, 1);
+    SSDGS__RANGE(residual_shadow, 0, 1);
+    SSDGS__RANGE(shadow_on_scattering, 0, 1);
+    SSDGS__RANGE(scattering_layers, 2, SSDGS_MAX_LAYERS);
+    SSDGS__RANGE(scattering_width, 1, 1024);
+    SSDGS__RANGE(shadow_layers, 0, SSDGS_MAX_LAYERS);
+    SSDGS__RANGE(shadow_width, 1, 1024);
+    SSDGS__RANGE(light_blur, 0, SSDGS_BLUR_FLOOR);
+    SSDGS__RANGE(light_map_size, 0, 8192);
+    SSDGS__RANGE(light_bias, 0, (ssdgs_real)1e30);
+    SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
+    SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
+    SSDGS__RANGE(light_scale, 0, (ssdgs_real)1e30);
+    SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+#undef SSDGS__RANGE
+    return SSDGS_OK;
+}
+
+/* Neutral values of one Gaussian: grey, opacity 0.1, everything else at the start of training. */
+static void ssdgs__gaussian_reset(ssdgs_real *gaussians, size_t stride, size_t index) {
+    int i;
+    for (i = 0; i < SSDGS_CHANNELS; i++) gaussians[(size_t)i * stride + index] = 0;
+    gaussians[SSDGS_ROTATION * stride + index] = gaussians[SSDGS_FRAME * stride + index] = 1;
+    gaussians[SSDGS_OPACITY * stride + index] = (ssdgs_real)-2.1972245773362196; /* logit 0.1 */
+    for (i = 0; i < 3; i++) {
+        gaussians[(size_t)(SSDGS_LOG_SCALE + i) * stride + index] = (ssdgs_real)-4;
+        gaussians[(size_t)(SSDGS_DIFFUSE + i) * stride + index] = gaussians[(size_t)(SSDGS_SPECULAR + i) * stride + index] =
+            gaussians[(size_t)(SSDGS_SCATTERING + i) * stride + index] = (ssdgs_real)0.5;
+    }
+    for (i = 0; i < SSDGS_MATERIAL_COUNT; i++) gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
+}
+
+/* Room for `capacity` Gaussians; existing ones are kept. */
+static ssdgs_result ssdgs__planes_grow(ssdgs_context *context, ssdgs_real **planes, size_t *stride, size_t count, size_t capacity) {
+    ssdgs_real *grown;
+    size_t bytes, i;
+    capacity = (capacity + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    if (*planes && capacity <= *stride) return SSDGS_OK;
+    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof **planes, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
+    grown = (ssdgs_real *)ssdgs__allocate(context, bytes);
+    if (!grown) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < SSDGS_CHANNELS && count; i++) memcpy(grown + i * capacity, *planes + i * *stride, count * sizeof *grown);
+    ssdgs__release(context, *planes);
+    *planes = grown;
+    *stride = capacity;
+    return SSDGS_OK;
+}
+
+/* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow network's last layer is
+   0. ASG lobes start spread over the hemisphere, from broad to sharp. */
+static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
+    const double pi = 3.14159265358979323846;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], at;
+    int net, layer, j, i;
+    ssdgs__global_groups(&model->settings, first);
+    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        ssdgs_real *q = model->globals + 4 * j, *sharpness = model->globals + first[SSDGS__ASG_SHARPNESS] + 2 * j;
+        q[0] = (ssdgs_real)cos(pi * j / (2 * SSDGS_ASG_COUNT));
+        q[1] = q[2] = 0;
+        q[3] = (ssdgs_real)sin(pi * j / (2 * SSDGS_ASG_COUNT)); /* a turn about the normal */
+        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR ? 0 : (ssdgs_real)(0.5 + 0.6 * j);
+        sharpness[1] = sharpness[0];
+    }
+    for (net = 0; net < 2; net++) {
+        int sizes[SSDGS_MAX_LAYERS + 1];
+        const int layers = ssdgs__network_sizes(&model->settings, net, sizes);
+        at = first[net ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
+        for (layer = 0; layer < layers; layer++) {
+            const double bound = 1 / sqrt((double)sizes[layer]);
+            const int still = net && layer == layers - 1 && model->settings.residual_shadow;
+            for (i = 0; i < (sizes[layer] + 1) * sizes[layer + 1]; i++, at++)
+                model->globals[at] = still ? 0 : (ssdgs_real)(bound * (2 * ssdgs__uniform(seed ^ UINT64_C(0x6E6574), at) - 1));
+        }
+    }
+}
+
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+    ssdgs_model *model;
+    ssdgs_settings s;
+    ssdgs_result result;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    int i;
+    if (!out) return SSDGS_ERR_ARGUMENT;
+    *out = NULL;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    s = settings ? *settings : ssdgs_settings_default();
+    result = ssdgs__settings_check(context, &s);
+    if (result) return result;
+    if (count < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians", count);
+    if (count > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians", count);
+    model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
+    if (!model) return SSDGS_ERR_MEMORY;
+    model->context = context;
+    model->settings = s;
+    ssdgs__global_groups(&s, first);
+    model->global_count = first[SSDGS__GLOBAL_GROUPS];
+    model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
+    result = model->globals ? ssdgs__planes_grow(context, &model->gaussians, &model->capacity, 0, count ? (size_t)count : 1) : SSDGS_ERR_MEMORY;
+    if (result) {
+        ssdgs_model_destroy(model);
+        return result;
+    }
+    model->count = count;
+    for (i = 0; i < count; i++) ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
+    ssdgs__globals_reset(model, 1);
+    *out = model;
+    return SSDGS_OK;
+}
+
+SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
+    if (!model) return;
+    ssdgs__release(model->context, model->gaussians);
+    ssdgs__release(model->context, model->globals);
+    ssdgs__release(model->context, model);
+}
+
+SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
+    ssdgs_model_view view;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    ssdgs__global_groups(&model->settings, first);
+    view.count = model->count;
+    view.stride = model->capacity;
+    view.gaussians = model->gaussians;
+    view.asg_basis = model->globals;
+    view.asg_sharpness = model->globals + first[SSDGS__ASG_SHARPNESS];
+    view.asg_sigma = model->globals + first[SSDGS__ASG_SIGMA];
+    view.scattering = model->globals + first[SSDGS__SCATTERING_NET];
+    view.scattering_count = first[SSDGS__SHADOW_NET] - first[SSDGS__SCATTERING_NET];
+    view.shadow = model->globals + first[SSDGS__SHADOW_NET];
+    view.shadow_count = model->global_count - first[SSDGS__SHADOW_NET];
+    return view;
+}
+
+SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return &model->settings; }
+
+/* ==== >>frame  memory of a frame, its views ==== */
+
+typedef struct ssdgs__view_memory {
+    ssdgs__buffer record, depth, keys, order, first, count, owner, tile, mask, start, list, seen, sums, histogram;
+} ssdgs__view_memory;
+
+typedef struct ssdgs__frame_memory {
+    ssdgs__buffer views, view_memory, seen, visibility, cue, flux, light_sums, shaded, color, component[5], pixels, transmittance;
+    ssdgs__buffer activations, scratch, slots, lane_slots, view_slots, tile_pixels;
+    ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
+    ssdgs__buffer bounds, image, target;
+    int view_room;
+} ssdgs__frame_memory;
+
+static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
+    size_t i;
+    int v;
+    if (!m) return;
+    for (v = 0; v < m->view_room; v++) {
+        ssdgs__buffer *b = (ssdgs__buffer *)((ssdgs__view_memory *)m->view_memory.memory + v);
+        for (i = 0; i < sizeof(ssdgs__view_memory) / sizeof *b; i++) ssdgs__release(context, b[i].memory);
+    }
+    for (i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
+        ssdgs__release(context, ((ssdgs__buffer *)m + i)->memory);
+    ssdgs__release(context, m);
+}
+
+#define SSDGS__RESERVE(buffer, pointer, type, count)                                             \
+    do {                                                                                         \
+        const ssdgs_result reserved_ = ssdgs__reserve(context, &(buffer), (size_t)(count), sizeof(type)); \
+        if (reserved_) return reserved_;                                                         \
+        (pointer) = (type *)(buffer).memory;                                                     \
+    } while (0)
+
+/* Room for `count` views; what the present ones own is kept. */
+static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_memory *m, int count) {
+    ssdgs__view_memory *grown;
+    if (count <= m->view_room) return SSDGS_OK;
+    grown = (ssdgs__view_memory *)ssdgs__allocate(context, (size_t)count * sizeof *grown);
+    if (!grown) return SSDGS_ERR_MEMORY;
+    if (m->view_room) memcpy(grown, m->view_memory.memory, (size_t)m->view_room * sizeof *grown);
+    ssdgs__release(context, m->view_memory.memory);
+    m->view_memory.memory = grown;
+    m->view_room = count;
+    return SSDGS_OK;
+}
+
+/* View axes (right, down, forward) looking along `forward` from `eye`; the image's up is the axis least along forward. */
+static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3], ssdgs_real view[12]) {
+    double f[3], r[3], d[3], u[3], length, best = 2;
+    int i, axis = 0;
+    length = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
+    for (i = 0; i < 3; i++) f[i] = length > 0 ? forward[i] / length : (i == 2);
+    for (i = 0; i < 3; i++) {
+        u[i] = up ? up[i] : 0;
+        if (fabs(f[i]) < best) {
+            best = fabs(f[i]);
+            axis = i;
+        }
+    }
+    for (;;) { /* an up along the view is replaced */
+        r[0] = f[1] * u[2] - f[2] * u[1];
+        r[1] = f[2] * u[0] - f[0] * u[2];
+        r[2] = f[0] * u[1] - f[1] * u[0];
+        length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+        if (length > 1e-6 * sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])) break;
+        u[0] = u[1] = u[2] = 0;
+        u[axis] = 1;
+    }
+    for (i = 0; i < 3; i++) r[i] /= length;
+    d[0] = f[1] * r[2] - f[2] * r[1];
+    d[1] = f[2] * r[0] - f[0] * r[2];
+    d[2] = f[0] * r[1] - f[1] * r[0];
+    for (i = 0; i < 3; i++) {
+        view[i] = (ssdgs_real)r[i];
+        view[4 + i] = (ssdgs_real)d[i];
+        view[8 + i] = (ssdgs_real)f[i];
+    }
+    view[3] = (ssdgs_real)-(r[0] * eye[0] + r[1] * eye[1] + r[2] * eye[2]);
+    view[7] = (ssdgs_real)-(d[0] * eye[0] + d[1] * eye[1] + d[2] * eye[2]);
+    view[11] = (ssdgs_real)-(f[0] * eye[0] + f[1] * eye[1] + f[2] * eye[2]);
+}
+
+SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3], const ssdgs_real up[3],
+                                            ssdgs_real fov_x, int width, int height) {
+    ssdgs_camera camera;
+    double e[3], f[3], u[3];
+    int i;
+    memset(&camera, 0, sizeof camera);
+    for (i = 0; i < 3; i++) {
+        e[i] = (double)eye[i];
+        f[i] = (double)target[i] - (double)eye[i];
+        u[i] = (double)up[i];
+    }
+    ssdgs__look_along(e, f, u, camera.view);
+    camera.width = width;
+    camera.height = height;
+    camera.fx = camera.fy = (ssdgs_real)(0.5 * width / tan(0.5 * (double)fov_x));
+    camera.cx = (ssdgs_real)width / 2;
+    camera.cy = (ssdgs_real)height / 2;
+    return camera;
+}
+
+/* What the light's map must cover, and how finely. */
+typedef struct ssdgs__bounds {
+    double low[3], high[3], log_scale;
+    int count;
+} ssdgs__bounds;
+
+typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; } ssdgs__bounds_job;
+
+static void ssdgs__bounds_task(void *data, int index) {
+    const ssdgs__bounds_job *job = (const ssdgs__bounds_job *)data;
+    const ssdgs_model_view *g = job->g;
+    ssdgs__bounds *b = job->chunk + index;
+    const int end = (index + 1) * SSDGS__CHUNK < g->count ? (index + 1) * SSDGS__CHUNK : g->count;
+    int i, j;
+    for (j = 0; j < 3; j++) {
+        b->low[j] = 1e30;
+        b->high[j] = -1e30;
+    }
+    b->log_scale = 0;
+    b->count = 0;
+    for (i = index * SSDGS__CHUNK; i < end; i++) {
+        const ssdgs_real *p = g->gaussians + i;
+        ssdgs_real largest = p[SSDGS_LOG_SCALE * g->stride], reach;
+        double mean = 0;
+        int usable = p[SSDGS_OPACITY * g->stride] > (ssdgs_real)-5.6; /* fainter than 1/255 draws nothing */
+        for (j = 0; j < 3; j++) {
+            const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + j) * g->stride];
+            usable = usable && ssdgs__finite(s) && ssdgs__finite(p[(size_t)j * g->stride]);
+            largest = s > largest ? s : largest;
+            mean += (double)s / 3;
+        }
+        if (!usable) continue;
+        reach = 3 * ssdgs__exp_scalar(largest < 20 ? largest : 20);
+        b->log_scale += mean;
+        b->count++;
+        for (j = 0; j < 3; j++) {
+            const double x = (double)p[(size_t)j * g->stride];
+            if (x - (double)reach < b->low[j]) b->low[j] = x - (double)reach;
+            if (x + (double)reach > b->high[j]) b->high[j] = x + (double)reach;
+        }
+    }
+}
+
+static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g, ssdgs__bounds *total) {
+    const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
+    ssdgs__bounds_job job;
+    int i, j;
+    SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
+    job.g = g;
+    ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
+    memset(total, 0, sizeof *total);
+    for (i = 0; i < chunks; i++) {
+        const ssdgs__bounds *b = job.chunk + i;
+        if (!b->count) continue;
+        for (j = 0; j < 3; j++) {
+            if (!total->count || b->low[j] < total->low[j]) total->low[j] = b->low[j];
+            if (!total->count || b->high[j] > total->high[j]) total->high[j] = b->high[j];
+        }
+        total->count += b->count;
+        total->log_scale += b->log_scale;
+    }
+    if (total->count) total->log_scale /= total->count;
+    return SSDGS_OK;
+}
+
+/* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very far, six faces of
+   a cube from close by or inside. Returns how many; with views NULL only that. */
+static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, int index, ssdgs_splat_view *views) {
+    double centre[3], position[3], to_scene[3], radius2 = 0, radius, distance2 = 0, distance, size;
+    int i, faces, face, map;
+    for (i = 0; i < 3; i++) {
+        const double half = b->count ? 0.5 * (b->high[i] - b->low[i]) : 1;
+        centre[i] = b->count ? 0.5 * (b->high[i] + b->low[i]) : 0;
+        position[i] = (double)light->position[i];
+        to_scene[i] = light->kind == SSDGS_LIGHT_DIRECTIONAL ? -position[i] : centre[i] - position[i];
+        radius2 += half * half;
+        distance2 += to_scene[i] * to_scene[i];
+    }
+    radius = sqrt(radius2);
+    distance = sqrt(distance2);
+    if (light->kind == SSDGS_LIGHT_DIRECTIONAL) distance = 1e30;
+    faces = distance > 1.3 * radius ? 1 : 6;
+    if (!views) return faces;
+    map = settings->light_map_size;
+    if (!map) {
+        size = 2 * radius / exp(b->log_scale);
+        map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
+    }
+    map = (map + 15) / 16 * 16;
+    for (face = 0; face < faces; face++) {
+        ssdgs_splat_view *v = views + face;
+        double direction[3], eye[3], f;
+        memset(v, 0, sizeof *v);
+        v->light = index;
+        v->width = v->height = map;
+        v->blur = settings->light_blur;
+        v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
+        v->cx = v->cy = (ssdgs_real)map / 2;
+        if (faces == 6) {
+            for (i = 0; i < 3; i++) {
+                direction[i] = i == face / 2 ? (face & 1 ? -1 : 1) : 0;
+                eye[i] = position[i];
+            }
+            f = 0.5 * map;
+            v->near_plane = (ssdgs_real)(1e-4 * radius);
+            v->by_distance = 1;
+        } else {
+            v->orthographic = distance > 1000 * radius;
+            for (i = 0; i < 3; i++) {
+                direction[i] = to_scene[i];
+                eye[i] = v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
+            }
+            f = v->orthographic ? 0.5 * map / radius : 0.5 * map * sqrt(distance * distance - radius2) / radius;
+            v->near_plane = v->orthographic ? 0 : (ssdgs_real)(1e-3 * distance);
+            v->by_distance = !v->orthographic;
+        }
+        v->fx = v->fy = (ssdgs_real)f;
+        ssdgs__look_along(eye, direction, NULL, v->view);
+    }
+    return faces;
+}
+
+static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c) {
+    double determinant;
+    int i, j;
+    if (c->width < 1 || c->height < 1 || c->width > 1 << 15 || c->height > 1 << 15)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
+    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: focal lengths must be positive, the centre finite");
+    if (!(c->near_plane >= 0) || !ssdgs__finite(c->near_plane)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: near_plane is negative");
+    for (i = 0; i < 12; i++)
+        if (!ssdgs__finite(c->view[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
+    for (i = 0; i < 3; i++)
+        for (j = 0; j <= i; j++) {
+            const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
+            const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+            if (fabs(dot - (i == j)) > 1e-3) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: the rows of view are not orthonormal");
+        }
+    determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
+                           c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
+                           c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
+    if (determinant < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: view is a mirror image");
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
+    ssdgs_render_options o;
+    memset(&o, 0, sizeof o);
+    o.version = SSDGS_VERSION;
+    o.terms = SSDGS_ALL_TERMS;
+    o.stop = (ssdgs_real)1e-4;
+    o.alpha_threshold = (ssdgs_real)(1.0 / 255);
+    return o;
+}
+
+/* Points the frame's arrays of size n, its image planes and its views at memory. */
+static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                                       int light_count, const ssdgs_render_options *options, int components, int training) {
+    ssdgs_context *context = model->context;
+    ssdgs__frame_memory *m;
+    ssdgs__bounds bounds;
+    ssdgs_result result;
+    const size_t n = (size_t)model->count + SSDGS__BLOCK;
+    size_t pixels;
+    int i, j, needs_light;
+    if (!context->frame) context->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
+    if (!context->frame) return SSDGS_ERR_MEMORY;
+    m = context->frame;
+    memset(frame, 0, sizeof *frame);
+    frame->options = options ? *options : ssdgs_render_options_default();
+    if (frame->options.version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "render options: not made by ssdgs_render_options_default()");
+    result = ssdgs__camera_check(context, camera);
+    if (result) return result;
+    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d lights", light_count);
+    for (i = 0; i < light_count; i++) {
+        double norm2 = 0;
+        for (j = 0; j < 3; j++) {
+            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
+            if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its intensity is negative or not finite", i);
+            norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
+        }
+        if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector", i);
+    }
+    for (i = 0; i < 3; i++)
+        if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
+    frame->context = context;
+    frame->model = model;
+    frame->memory = m;
+    frame->settings = model->settings;
+    frame->gaussians = ssdgs_model_get(model);
+    frame->camera = *camera;
+    frame->lights = lights;
+    frame->light_count = model->settings.baked ? 0 : light_count;
+    frame->terms = model->settings.terms & frame->options.terms;
+    frame->components = components;
+    frame->training = training;
+    for (i = 0; i < 3; i++)
+        frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] * camera->view[11]);
+    needs_light = (frame->terms & SSDGS_SHADOW_TERM) || ((frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
+    frame->view_count = 1;
+    if (needs_light && frame->light_count) {
+        result = ssdgs__scene_bounds(context, m, &frame->gaussians, &bounds);
+        if (result) return result;
+        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, NULL);
+    }
+    result = ssdgs__views_reserve(context, m, frame->view_count);
+    if (result) return result;
+    SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
+    memset(frame->views, 0, sizeof *frame->views);
+    frame->views[0].light = -1;
+    frame->views[0].width = camera->width;
+    frame->views[0].height = camera->height;
+    frame->views[0].fx = camera->fx;
+    frame->views[0].fy = camera->fy;
+    frame->views[0].cx = camera->cx;
+    frame->views[0].cy = camera->cy;
+    frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
+    frame->views[0].compensate = frame->options.antialias;
+    memcpy(frame->views[0].view, camera->view, sizeof camera->view);
+    for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, frame->views + j);
+    pixels = (size_t)camera->width * (size_t)camera->height;
+    SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
+    SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
+    SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
+    if (components) {
+        SSDGS__RESERVE(m->component[0], frame->diffuse, ssdgs_real, n * 4);
+        SSDGS__RESERVE(m->component[1], frame->specular, ssdgs_real, n * 4);
+        SSDGS__RESERVE(m->component[2], frame->scattering, ssdgs_real, n * 4);
+        SSDGS__RESERVE(m->component[3], frame->normal, ssdgs_real, n * 4);
+        SSDGS__RESERVE(m->component[4], frame->shadow, ssdgs_real, n * 4);
+    }
+    SSDGS__RESERVE(m->pixels, frame->pixels, ssdgs_real, pixels * 3);
+    SSDGS__RESERVE(m->transmittance, frame->transmittance, ssdgs_real, pixels);
+    if (training) {
+        SSDGS__RESERVE(m->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 3);
+        SSDGS__RESERVE(m->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
+        SSDGS__RESERVE(m->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
+        SSDGS__RESERVE(m->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
+        SSDGS__RESERVE(m->global_gradient, frame->global_gradient, ssdgs_real, model->global_count);
+    }
+    return SSDGS_OK;
+}
+
+/* ==== >>project  records, order, instances, tile lists ==== */
+
+#define SSDGS__BIN_CHUNKS 64
+
+static ssdgs_real ssdgs__log2_threshold(const ssdgs_frame *frame) {
+    const double threshold = (double)frame->options.alpha_threshold;
+    return (ssdgs_real)(log(threshold > 1e-9 ? threshold : 1e-9) * 1.44269504088896341);
+}
+
+static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ssdgs_splat_view *v) {
+    ssdgs__projection p;
+    memcpy(p.view, v->view, sizeof p.view);
+    p.fx = v->fx;
+    p.fy = v->fy;
+    p.cx = v->cx;
+    p.cy = v->cy;
+    p.near_plane = v->near_plane;
+    p.log2_threshold = ssdgs__log2_threshold(frame);
+    p.width = v->width;
+    p.height = v->height;
+    p.orthographic = v->orthographic;
+    p.by_distance = v->by_distance;
+    p.compensate = v->compensate;
+    p.blur = v->blur;
+    return p;
+}
+
+static int ssdgs__chunks(const ssdgs_frame *frame) { return (frame->gaussians.count + SSDGS__CHUNK - 1) / SSDGS__CHUNK; }
+
+static void ssdgs__project_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const int chunks = ssdgs__chunks(frame), chunk = index % chunks;
+    ssdgs_splat_view *v = frame->views + index / chunks;
+    const ssdgs__projection p = ssdgs__projection_of(frame, v);
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record, v->depth);
+}
+
+static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
+    int i;
+    for (i = 0; i < frame->view_count; i++) {
+        ssdgs_splat_view *v = frame->views + i;
+        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        SSDGS__RESERVE(m->record, v->record, ssdgs_real, n * 8);
+        SSDGS__RESERVE(m->depth, v->depth, ssdgs_real, n);
+        v->tiles_x = (v->width + 15) / 16;
+        v->tiles_y = (v->height + 15) / 16;
+    }
+    ssdgs__parallel(context, frame->view_count * ssdgs__chunks(frame), ssdgs__project_task, frame);
+    return SSDGS_OK;
+}
+
+/* Least-significant-digit radix sort of (depth bits, index): stable, so equal depths keep the order of their indices. */
+static void ssdgs__sort_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    ssdgs_splat_view *v = frame->views + index;
+    const int n = frame->gaussians.count;
+    uint64_t *from = (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory, *to = from + n, *swap;
+    uint32_t *histogram = (uint32_t *)(to + n);
+    int i, pass, visible = 0;
+    memset(histogram, 0, 3 * 2048 * sizeof *histogram);
+    for (i = 0; i < n; i++) {
+        const float depth = (float)v->depth[i];
+        uint32_t bits;
+        if (!(depth >= 0)) continue;
+        memcpy(&bits, &depth, 4);
+        from[visible++] = (uint64_t)bits << 32 | (uint32_t)i;
+        histogram[bits & 2047]++;
+        histogram[2048 + (bits >> 11 & 2047)]++;
+        histogram[4096 + (bits >> 22)]++;
+    }
+    for (pass = 0; pass < 3; pass++) {
+        uint32_t *h = histogram + 2048 * pass, sum = 0;
+        for (i = 0; i < 2048; i++) {
+            const uint32_t count = h[i];
+            h[i] = sum;
+            sum += count;
+        }
+        for (i = 0; i < visible; i++) to[h[from[i] >> (32 + 11 * pass) & 2047]++] = from[i];
+        swap = from;
+        from = to;
+        to = swap;
+    }
+    for (i = 0; i < visible; i++) v->order[i] = (uint32_t)from[i];
+    v->visible = visible;
+}
+
+static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const size_t n = (size_t)frame->gaussians.count;
+    int i;
+    for (i = 0; i < frame->view_count; i++) {
+        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        uint64_t *keys;
+        SSDGS__RESERVE(m->keys, keys, uint64_t, 2 * n + 3 * 1024);
+        SSDGS__RESERVE(m->order, frame->views[i].order, uint32_t, n + 1);
+        (void)keys;
+    }
+    ssdgs__parallel(context, frame->view_count, ssdgs__sort_task, frame);
+    return SSDGS_OK;
+}
+
+/* Tiles the record's bounding box touches: first and last column and row. */
+static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, int box[4]) {
+    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1}, high[2] = {record[0] + record[6] + 1, record[1] + record[7] + 1};
+    const int tiles[2] = {v->tiles_x, v->tiles_y};
+    int a;
+    for (a = 0; a < 2; a++) {
+        const ssdgs_real last = (ssdgs_real)(16 * tiles[a] - 1);
+        box[a] = (int)(low[a] < 0 ? 0 : low[a] < last ? low[a] : last) / 16;
+        box[2 + a] = (int)(high[a] < 0 ? 0 : high[a] < last ? high[a] : last) / 16;
+    }
+}
+
+static void ssdgs__bin_room_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    ssdgs_splat_view *v = frame->views + index;
+    uint64_t room = 0;
+    int rank, box[4];
+    for (rank = 0; rank < v->visible; rank++) {
+        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, box);
+        v->first_instance[rank] = (uint32_t)room;
+        room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
+        if (room > UINT32_MAX / 2) break; /* refused by the caller */
+    }
+    v->first_instance[v->visible] = (uint32_t)room;
+    v->instance_room = (size_t)room;
+}
+
+static void ssdgs__bin_range(const ssdgs_splat_view *v, int chunk, int *begin, int *end) {
+    const int size = (v->visible + SSDGS__BIN_CHUNKS - 1) / SSDGS__BIN_CHUNKS;
+    *begin = chunk * size < v->visible ? chunk * size : v->visible;
+    *end = *begin + size < v->visible ? *begin + size : v->visible;
+}
+
+static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
+    const ssdgs_splat_view *v = frame->views + view;
+    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory + (size_t)chunk * (size_t)(v->tiles_x * v->tiles_y);
+}
+
+/* Instances of a chunk of ranks, from the exact spans of their ellipses; counts them per tile. */
+static void ssdgs__bin_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    ssdgs_splat_view *v = frame->views + view;
+    uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
+    const ssdgs_real threshold = ssdgs__log2_threshold(frame);
+    int begin, end, rank, box[4], ty, tx, r, block;
+    int16_t first[64], last[64];
+    memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
+    ssdgs__bin_range(v, chunk, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        const uint32_t gaussian = v->order[rank];
+        const ssdgs_real *record = v->record + (size_t)gaussian * 8;
+        uint32_t at = v->first_instance[rank];
+        ssdgs__tile_box(v, record, box);
+        for (block = box[1]; block <= box[3]; block += 16) {
+            const int rows = (box[3] - block + 1 < 16 ? box[3] - block + 1 : 16) * 4;
+            frame->context->k->row_spans(record, threshold, 4 * block, rows, 4 * v->tiles_x, first, last);
+            for (ty = 0; ty < rows / 4; ty++) {
+                int low = 4 * v->tiles_x, high = -1;
+                for (r = 4 * ty; r < 4 * ty + 4; r++) {
+                    if (first[r] > last[r]) continue;
+                    low = first[r] < low ? first[r] : low;
+                    high = last[r] > high ? last[r] : high;
+                }
+                for (tx = low / 4 > box[0] ? low / 4 : box[0]; 4 * tx <= high && tx <= box[2]; tx++) {
+                    unsigned mask = 0;
+                    for (r = 0; r < 4; r++) {
+                        const int from = first[4 * ty + r] - 4 * tx, to = last[4 * ty + r] - 4 * tx;
+                        if (from > to || from > 3 || to < 0) continue;
+                        mask |= ((2u << (to > 3 ? 3 : to)) - (1u << (from < 0 ? 0 : from))) << (4 * r);
+                    }
+                    if (!mask) continue;
+                    v->instance_owner[at] = gaussian;
+                    v->instance_tile[at] = (uint32_t)((block + ty) * v->tiles_x + tx);
+                    v->instance_mask[at] = (uint16_t)mask;
+                    histogram[v->instance_tile[at++]]++;
+                }
+            }
+        }
+        v->instance_count[rank] = at - v->first_instance[rank];
+    }
+}
+
+/* Turns the counts into places: per tile, chunk after chunk, so lists stay in depth order. */
+static void ssdgs__bin_offsets_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    ssdgs_splat_view *v = frame->views + index;
+    const int tiles = v->tiles_x * v->tiles_y;
+    uint32_t sum = 0;
+    int tile, chunk;
+    for (tile = 0; tile < tiles; tile++) {
+        v->tile_start[tile] = sum;
+        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
+            uint32_t *h = ssdgs__histogram(frame, index, chunk) + tile;
+            const uint32_t count = *h;
+            *h = sum;
+            sum += count;
+        }
+    }
+    v->tile_start[tiles] = sum;
+    v->instances = sum;
+}
+
+static void ssdgs__bin_scatter_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const int view = index / SSDGS__BIN_CHUNKS;
+    ssdgs_splat_view *v = frame->views + view;
+    uint32_t *place = ssdgs__histogram(frame, view, index % SSDGS__BIN_CHUNKS), i;
+    int begin, end, rank;
+    ssdgs__bin_range(v, index % SSDGS__BIN_CHUNKS, &begin, &end);
+    for (rank = begin; rank < end; rank++)
+        for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++)
+            v->tile_list[place[v->instance_tile[i]]++] = i;
+}
+
+static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    int i;
+    for (i = 0; i < frame->view_count; i++) {
+        ssdgs_splat_view *v = frame->views + i;
+        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
+        SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
+    }
+    ssdgs__parallel(context, frame->view_count, ssdgs__bin_room_task, frame);
+    for (i = 0; i < frame->view_count; i++) {
+        ssdgs_splat_view *v = frame->views + i;
+        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
+        uint32_t *histogram;
+        if (v->instance_room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d", v->width, v->height);
+        SSDGS__RESERVE(m->owner, v->instance_owner, uint32_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->tile, v->instance_tile, uint32_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->mask, v->instance_mask, uint16_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->list, v->tile_list, uint32_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->start, v->tile_start, uint32_t, tiles + 1);
+        SSDGS__RESERVE(m->histogram, histogram, uint32_t, tiles * SSDGS__BIN_CHUNKS);
+        (void)histogram;
+    }
+    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_task, frame);
+    ssdgs__parallel(context, frame->view_count, ssdgs__bin_offsets_task, frame);
+    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_scatter_task, frame);
+    return SSDGS_OK;
+}
+
+/* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ====
+   Tiles of all views in one loop: the camera's walk and the light pass run side by side. */
+
+static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index) {
+    ssdgs__tile t;
+    t.record = v->record;
+    t.depth = v->depth;
+    t.list = v->tile_list + v->tile_start[index];
+    t.owner = v->instance_owner;
+    t.mask = v->instance_mask;
+    t.count = v->tile_start[index + 1] - v->tile_start[index];
+    t.x = 16 * (index % v->tiles_x);
+    t.y = 16 * (index / v->tiles_x);
+    t.width = v->width;
+    t.height = v->height;
+    t.log2_threshold = ssdgs__log2_threshold(frame);
+    t.stop = frame->options.stop;
+    t.bias = frame->settings.light_bias;
+    t.depth_origin = v->visible ? v->depth[v->order[0]] : 0;
+    t.cx = v->cx;
+    t.cy = v->cy;
+    t.inverse_focal = 1 / v->fx;
+    return t;
+}
+
+static void ssdgs__walk_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs_splat_view *v = frame->views;
+    ssdgs__tile tile;
+    for (; index >= v->tiles_x * v->tiles_y; v++) index -= v->tiles_x * v->tiles_y;
+    tile = ssdgs__tile_of(frame, v, index);
+    if (!tile.count) return;
+    if (v->light < 0) frame->context->k->walk_camera(&tile, v->instance_seen);
+    else frame->context->k->walk_light(&tile, v->instance_sums);
+}
+
+typedef struct ssdgs__gather_job { const ssdgs_frame *frame; const ssdgs_splat_view *view; ssdgs_real *sums; } ssdgs__gather_job;
+
+/* Per Gaussian, the sums over its instances, in their order. */
+static void ssdgs__gather_light_task(void *data, int index) {
+    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
+    const ssdgs_splat_view *v = job->view;
+    int begin, end, rank, i;
+    uint32_t instance;
+    ssdgs__bin_range(v, index, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        ssdgs_real *sum = job->sums + (size_t)v->order[rank] * 4;
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
+            for (i = 0; i < 4; i++) sum[i] += v->instance_sums[(size_t)instance * 4 + (size_t)i];
+    }
+}
+
+static void ssdgs__gather_camera_task(void *data, int index) {
+    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
+    const ssdgs_splat_view *v = job->view;
+    int begin, end, rank;
+    uint32_t instance;
+    ssdgs__bin_range(v, index, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        unsigned char seen = 0;
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) seen |= v->instance_seen[instance];
+        job->frame->seen[v->order[rank]] = seen;
+    }
+}
+
+static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const size_t n = (size_t)frame->gaussians.count;
+    ssdgs__gather_job job;
+    size_t g;
+    int i, light, tiles = 0;
+    for (i = 0; i < frame->view_count; i++) {
+        ssdgs_splat_view *v = frame->views + i;
+        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        tiles += v->tiles_x * v->tiles_y;
+        if (v->light < 0) {
+            SSDGS__RESERVE(m->seen, v->instance_seen, unsigned char, v->instance_room + 1);
+            memset(v->instance_seen, 0, v->instance_room);
+        } else {
+            SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * 4 + 4);
+            memset(v->instance_sums, 0, v->instance_room * 4 * sizeof(ssdgs_real));
+        }
+    }
+    SSDGS__RESERVE(frame->memory->light_sums, job.sums, ssdgs_real, n * 4 + 4);
+    ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
+    job.frame = frame;
+    job.view = frame->views;
+    memset(frame->seen, 0, n);
+    ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
+    for (light = 0, i = 1; light < frame->light_count; light++) {
+        ssdgs_real *visibility = frame->visibility + n * (size_t)light, *cue = frame->depth_cue + n * (size_t)light, *flux = frame->flux + n * (size_t)light;
+        memset(job.sums, 0, n * 4 * sizeof(ssdgs_real));
+        for (; i < frame->view_count && frame->views[i].light == light; i++) {
+            job.view = frame->views + i;
+            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
+        }
+        for (g = 0; g < n; g++) {
+            const ssdgs_real *sum = job.sums + 4 * g;
+            visibility[g] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
+            cue[g] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
+            flux[g] = sum[3];
+        }
+    }
+    return SSDGS_OK;
+}
+
+/* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks: geometry, both networks, colour ==== */
+
+/* How a block's working memory is laid out, in values; per light the geometry, the cues and both networks' activations. */
+typedef struct ssdgs__block_layout {
+    int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers, widest;
+    size_t rows, visibility, cue, shadow_at, scattering_at, light_size; /* within a light's part */
+    size_t gauss, outs, lights, size;                                     /* within the block */
+    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dvisibility, scratch; /* the backward's */
+} ssdgs__block_layout;
+
+static size_t ssdgs__activation_rows(const int *sizes, int layers) {
+    size_t rows = 0;
+    int i;
+    for (i = 0; layers && i <= layers; i++) rows += (size_t)sizes[i];
+    return rows;
+}
+
+static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
+    ssdgs__block_layout l;
+    const size_t b = SSDGS__BLOCK;
+    int i;
+    memset(&l, 0, sizeof l);
+    if (frame->terms & SSDGS_SCATTERING_TERM) l.scattering_layers = ssdgs__network_sizes(&frame->settings, 0, l.scattering);
+    if (frame->terms & SSDGS_SHADOW_TERM) l.shadow_layers = ssdgs__network_sizes(&frame->settings, 1, l.shadow);
+    for (i = 0; i <= SSDGS_MAX_LAYERS; i++) {
+        l.widest = l.scattering[i] > l.widest ? l.scattering[i] : l.widest;
+        l.widest = l.shadow[i] > l.widest ? l.shadow[i] : l.widest;
+    }
+    l.visibility = SSDGS__ROWS * b;
+    l.cue = l.visibility + b;
+    l.shadow_at = l.cue + b;
+    l.scattering_at = l.shadow_at + b * ssdgs__activation_rows(l.shadow, l.shadow_layers);
+    l.light_size = l.scattering_at + b * ssdgs__activation_rows(l.scattering, l.scattering_layers);
+    l.outs = b * SSDGS_CHANNELS;
+    l.lights = l.outs + b * SSDGS__OUTS;
+    l.size = l.lights + l.light_size * (size_t)frame->light_count;
+    l.drows = b * SSDGS_CHANNELS;
+    l.dcolor = l.drows + b * SSDGS__ROWS;
+    l.dvisibility = l.dcolor + b * 3;
+    l.dnet = l.dvisibility + b;
+    l.dnet2 = l.dnet + b * (size_t)(l.widest + 1);
+    l.transposed = l.dnet2 + b * (size_t)(l.widest + 1);
+    l.scratch = l.transposed + b * (size_t)(l.widest + 16);
+    return l;
+}
+
+static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
+    const ssdgs_settings *s = &frame->settings;
+    const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+    ssdgs__lighting k;
+    int i, j;
+    memset(&k, 0, sizeof k);
+    for (i = 0; i < 3; i++) {
+        k.light[i] = frame->lights[light].position[i];
+        k.intensity[i] = frame->lights[light].intensity[i] * s->light_scale;
+        k.eye[i] = frame->eye[i];
+    }
+    k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
+    k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
+    k.directional = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL;
+    k.angular = s->asg == SSDGS_ASG_ANGULAR;
+    k.dipole = s->dipole;
+    k.diffuse = (frame->terms & SSDGS_DIFFUSE_TERM) != 0;
+    k.specular = (frame->terms & SSDGS_SPECULAR_TERM) != 0;
+    k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
+    k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
+    k.residual_shadow = s->residual_shadow;
+    k.per_channel_optics = s->per_channel_optics;
+    k.shadow_on_scattering = s->shadow_on_scattering;
+    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
+        ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
+        ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
+        for (i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
+        if (k.angular) {
+            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
+            for (i = 0; i < 2; i++) b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(sharpness[i]);
+            b[11] = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]) * ssdgs__softplus_scalar(step);
+        } else {
+            for (i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
+        }
+    }
+    return k;
+}
+
+/* Sums over lanes of dL/d(basis rows) -> raw ASG parameters. */
+static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    int i, j;
+    ssdgs__global_groups(&frame->settings, first);
+    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        const ssdgs_real *d = dbasis + 12 * j, *sharpness = frame->gaussians.asg_sharpness + 2 * j;
+        ssdgs_real q[4], r[9], dr[9], inverse = ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
+        ssdgs_real *out = frame->global_gradient + first[SSDGS__ASG_SHARPNESS] + 2 * j;
+        for (i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
+        ssdgs__rotation_backward_scalar(frame->global_gradient + 4 * j, q, inverse, dr);
+        for (i = 0; i < 2; i++) {
+            const ssdgs_real s = ssdgs__sigmoid_scalar(sharpness[i]);
+            /* angular: 1 / (10 s), d = -(1 - s) / (10 s) */
+            out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
+        }
+        if (frame->settings.asg == SSDGS_ASG_ANGULAR) {
+            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)), s = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]);
+            frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] = d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
+        }
+    }
+}
+
+/* Activations: inputs, then every layer's outputs, (size, BLOCK) each. The last layer has no ReLU. */
+static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights, ssdgs_real *activations) {
+    ssdgs__product p;
+    int layer;
+    memset(&p, 0, sizeof p);
+    for (layer = 0; layer < layers; layer++) {
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1];
+        p.a = weights;
+        p.a_row = in;
+        p.a_k = 1;
+        p.b = activations;
+        p.bias = weights + in * out;
+        p.out = activations += in * SSDGS__BLOCK;
+        p.out_stride = p.b_stride = p.columns = SSDGS__BLOCK;
+        p.rows = sizes[layer + 1];
+        p.depth = sizes[layer];
+        p.relu = layer < layers - 1;
+        k->dense(&p);
+        weights += (in + 1) * out;
+    }
+}
+
+/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. */
+static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
+                                           const ssdgs_real *activations, ssdgs_real *d, ssdgs_real *spare, ssdgs_real *transposed, ssdgs_real *dweights) {
+    const ssdgs_real *layer_in = activations;
+    size_t at = 0, i, s;
+    int layer;
+    for (layer = 0; layer < layers - 1; layer++) {
+        layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
+        at += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
+    }
+    for (layer = layers - 1; layer >= 0; layer--) {
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = (in + 15) / 16 * 16;
+        ssdgs_real *swap = d;
+        ssdgs__product p;
+        memset(&p, 0, sizeof p);
+        for (s = 0; s < SSDGS__BLOCK; s++) {
+            for (i = 0; i < in; i++) transposed[s * padded + i] = layer_in[i * SSDGS__BLOCK + s];
+            for (; i < padded; i++) transposed[s * padded + i] = 0; /* so the columns beyond a row add 0 to the next */
+        }
+        p.out = dweights + at; /* dW += d x^T */
+        p.out_stride = in;
+        p.a = d;
+        p.a_row = SSDGS__BLOCK;
+        p.a_k = 1;
+        p.b = transposed;
+        p.b_stride = padded;
+        p.rows = (int)out;
+        p.columns = (int)padded;
+        p.depth = SSDGS__BLOCK;
+        p.accumulate = 1;
+        k->dense(&p);
+        k->row_sums(dweights + at + in * out, d, (int)out);
+        p.out = spare; /* dx = W^T d */
+        p.out_stride = p.b_stride = p.columns = SSDGS__BLOCK;
+        p.a = weights + at;
+        p.a_row = 1;
+        p.a_k = in;
+        p.b = d;
+        p.rows = (int)in;
+        p.depth = (int)out;
+        p.accumulate = 0;
+        k->dense(&p);
+        if (layer) {
+            k->relu_backward(spare, layer_in, (int)in);
+            layer_in -= (size_t)sizes[layer - 1] * SSDGS__BLOCK;
+            at -= (size_t)(sizes[layer - 1] + 1) * in;
+        }
+        d = spare;
+        spare = swap;
+    }
+    return d;
+}
+
+/* The networks' inputs and their encodings, in the order of their rows. */
+typedef struct ssdgs__input {
+    int row, dims, levels; /* levels < 0: copied */
+    ssdgs_real scale;
+    size_t from;          /* in the light's part, or for the Gaussian's own rows in gauss */
+    int of_gaussian;
+} ssdgs__input;
+
+static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, ssdgs__input inputs[6]) {
+    const size_t b = SSDGS__BLOCK;
+    const int scaled = shadow ? frame->settings.residual_shadow : frame->settings.depth_cue;
+    const ssdgs_real inverse_unit = 1 / frame->settings.length_unit;
+    int n = 0, row = 0;
+#define SSDGS__INPUT(width, depth, factor, place, own)                                                                   \
+    do {                                                                                                                 \
+        inputs[n].row = row, inputs[n].dims = (width), inputs[n].levels = (depth), inputs[n].scale = (factor);           \
+        inputs[n].from = (place), inputs[n++].of_gaussian = (own), row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
+    } while (0)
+    SSDGS__INPUT(3, shadow ? 3 : 4, scaled ? inverse_unit : 1, b * SSDGS_POSITION, 1);
+    if (!shadow) SSDGS__INPUT(3, 4, 1, b * SSDGS__WO, 0);
+    SSDGS__INPUT(3, shadow ? 3 : 4, 1, b * SSDGS__WI, 0);
+    if (shadow) SSDGS__INPUT(1, -1, 1, l->visibility, 0);
+    else SSDGS__INPUT(3, -1, 1, b * SSDGS__NORMAL, 0);
+    SSDGS__INPUT(SSDGS_MATERIAL_COUNT, -1, 1, b * SSDGS_MATERIAL, 1);
+    if (!shadow && frame->settings.depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
+#undef SSDGS__INPUT
+    return n;
+}
+
+static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *gauss,
+                                 const ssdgs_real *part, ssdgs_real *activations) {
+    ssdgs__input in[6];
+    const int n = ssdgs__inputs(frame, l, shadow, in);
+    int i;
+    for (i = 0; i < n; i++) {
+        const ssdgs_real *from = (in[i].of_gaussian ? gauss : part) + in[i].from;
+        ssdgs_real *to = activations + (size_t)in[i].row * SSDGS__BLOCK;
+        const int centred = in[i].of_gaussian && in[i].levels >= 0;
+        if (in[i].levels < 0) memcpy(to, from, (size_t)in[i].dims * SSDGS__BLOCK * sizeof *to);
+        else frame->context->k->encode(to, from, centred ? frame->settings.centre : NULL, in[i].scale, in[i].dims, in[i].levels);
+    }
+}
+
+/* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the depth cue is held fixed. */
+static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *activations,
+                                          const ssdgs_real *dinputs, ssdgs_real *dgauss, ssdgs_real *drows, ssdgs_real *dvisibility) {
+    ssdgs__input in[6];
+    const int n = ssdgs__inputs(frame, l, shadow, in);
+    int i, s;
+    for (i = 0; i < n; i++) {
+        const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
+        ssdgs_real *to = in[i].of_gaussian ? dgauss + in[i].from : in[i].from == l->visibility ? dvisibility : drows + in[i].from;
+        if (in[i].from == l->cue) continue;
+        if (in[i].levels >= 0) frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims, in[i].levels);
+        else for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
+    }
+}
+
+/* The Gaussian in lane s of a block; the last one fills the block up. */
+static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
+    const int i = block * SSDGS__BLOCK + s;
+    return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
+}
+
+static void ssdgs__shade_block(const ssdgs_frame *frame, const ssdgs__block_layout *l, int block, ssdgs_real *memory) {
+    const ssdgs__kernels *k = frame->context->k;
+    const size_t n = (size_t)frame->gaussians.count;
+    ssdgs_real *gauss = memory + l->gauss, *outs = memory + l->outs;
+    int light, s, i, c;
+    for (s = 0; s < SSDGS__BLOCK; s++) {
+        const size_t g = ssdgs__block_lane(frame, block, s);
+        for (i = 0; i < SSDGS_CHANNELS; i++) gauss[i * SSDGS__BLOCK + s] = frame->gaussians.gaussians[(size_t)i * frame->gaussians.stride + g];
+    }
+    memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
+    for (light = 0; light < frame->light_count; light++) {
+        const ssdgs__lighting lighting = ssdgs__lighting_of(frame, light);
+        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light, *shadow = NULL, *scattering = NULL;
+        k->reflect(&lighting, gauss, part + l->rows);
+        for (s = 0; s < SSDGS__BLOCK; s++) {
+            const size_t at = n * (size_t)light + ssdgs__block_lane(frame, block, s);
+            part[l->visibility + (size_t)s] = lighting.shadow ? frame->visibility[at] : 1;
+            part[l->cue + (size_t)s] = lighting.scattering && frame->settings.depth_cue ? frame->depth_cue[at] : 0;
+        }
+        if (l->shadow_layers) {
+            ssdgs__encode_inputs(frame, l, 1, gauss, part, part + l->shadow_at);
+            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at);
+            shadow = part + l->scattering_at - SSDGS__BLOCK;
+        }
+        if (l->scattering_layers) {
+            ssdgs__encode_inputs(frame, l, 0, gauss, part, part + l->scattering_at);
+            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, part + l->scattering_at);
+            scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
+        }
+        k->colour(&lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
+    }
+    for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++) {
+        const size_t g = ssdgs__block_lane(frame, block, s);
+        const ssdgs_real *o = outs + s;
+        for (c = 0; c < 3; c++)
+            frame->color[4 * g + (size_t)c] = frame->settings.baked ? ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s])
+                                                                   : o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
+        if (!frame->components) continue;
+        {
+            ssdgs_real raw[4], q[4], r[9];
+            for (i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
+            ssdgs__rotation_scalar(raw, q, r);
+            for (c = 0; c < 3; c++) {
+                frame->diffuse[4 * g + (size_t)c] = frame->settings.baked ? frame->color[4 * g + (size_t)c] : o[c * SSDGS__BLOCK];
+                frame->specular[4 * g + (size_t)c] = o[(3 + c) * SSDGS__BLOCK];
+                frame->scattering[4 * g + (size_t)c] = o[(6 + c) * SSDGS__BLOCK];
+                frame->normal[4 * g + (size_t)c] = r[3 * c + 2];
+            }
+            frame->shadow[4 * g] = frame->light_count ? o[9 * SSDGS__BLOCK] / (ssdgs_real)frame->light_count : 1;
+            frame->shadow[4 * g + 1] = frame->views[0].depth[g];
+            frame->shadow[4 * g + 2] = 0;
+        }
+    }
+}
+
+typedef struct ssdgs__shade_job {
+    ssdgs_frame *frame;
+    ssdgs__block_layout layout;
+    int blocks;
+    size_t slot_stride;
+    ssdgs_real *activations, *scratch, *slots, *lane_slots;
+} ssdgs__shade_job;
+
+/* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
+static int ssdgs__slot_begin(const ssdgs__shade_job *job, int slot) { return (int)((int64_t)job->blocks * slot / SSDGS__SLOTS); }
+
+static void ssdgs__shade_task(void *data, int slot) {
+    const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
+    int block;
+    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
+        ssdgs__shade_block(job->frame, &job->layout, block, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot));
+}
+
+static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    ssdgs__shade_job job;
+    int i;
+    frame->shaded_count = 0;
+    for (i = 0; i < frame->gaussians.count; i++)
+        if (frame->seen[i]) frame->shaded[frame->shaded_count++] = (uint32_t)i;
+    memset(&job, 0, sizeof job);
+    job.frame = frame;
+    job.layout = ssdgs__layout(frame);
+    job.blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real, job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
+    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
+    return SSDGS_OK;
+}
+
+static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, int slot) {
+    const ssdgs_frame *frame = job->frame;
+    const ssdgs__block_layout *l = &job->layout;
+    const ssdgs__kernels *k = frame->context->k;
+    const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
+    ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *dgauss = scratch, *drows = scratch + l->drows, *dcolor = scratch + l->dcolor;
+    ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
+    ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    int light, s, c;
+    ssdgs__global_groups(&frame->settings, first);
+    memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
+    for (s = 0; s < SSDGS__BLOCK; s++) {
+        const int live = block * SSDGS__BLOCK + s < frame->shaded_count;
+        for (c = 0; c < 3; c++) dcolor[c * SSDGS__BLOCK + s] = live ? frame->color_gradient[4 * ssdgs__block_lane(frame, block, s) + (size_t)c] : 0;
+    }
+    for (light = 0; light < frame->light_count; light++) {
+        const ssdgs__lighting lighting = ssdgs__lighting_of(frame, light);
+        const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light;
+        const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
+        const ssdgs_real *scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
+        ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16, *dinputs;
+        memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
+        /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
+        k->colour_backward(&lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor, dgauss, drows,
+                           scratch + l->transposed - SSDGS__BLOCK, dnet, dvisibility);
+        if (l->scattering_layers) {
+            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, part + l->scattering_at, dnet, dnet2,
+                                              scratch + l->transposed, slot_gradient + first[SSDGS__SCATTERING_NET]);
+            ssdgs__encode_inputs_backward(frame, l, 0, part + l->scattering_at, dinputs, dgauss, drows, dvisibility);
+        }
+        if (l->shadow_layers) {
+            memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
+            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at, dnet, dnet2,
+                                              scratch + l->transposed, slot_gradient + first[SSDGS__SHADOW_NET]);
+            ssdgs__encode_inputs_backward(frame, l, 1, part + l->shadow_at, dinputs, dgauss, drows, dvisibility);
+        }
+        k->reflect_backward(&lighting, gauss, drows, dgauss, lane_sums);
+    }
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++)
+            frame->gradient[(size_t)c * frame->gaussians.stride + ssdgs__block_lane(frame, block, s)] = dgauss[c * SSDGS__BLOCK + s];
+}
+
+static void ssdgs__shade_backward_task(void *data, int slot) {
+    const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
+    const size_t lanes = (size_t)SSDGS__LANE_SUMS * 16 * (size_t)job->frame->light_count;
+    int block;
+    memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
+    memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
+    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++) ssdgs__shade_backward_block(job, block, slot);
+}
+
+#define SSDGS__REDUCE 4096 /* shared parameters summed by one task */
+
+static void ssdgs__reduce_task(void *data, int index) {
+    const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
+    const size_t begin = (size_t)index * SSDGS__REDUCE, n = job->frame->model->global_count, end = begin + SSDGS__REDUCE < n ? begin + SSDGS__REDUCE : n;
+    ssdgs_real *out = job->frame->global_gradient;
+    size_t i;
+    int slot;
+    memcpy(out + begin, job->slots + begin, (end - begin) * sizeof *out);
+    for (slot = 1; slot < SSDGS__SLOTS; slot++)
+        for (i = begin; i < end; i++) out[i] += job->slots[job->slot_stride * (size_t)slot + i];
+}
+
+/* Overwrites gradient, global_gradient and light_gradient; adds the eye's part to view_gradient. */
+static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const size_t n = frame->gaussians.stride * SSDGS_CHANNELS, lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
+    ssdgs_real sums[SSDGS__LANE_SUMS];
+    ssdgs__shade_job job;
+    size_t i;
+    int slot, light, j, c, lane;
+    memset(&job, 0, sizeof job);
+    job.frame = frame;
+    job.layout = ssdgs__layout(frame);
+    job.blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    job.slot_stride = (frame->model->global_count + 79) / 64 * 64;
+    job.activations = (ssdgs_real *)frame->memory->activations.memory;
+    SSDGS__RESERVE(frame->memory->scratch, job.scratch, ssdgs_real, job.layout.scratch * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
+    memset(frame->gradient, 0, n * sizeof(ssdgs_real));
+    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_backward_task, &job);
+    ssdgs__parallel(context, (int)((frame->model->global_count + SSDGS__REDUCE - 1) / SSDGS__REDUCE), ssdgs__reduce_task, &job);
+    memset(sums, 0, sizeof sums);
+    memset(frame->light_gradient, 0, sizeof frame->light_gradient);
+    for (slot = 0; slot < SSDGS__SLOTS; slot++)
+        for (light = 0; light < frame->light_count; light++)
+            for (i = 0; i < SSDGS__LANE_SUMS; i++) {
+                const ssdgs_real *row = job.lane_slots + ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) * 16;
+                ssdgs_real sum = 0;
+                for (lane = 0; lane < 16; lane++) sum += row[lane];
+                sums[i] += sum;
+                if (i < 3 && light == 0) frame->light_gradient[i] += sum;
+            }
+    ssdgs__asg_backward(frame, sums + 6);
+    /* eye = -R^T t */
+    for (j = 0; j < 3; j++)
+        for (c = 0; c < 3; c++) {
+            frame->view_gradient[4 * j + c] -= frame->camera.view[4 * j + 3] * sums[3 + c];
+            frame->view_gradient[4 * j + 3] -= frame->camera.view[4 * j + c] * sums[3 + c];
+        }
+    return SSDGS_OK;
+}
+
+/* ==== >>composite  eq. 1 and its backward over tiles ==== */
+
+typedef struct ssdgs__composite_job { const ssdgs_frame *frame; const ssdgs_real *color; ssdgs_real *pixels, *transmittance; } ssdgs__composite_job;
+
+static void ssdgs__composite_task(void *data, int index) {
+    const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
+    const ssdgs_splat_view *v = job->frame->views;
+    const ssdgs__tile tile = ssdgs__tile_of(job->frame, v, index);
+    const size_t plane = (size_t)v->width * (size_t)v->height;
+    ssdgs_real pixels[16 * 64];
+    int micro, lane, c;
+    job->frame->context->k->composite(&tile, job->color, pixels);
+    for (micro = 0; micro < 16; micro++)
+        for (lane = 0; lane < 16; lane++) {
+            const int x = tile.x + 4 * (micro & 3) + (lane & 3), y = tile.y + 4 * (micro >> 2) + (lane >> 2);
+            const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
+            if (x >= v->width || y >= v->height) continue;
+            for (c = 0; c < 3; c++) job->pixels[plane * (size_t)c + at] = pixels[micro * 64 + c * 16 + lane];
+            job->transmittance[at] = pixels[micro * 64 + 48 + lane];
+        }
+}
+
+/* Any per-Gaussian triple: the colour, or a component. */
+static ssdgs_result ssdgs__composite_planes(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
+    ssdgs__composite_job job;
+    job.frame = frame;
+    job.color = color;
+    job.pixels = pixels;
+    job.transmittance = frame->transmittance;
+    ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task, &job);
+    return SSDGS_OK;
+}
+
+static void ssdgs__composite_backward_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs_splat_view *v = frame->views;
+    const ssdgs__tile tile = ssdgs__tile_of(frame, v, index);
+    const size_t plane = (size_t)v->width * (size_t)v->height;
+    ssdgs_real pixels[16 * 64];
+    int micro, lane, c;
+    if (!tile.count) return;
+    for (micro = 0; micro < 16; micro++)
+        for (lane = 0; lane < 16; lane++) {
+            const int x = tile.x + 4 * (micro & 3) + (lane & 3), y = tile.y + 4 * (micro >> 2) + (lane >> 2);
+            const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
+            ssdgs_real *p = pixels + micro * 64 + lane, total = 0;
+            for (c = 0; c < 3; c++) {
+                const int inside = x < v->width && y < v->height;
+                const ssdgs_real d = inside ? frame->pixel_gradient[plane * (size_t)c + at] : 0;
+                p[16 * c] = d;
+                if (inside) total += d * (frame->pixels[plane * (size_t)c + at] + frame->transmittance[at] * frame->options.background[c]);
+            }
+            p[48] = total;
+        }
+    frame->context->k->composite_backward(&tile, frame->color, pixels, v->instance_sums);
+}
+
+static void ssdgs__splat_gradient_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs_splat_view *v = frame->views;
+    const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
+    int begin, end, rank, i;
+    uint32_t instance;
+    ssdgs__bin_range(v, index, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        const size_t g = v->order[rank];
+        const ssdgs_real *r = v->record + 8 * g, a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
+        ssdgs_real sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
+        memset(sum, 0, sizeof sum);
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
+            for (i = 0; i < SSDGS__SUMS; i++) sum[i] += v->instance_sums[(size_t)instance * SSDGS__SUMS + (size_t)i];
+        /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
+        d[0] = a * sum[1] + b * sum[2];
+        d[1] = b * sum[1] + c * sum[2];
+        d[2] = (ssdgs_real)-0.5 * sum[3];
+        d[3] = -sum[4];
+        d[4] = (ssdgs_real)-0.5 * sum[5];
+        d[5] = sum[0];
+        d[6] = sum[6];
+        for (i = 0; i < 3; i++) frame->color_gradient[4 * g + (size_t)i] = sum[8 + i];
+    }
+}
+
+static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    ssdgs_splat_view *v = frame->views;
+    ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
+    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
+    SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * SSDGS__SUMS + SSDGS__SUMS);
+    memset(v->instance_sums, 0, v->instance_room * SSDGS__SUMS * sizeof(ssdgs_real));
+    memset(frame->splat_gradient, 0, n * SSDGS__SPLAT * sizeof(ssdgs_real));
+    memset(frame->color_gradient, 0, n * 4 * sizeof(ssdgs_real));
+    memset(frame->view_gradient, 0, sizeof frame->view_gradient);
+    ssdgs__parallel(context, v->tiles_x * v->tiles_y, ssdgs__composite_backward_task, frame);
+    ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__splat_gradient_task, frame);
+    return SSDGS_OK;
+}
+
+static void ssdgs__project_backward_task(void *data, int chunk) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs__projection p = ssdgs__projection_of(frame, frame->views);
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, frame->splat_gradient, frame->gradient,
+                                        frame->gaussians.stride, (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
+}
+
+static ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const int chunks = ssdgs__chunks(frame);
+    ssdgs_real *slots;
+    int i, j;
+    SSDGS__RESERVE(frame->memory->view_slots, slots, ssdgs_real, 12 * (size_t)chunks + 12);
+    ssdgs__parallel(context, chunks, ssdgs__project_backward_task, frame);
+    for (i = 0; i < chunks; i++)
+        for (j = 0; j < 12; j++) frame->view_gradient[j] += slots[12 * i + j];
+    return SSDGS_OK;
+}
+
+/* ==== >>render  the stages in order ==== */
+
+SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
+    switch (stage) {
+        case SSDGS_STAGE_PROJECT: return ssdgs__project(frame);
+        case SSDGS_STAGE_SORT: return ssdgs__sort(frame);
+        case SSDGS_STAGE_BIN: return ssdgs__bin(frame);
+        case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
+        case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
+        case SSDGS_STAGE_COMPOSITE: return ssdgs__composite_planes(frame, frame->color, frame->pixels);
+        case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
+        case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
+        case SSDGS_STAGE_PROJECT_BACKWARD: return ssdgs__project_backward(frame);
+        default: return SSDGS_ERR_ARGUMENT;
+    }
+}
+
+static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
+    const ssdgs_gpu_hook *gpu = &frame->context->gpu;
+    int stage;
+    for (stage = first; stage <= last; stage++) {
+        const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame) : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+        if (result) return result;
+    }
+    return SSDGS_OK;
+}
+
+/* Planes to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. */
+static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride, const ssdgs_real *background, ssdgs_real *out) {
+    const int w = frame->camera.width, h = frame->camera.height;
+    const size_t plane = (size_t)w * (size_t)h;
+    size_t at = 0;
+    int x, y, c;
+    for (y = 0; y < h; y++)
+        for (x = 0; x < w; x++, at++)
+            for (c = 0; c < channels; c++)
+                out[((size_t)y * (size_t)stride + (size_t)x) * (size_t)channels + (size_t)c] =
+                    planes[plane * (size_t)c + at] + (background ? frame->transmittance[at] * background[c] : 0);
+}
+
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
+    ssdgs_context *context;
+    ssdgs_frame frame;
+    ssdgs_result result;
+    ssdgs_real *planes;
+    size_t pixels, i;
+    int stride, c, x, y;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (!model || !camera || !image) return SSDGS_ERR_ARGUMENT;
+    context = model->context;
+    result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
+                                image->diffuse || image->specular || image->scattering || image->normal || image->shadow || image->depth, 0);
+    if (result) return result;
+    stride = image->stride ? image->stride : camera->width;
+    if (stride < camera->width) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride, camera->width);
+    result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
+    if (result) return result;
+    pixels = (size_t)camera->width * (size_t)camera->height;
+    if (image->color) ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
+    if (image->alpha)
+        for (y = 0, i = 0; y < camera->height; y++)
+            for (x = 0; x < camera->width; x++, i++) image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
+    SSDGS__RESERVE(frame.memory->image, planes, ssdgs_real, pixels * 3);
+    for (c = 0; c < 4; c++) {
+        ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
+        const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
+        if (!to[c]) continue;
+        ssdgs__composite_planes(&frame, from[c], planes);
+        ssdgs__write_rows(&frame, planes, 3, stride, NULL, to[c]);
+    }
+    if (image->shadow || image->depth) {
+        ssdgs__composite_planes(&frame, frame.shadow, planes);
+        if (image->shadow) ssdgs__write_rows(&frame, planes, 1, stride, NULL, image->shadow);
+        if (image->depth) ssdgs__write_rows(&frame, planes + pixels, 1, stride, NULL, image->depth);
+    }
+    if (stats) {
+        stats->gaussians = model->count;
+        stats->visible = frame.views[0].visible;
+        stats->shaded = frame.shaded_count;
+        stats->light_views = frame.view_count - 1;
+        stats->instances = frame.views[0].instances;
+        for (i = 0; i < (size_t)model->count; i++)
+            for (c = 0; c < SSDGS_DIFFUSE; c++)
+                if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i])) {
+                    stats->rejected++;
+                    break;
+                }
+    }
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count, const ssdgs_image *image) {
+    return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
+}
+
+/* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, image metrics ==== */
+
+SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear) {
+    ssdgs_real out;
+    ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
+    return out;
+}
+
+SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
+    ssdgs_real out;
+    ssdgs__srgb_decode_scalar(&out, &encoded, 1);
+    return out;
+}
+
+SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
+    size_t i;
+    for (i = 0; i < count; i++) {
+        ssdgs_real x = values[i] > 0 ? values[i] : 0; /* NaN too becomes 0 */
+        x = x < 1 ? x : 1;
+        if (transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(x);
+        bytes[i] = (unsigned char)(x * 255 + (ssdgs_real)0.5);
+    }
+}
+
+typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
+
+#define SSDGS__BAND 16 /* rows of a loss task */
+
+typedef struct ssdgs__loss_job {
+    const ssdgs__kernels *k;
+    const ssdgs_real *image, *target; /* (3, h, w) */
+    ssdgs_real *gradient;             /* (3, h, w), may be NULL */
+    ssdgs_real *padded[5];            /* image, target, three derivative planes: (3, h + 10, stride) */
+    ssdgs_real *scratch;              /* (tasks, 5, stride) */
+    double *sums;                     /* (tasks, 3) */
+    size_t stride;
+    int width, height, bands;
+    ssdgs_real by_l1, by_ssim;
+} ssdgs__loss_job;
+
+static size_t ssdgs__padded_at(const ssdgs__loss_job *job, int channel, int y) { /* row y, column 0 */
+    return ((size_t)channel * (size_t)(job->height + 10) + (size_t)(y + 5)) * job->stride + 16;
+}
+
+/* Copies a band into the padded planes; the first and last also own the border rows. */
+static void ssdgs__loss_pad_task(void *data, int index) {
+    const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
+    const int channel = index / job->bands, band = index % job->bands, w = job->width;
+    const int begin = band ? band * SSDGS__BAND : -5, end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
+    int y, x, p;
+    for (y = begin; y < end; y++)
+        for (p = 0; p < 5; p++) {
+            const ssdgs_real *from = (p ? job->target : job->image) + (size_t)channel * (size_t)w * (size_t)job->height + (size_t)(y > 0 ? y : 0) * (size_t)w;
+            const ssdgs_real outside = p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
+            const int inside = y >= 0 && y < job->height && p < 2;
+            ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
+            for (x = 0; x < 16; x++) to[x] = outside;
+            for (x = 0; x < w; x++) to[16 + x] = inside ? from[x] - (ssdgs_real)0.5 : outside;
+            for (x = 16 + w; x < (int)job->stride; x++) to[x] = outside;
+        }
+}
+
+static void ssdgs__loss_task(void *data, int index) {
+    const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
+    const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
+    const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
+    int y, i;
+    for (i = 0; i < 3; i++) job->sums[3 * index + i] = 0;
+    for (y = begin; y < end; y++) {
+        const size_t at = ssdgs__padded_at(job, channel, y);
+        ssdgs_real sums[3];
+        job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, job->scratch + (size_t)index * 5 * job->stride,
+                         job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, sums);
+        for (i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
+    }
+}
+
+static void ssdgs__loss_backward_task(void *data, int index) {
+    const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
+    const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
+    const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
+    ssdgs_real *scratch = job->scratch + (size_t)index * 5 * job->stride, *row = scratch + 4 * job->stride;
+    int y;
+    for (y = begin; y < end; y++) {
+        const size_t at = ssdgs__padded_at(job, channel, y);
+        job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch, job->padded[2] + at,
+                                  job->padded[3] + at, job->padded[4] + at, job->by_l1, job->by_ssim, row);
+        memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row, (size_t)job->width * sizeof *row);
+    }
+}
+
+/* image, target, gradient: (3, h, w) stored values. gradient may be NULL. */
+static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, const ssdgs_real *image, const ssdgs_real *target,
+                                int width, int height, ssdgs_real dssim, ssdgs_real *gradient, ssdgs__loss_values *values) {
+    ssdgs__loss_job job;
+    const double pixels = 3.0 * width * height;
+    double sum[3] = {0, 0, 0};
+    size_t plane;
+    ssdgs_real *at;
+    int tasks, i, j;
+    memset(&job, 0, sizeof job);
+    job.k = context->k;
+    job.image = image;
+    job.target = target;
+    job.gradient = gradient;
+    job.width = width;
+    job.height = height;
+    job.bands = (height + SSDGS__BAND - 1) / SSDGS__BAND;
+    job.stride = (size_t)(width + 15) / 16 * 16 + 32;
+    plane = 3 * (size_t)(height + 10) * job.stride;
+    tasks = 3 * job.bands;
+    SSDGS__RESERVE(*memory, at, ssdgs_real, 6 * (size_t)tasks + 5 * plane + (size_t)tasks * 5 * job.stride);
+    job.sums = (double *)memory->memory;
+    at += 6 * (size_t)tasks;
+    for (i = 0; i < 5; i++, at += plane) job.padded[i] = at;
+    job.scratch = at;
+    job.by_l1 = (ssdgs_real)((1 - (double)dssim) / pixels);
+    job.by_ssim = (ssdgs_real)(-(double)dssim / pixels);
+    ssdgs__parallel(context, tasks, ssdgs__loss_pad_task, &job);
+    ssdgs__parallel(context, tasks, ssdgs__loss_task, &job);
+    if (gradient) ssdgs__parallel(context, tasks, ssdgs__loss_backward_task, &job);
+    for (i = 0; i < tasks; i++)
+        for (j = 0; j < 3; j++) sum[j] += job.sums[3 * i + j];
+    values->ssim = sum[0] / pixels;
+    values->l1 = sum[1] / pixels;
+    values->mse = sum[2] / pixels;
+    values->loss = (1 - (double)dssim) * values->l1 + (double)dssim * (1 - values->ssim);
+    return SSDGS_OK;
+}
+
+static double ssdgs__psnr(double mse) { return mse > 1e-10 ? -10 * log10(mse) : 100; }
+/* ---- FLIP: the visible difference of two images shown in turn (Andersson et al. 2020) ---- */
+
+/* Linear sRGB to CIE XYZ relative to the white point, and back. Rows sum to 1. */
+static const double ssdgs__flip_to_xyz[9] = {
+    10135552.0 / 23359437, 8788810.0 / 23359437, 4435075.0 / 23359437,
+    2613072.0 / 12288897, 8788810.0 / 12288897, 887015.0 / 12288897,
+    1425312.0 / 80288307, 8788810.0 / 80288307, 70074185.0 / 80288307
+};
+static const double ssdgs__flip_to_rgb[9] = {
+    3.080341988280, -1.537398969489, -0.542943018792,
+    -0.921178396165, 1.875929983695, 0.045248412470,
+    0.052881292876, -0.204011206124, 1.151129913248
+};
+
+static void ssdgs__flip_transform(const double matrix[9], const double v[3], double result[3]) {
+    int i;
+    for (i = 0; i < 3; i++) result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
+}
+
+/* Linear sRGB to CIELAB with Hunt's adjustment: chroma counts less where it is dark. */
+static void ssdgs__flip_lab(const double rgb[3], double lab[3]) {
+    const double delta = 6.0 / 29;
+    double f[3];
+    int i;
+    ssdgs__flip_transform(ssdgs__flip_to_xyz, rgb, f);
+    for (i = 0; i < 3; i++) f[i] = f[i] > delta * delta * delta ? pow(f[i], 1.0 / 3) : f[i] / (3 * delta * delta) + 4.0 / 29;
+    lab[0] = 116 * f[1] - 16;
+    lab[1] = 0.01 * lab[0] * 500 * (f[0] - f[1]);
+    lab[2] = 0.01 * lab[0] * 200 * (f[1] - f[2]);
+}
+
+static double ssdgs__flip_hyab(const double p[3], const double q[3]) {
+    return fabs(p[0] - q[0]) + sqrt((p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
+}
+
+enum { SSDGS__FLIP_COLOR_RADIUS = 10, SSDGS__FLIP_FEATURE_RADIUS = 9, SSDGS__FLIP_TAPS = 21 }; /* 3 sigma of the widest */
+
+/* Taps of a Gaussian (order 0), its first or second derivative: positive ones sum to 1, negative ones to -1.
+   Returns what the positive ones summed to before. */
+static double ssdgs__flip_kernel(int order, double sigma, int radius, ssdgs_real *taps) {
+    double raw[SSDGS__FLIP_TAPS], positive = 0, negative = 0;
+    int i;
+    for (i = 0; i <= 2 * radius; i++) {
+        const double x = (i - radius) / sigma;
+        raw[i] = exp(-0.5 * x * x) * (order == 0 ? 1 : order == 1 ? -x : x * x - 1);
+        *(raw[i] > 0 ? &positive : &negative) += fabs(raw[i]);
+    }
+    for (i = 0; i <= 2 * radius; i++) taps[i] = (ssdgs_real)(raw[i] / (raw[i] > 0 ? positive : raw[i] < 0 ? negative : 1));
+    return positive;
+}
+
+/* output += weight x input filtered by across along the rows and down along the columns; the border pixels go on for ever.
+   scratch holds a plane and a row with its borders. */
+static void ssdgs__flip_filter(const ssdgs_real *input, int width, int height, const ssdgs_real *across, const ssdgs_real *down,
+                               int radius, double weight, ssdgs_real *scratch, ssdgs_real *output) {
+    const size_t w = (size_t)width;
+    ssdgs_real *row = scratch + w * (size_t)height;
+    int x, y, k;
+    for (y = 0; y < height; y++) {
+        const ssdgs_real *from = input + w * (size_t)y;
+        ssdgs_real *to = scratch + w * (size_t)y;
+        for (x = -radius; x < width + radius; x++) row[x + radius] = from[x < 0 ? 0 : x < width ? x : width - 1];
+        for (x = 0; x < width; x++) to[x] = 0;
+        for (k = 0; k <= 2 * radius; k++) {
+            for (x = 0; x < width; x++) to[x] += across[k] * row[x + k];
+        }
+    }
+    for (y = 0; y < height; y++) {
+        ssdgs_real *to = output + w * (size_t)y;
+        for (k = 0; k <= 2 * radius; k++) {
+            const int source = y + k - radius;
+            const ssdgs_real *from = scratch + w * (size_t)(source < 0 ? 0 : source < height ? source : height - 1);
+            const ssdgs_real tap = (ssdgs_real)weight * down[k];
+            for (x = 0; x < width; x++) to[x] += tap * from[x];
+        }
+    }
+}
+
+/* Fills five planes: what the eye resolves of an image's colours (Hunt-adjusted L, a, b), how strong its edges and points
+   are. scratch holds four planes and a row. */
+static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ssdgs_real *planes, ssdgs_real *scratch) {
+    const double degree = 3840 * 3.14159265358979323846 / 180; /* px per degree: 0.7 m before a 0.7 m wide 4K monitor */
+    const double pi2 = 9.86960440108935861883;
+    /* Contrast sensitivity of the three opponent channels; the last is a sum of two Gaussians. */
+    static const double amplitude[4] = { 1, 1, 34.1, 13.5 }, spread[4] = { 0.0047, 0.0053, 0.04, 0.025 };
+    static const int channel[4] = { 0, 1, 2, 2 };
+    const size_t pixels = (size_t)width * (size_t)height;
+    ssdgs_real *opponent = scratch + pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS;
+    ssdgs_real taps[4][SSDGS__FLIP_TAPS], smooth[SSDGS__FLIP_TAPS];
+    double gain[4], color[3], xyz[3];
+    size_t p;
+    int i, k;
+
+    for (p = 0; p < pixels; p++) { /* Yy, Cx, Cz without their scale and offset, which filters keep */
+        for (k = 0; k < 3; k++) {
+            const ssdgs_real v = image[3 * p + (size_t)k];
+            color[k] = (double)ssdgs_srgb_decode(v > 0 ? v < 1 ? v : 1 : 0);
+        }
+        ssdgs__flip_transform(ssdgs__flip_to_xyz, color, xyz);
+        opponent[p] = (ssdgs_real)xyz[1];
+        opponent[pixels + p] = (ssdgs_real)(xyz[0] - xyz[1]);
+        opponent[2 * pixels + p] = (ssdgs_real)(xyz[1] - xyz[2]);
+    }
+
+    ssdgs__flip_kernel(0, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS, smooth); /* half of 0.082 degrees, peak to trough */
+    for (k = 1; k <= 2; k++) { /* edges, points: length of the two derivatives; L and a are free to hold them */
+        ssdgs__flip_kernel(k, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS, taps[0]);
+        memset(planes, 0, 2 * pixels * sizeof *planes);
+        ssdgs__flip_filter(opponent, width, height, taps[0], smooth, SSDGS__FLIP_FEATURE_RADIUS, 1, scratch, planes);
+        ssdgs__flip_filter(opponent, width, height, smooth, taps[0], SSDGS__FLIP_FEATURE_RADIUS, 1, scratch, planes + pixels);
+        for (p = 0; p < pixels; p++) {
+            const double dx = (double)planes[p], dy = (double)planes[pixels + p];
+            planes[(size_t)(2 + k) * pixels + p] = (ssdgs_real)sqrt(dx * dx + dy * dy);
+        }
+    }
+
+    for (i = 0; i < 4; i++) { /* a spread b is a Gaussian of sigma sqrt(b / 2) / pi degrees */
+        const double sum = ssdgs__flip_kernel(0, sqrt(spread[i] / (2 * pi2)) * degree, SSDGS__FLIP_COLOR_RADIUS, taps[i]);
+        gain[i] = i < 2 ? 1 : amplitude[i] / sqrt(spread[i]) * sum * sum;
+    }
+    memset(planes, 0, 3 * pixels * sizeof *planes);
+    for (i = 0; i < 4; i++) {
+        ssdgs__flip_filter(opponent + (size_t)channel[i] * pixels, width, height, taps[i], taps[i], SSDGS__FLIP_COLOR_RADIUS,
+                           i < 2 ? 1 : gain[i] / (gain[2] + gain[3]), scratch, planes + (size_t)channel[i] * pixels);
+    }
+    for (p = 0; p < pixels; p++) {
+        xyz[1] = (double)planes[p];
+        xyz[0] = xyz[1] + (double)planes[pixels + p];
+        xyz[2] = xyz[1] - (double)planes[2 * pixels + p];
+        ssdgs__flip_transform(ssdgs__flip_to_rgb, xyz, color);
+        for (k = 0; k < 3; k++) color[k] = color[k] > 0 ? color[k] < 1 ? color[k] : 1 : 0;
+        ssdgs__flip_lab(color, xyz);
+        for (k = 0; k < 3; k++) planes[(size_t)k * pixels + p] = (ssdgs_real)xyz[k];
+    }
+}
+
+/* Mean LDR-FLIP error of two (h,w,3) images of sRGB-encoded values, clamped to [0,1]. */
+static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference, int width,
+                                int height, double *flip) {
+    static const double green[3] = { 0, 1, 0 }, blue[3] = { 0, 0, 1 }; /* the largest difference there is */
+    double lab[2][3], largest, knee, sum = 0;
+    ssdgs_real *planes; /* five of each image, four and a row of scratch */
+    size_t pixels, bytes, p;
+    int i;
+
+    *flip = 0;
+    if (!ssdgs__product_fits((size_t)width, (size_t)height, &pixels) || pixels > SIZE_MAX / sizeof *planes / 32 ||
+        !ssdgs__product_fits(14 * pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS, sizeof *planes, &bytes))
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "FLIP: %d x %d pixels are too many", width, height);
+    planes = (ssdgs_real *)ssdgs__allocate(context, bytes);
+    if (!planes) return SSDGS_ERR_MEMORY;
+    ssdgs__flip_image(image, width, height, planes, planes + 10 * pixels);
+    ssdgs__flip_image(reference, width, height, planes + 5 * pixels, planes + 10 * pixels);
+
+    ssdgs__flip_lab(green, lab[0]);
+    ssdgs__flip_lab(blue, lab[1]);
+    largest = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
+    knee = 0.4 * largest; /* errors below it take 95% of the scale */
+    for (p = 0; p < pixels; p++) {
+        double color, edge, point, feature;
+        for (i = 0; i < 3; i++) {
+            lab[0][i] = (double)planes[(size_t)i * pixels + p];
+            lab[1][i] = (double)planes[(size_t)(i + 5) * pixels + p];
+        }
+        color = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
+        color = color < knee ? 0.95 / knee * color : 0.95 + 0.05 * (color - knee) / (largest - knee);
+        edge = fabs((double)planes[3 * pixels + p] - (double)planes[8 * pixels + p]);
+        point = fabs((double)planes[4 * pixels + p] - (double)planes[9 * pixels + p]);
+        feature = sqrt((edge > point ? edge : point) / 1.41421356237309504880);
+        sum += pow(color, feature < 1 ? 1 - feature : 0);
+    }
+    ssdgs__release(context, planes);
+    *flip = sum / (double)pixels;
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                     int width, int height, ssdgs_metrics *metrics) {
+    ssdgs__buffer planes = {0, 0}, memory = {0, 0};
+    ssdgs__loss_values values;
+    ssdgs_result result;
+    size_t pixels, i, c;
+    if (!context || !metrics) return SSDGS_ERR_ARGUMENT;
+    memset(metrics, 0, sizeof *metrics);
+    if (!image || !reference || width < 1 || height < 1 || width > 1 << 15 || height > 1 << 15)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
+    pixels = (size_t)width * (size_t)height;
+    result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
+    if (!result) {
+        ssdgs_real *p = (ssdgs_real *)planes.memory;
+        for (i = 0; i < pixels; i++)
+            for (c = 0; c < 6; c++) {
+                const ssdgs_real x = (c < 3 ? image : reference)[3 * i + c % 3];
+                p[pixels * c + i] = x > 0 ? (x < 1 ? x : 1) : 0;
+            }
+        result = ssdgs__loss(context, &memory, p, p + 3 * pixels, width, height, (ssdgs_real)0.2, NULL, &values);
+    }
+    if (!result) result = ssdgs__flip(context, image, reference, width, height, &metrics->flip);
+    if (!result) {
+        metrics->psnr = ssdgs__psnr(values.mse);
+        metrics->ssim = values.ssim;
+    }
+    ssdgs__release(context, planes.memory);
+    ssdgs__release(context, memory.memory);
+    return result;
+}
+/* ==== >>ply  model files, files at large ==== */
+
+/* A model is one PLY file: element vertex with the Gaussians, then the settings, the ASG bases and the weights. One table of
+   properties drives both ways. Reading: the header is matched against the table, a survey finds where each element lies and
+   that all of it is there, then the rows of known elements are read and mended. */
+
+#ifndef SSDGS_NO_STDIO
+#include <errno.h>
+#include <fcntl.h>
+#ifdef _WIN32
+#include <io.h>
+#include <process.h>
+#include <sys/stat.h>
+#else
+#include <unistd.h>
+#if defined(__STRICT_ANSI__) && !defined(__cplusplus)
+int fsync(int file); /* hidden by -std=c99 */
+#endif
+#endif
+#endif
+
+enum { SSDGS__PLY_VERTEX = 0, SSDGS__PLY_SETTINGS, SSDGS__PLY_BASIS, SSDGS__PLY_SCATTERING, SSDGS__PLY_SHADOW, SSDGS__PLY_KINDS };
+static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {
+    "vertex", "ssdgs_settings", "asg_basis", "scattering_weight", "shadow_weight"
+};
+
+/* A row is an array of 32-bit words: floats, as bits, or the integers of the settings when they are written. A vertex has the
+   model's planes first, then what only other programs use; settings lie as in their struct; globals at 4 x group. */
+enum {
+    SSDGS__PLY_NORMAL = SSDGS_CHANNELS, SSDGS__PLY_DC = SSDGS_CHANNELS + 3, SSDGS__PLY_RGB = SSDGS_CHANNELS + 6,
+    SSDGS__PLY_WORDS = SSDGS_CHANNELS + 9
+};
+typedef char ssdgs__ply_settings_fit[sizeof(ssdgs_settings) / sizeof(int) <= SSDGS__PLY_WORDS ? 1 : -1];
+
+typedef struct ssdgs__ply_field {
+    int kind;         /* element */
+    const char *stem; /* of the names stem0, stem1, .. */
+    int count;        /* of those; 0 = the stem is the name */
+    int word;         /* of the first */
+    int integer;
+} ssdgs__ply_field;
+
+#define SSDGS__V(stem, count, word) {SSDGS__PLY_VERTEX, stem, count, word, 0},
+#define SSDGS__I(member) {SSDGS__PLY_SETTINGS, #member, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1},
+#define SSDGS__R(stem, count, member) {SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0},
+#define SSDGS__G(kind, stem, count, group) {kind, stem, count, 4 * group, 0},
+static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the file; red, green, blue are only read */
+    SSDGS__V("x", 0, SSDGS_POSITION) SSDGS__V("y", 0, SSDGS_POSITION + 1) SSDGS__V("z", 0, SSDGS_POSITION + 2)
+    SSDGS__V("nx", 0, SSDGS__PLY_NORMAL) SSDGS__V("ny", 0, SSDGS__PLY_NORMAL + 1) SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2)
+    SSDGS__V("f_dc_", 3, SSDGS__PLY_DC) SSDGS__V("opacity", 0, SSDGS_OPACITY)
+    SSDGS__V("scale_", 3, SSDGS_LOG_SCALE) SSDGS__V("rot_", 4, SSDGS_ROTATION)
+    SSDGS__V("kd_", 3, SSDGS_DIFFUSE) SSDGS__V("ks_", 3, SSDGS_SPECULAR) SSDGS__V("ksss_", 3, SSDGS_SCATTERING)
+    SSDGS__V("alpha_asg_", SSDGS_ASG_COUNT, SSDGS_ASG_WEIGHT) SSDGS__V("local_q_", 4, SSDGS_FRAME)
+    SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT, SSDGS_MATERIAL)
+    SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2)
+    SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked) SSDGS__I(transfer) SSDGS__I(dipole) SSDGS__I(asg)
+    SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
+    SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
+    SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias) SSDGS__R("eta", 0, eta)
+    SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
+    SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS) SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS)
+    SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA)
+    SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET) SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)
+};
+#undef SSDGS__V
+#undef SSDGS__I
+#undef SSDGS__R
+#undef SSDGS__G
+
+typedef struct ssdgs__ply_cursor { /* walks an element's properties: zero it, then call ssdgs__ply_next */
+    const ssdgs__ply_field *field;
+    int index, word;
+    char name[32];
+} ssdgs__ply_cursor;
+
+static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
+    const ssdgs__ply_field *const end = ssdgs__ply_fields + sizeof ssdgs__ply_fields / sizeof *ssdgs__ply_fields;
+    size_t length;
+    if (cursor->field && cursor->index + 1 < cursor->field->count) {
+        cursor->index++;
+    } else {
+        cursor->index = 0;
+        cursor->field = cursor->field ? cursor->field + 1 : ssdgs__ply_fields;
+        while (cursor->field < end && cursor->field->kind != kind) cursor->field++;
+        if (cursor->field == end) return 0;
+    }
+    cursor->word = cursor->field->word + cursor->index;
+    length = strlen(cursor->field->stem);
+    memcpy(cursor->name, cursor->field->stem, length + 1);
+    if (cursor->field->count) cursor->name[length] = (char)('0' + cursor->index), cursor->name[length + 1] = 0;
+    return 1;
+}
+
+/* Where a setting lies: an int or a ssdgs_real. */
+static unsigned char *ssdgs__ply_setting(ssdgs_settings *settings, const ssdgs__ply_cursor *cursor) {
+    return (unsigned char *)settings + (size_t)cursor->field->word * sizeof(int) + (size_t)cursor->index * sizeof(ssdgs_real);
+}
+
+/* Where anything else lies. */
+static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const ssdgs__ply_cursor *cursor) {
+    const size_t width = cursor->field->count ? (size_t)cursor->field->count : 1;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    if (cursor->field->kind == SSDGS__PLY_VERTEX) return model->gaussians + (size_t)cursor->word * model->capacity + row;
+    ssdgs__global_groups(&model->settings, first);
+    return model->globals + first[cursor->field->word / 4] + row * width + (size_t)cursor->index;
+}
+
+/* Rows of anything but the vertices. */
+static size_t ssdgs__ply_rows(const ssdgs_settings *settings, int kind) {
+    if (kind == SSDGS__PLY_SETTINGS) return 1;
+    return kind == SSDGS__PLY_BASIS ? SSDGS_ASG_COUNT : ssdgs__network_count(settings, kind == SSDGS__PLY_SHADOW);
+}
+
+/* The float nearest to x, as bits, which can be tested whatever -ffast-math assumes. Only what is in range is cast. */
+static uint32_t ssdgs__ply_bits(double x) {
+    uint64_t wide, size;
+    uint32_t bits;
+    float single;
+    memcpy(&wide, &x, sizeof wide);
+    size = wide & UINT64_C(0x7fffffffffffffff);
+    bits = (uint32_t)((wide ^ size) >> 32);
+    if (size > UINT64_C(0x7ff0000000000000)) return bits | 0x7fc00000u;
+    if (size > UINT64_C(0x47efffffe0000000)) return bits | (size < UINT64_C(0x47effffff0000000) ? 0x7f7fffffu : 0x7f800000u);
+    single = (float)x;
+    memcpy(&bits, &single, sizeof bits);
+    return bits;
+}
+
+static double ssdgs__ply_value(uint32_t bits) {
+    float single;
+    memcpy(&single, &bits, sizeof single);
+    return (double)single;
+}
+
+static int ssdgs__ply_finite(uint32_t bits) { return (bits & 0x7f800000u) != 0x7f800000u; }
+
+#define SSDGS__PLY_HARMONIC 0.28209479177387814 /* colour = 0.5 + this x f_dc */
+
+/* ---- reading ---- */
+
+enum { /* limits of a header */
+    SSDGS__PLY_MAX_HEADER = 65536, SSDGS__PLY_MAX_LINE = 4096, SSDGS__PLY_MAX_ELEMENTS = 64, SSDGS__PLY_MAX_PROPERTIES = 1024
+};
+enum { SSDGS__PLY_UINT8 = 1, SSDGS__PLY_FLOAT32 = 6, SSDGS__PLY_FLOAT64 = 7, SSDGS__PLY_TYPES = 8 }; /* 0, 2, 4 are signed */
+static const char *const ssdgs__ply_types[SSDGS__PLY_TYPES][2] = {
+    {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"}, {"ushort", "uint16"},
+    {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}
+};
+static const unsigned char ssdgs__ply_sizes[SSDGS__PLY_TYPES] = {1, 1, 2, 2, 4, 4, 4, 8};
+
+typedef enum ssdgs__ply_format { SSDGS__PLY_UNKNOWN = 0, SSDGS__PLY_ASCII, SSDGS__PLY_LITTLE, SSDGS__PLY_BIG } ssdgs__ply_format;
+
+typedef struct ssdgs__ply_token { const unsigned char *text; size_t length; } ssdgs__ply_token;
+
+typedef struct ssdgs__ply_property {
+    ssdgs__ply_token name;
+    int type, list; /* type of the values, of a list's count; -1 = no list */
+    int word;       /* -1 = skipped */
+} ssdgs__ply_property;
+
+typedef struct ssdgs__ply_element {
+    ssdgs__ply_token name;
+    size_t count;
+    int kind;                  /* -1 = skipped */
+    int first, properties;     /* in ssdgs__ply.properties */
+    int lists;                 /* 1: some are lists */
+    uint64_t present;          /* words that the properties give */
+    const unsigned char *data;
+} ssdgs__ply_element;
+
+typedef struct ssdgs__ply {
+    ssdgs_context *context;
+    const char *name; /* of the file, for messages */
+    const unsigned char *begin, *at, *end;
+    ssdgs__ply_format format;
+    int newline, line, element_count, property_count;
+    ssdgs__ply_element elements[SSDGS__PLY_MAX_ELEMENTS], *known[SSDGS__PLY_KINDS];
+    ssdgs__ply_property properties[SSDGS__PLY_MAX_PROPERTIES];
+} ssdgs__ply;
+
+static int ssdgs__ply_space(int c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+static int ssdgs__ply_same(ssdgs__ply_token a, ssdgs__ply_token b) {
+    return a.length == b.length && memcmp(a.text, b.text, a.length) == 0;
+}
+
+static int ssdgs__ply_is(ssdgs__ply_token token, const char *text) {
+    return token.length == strlen(text) && memcmp(token.text, text, token.length) == 0;
+}
+
+/* The next token before end; an empty one when there is none. */
+static ssdgs__ply_token ssdgs__ply_cut(const unsigned char **at, const unsigned char *end) {
+    ssdgs__ply_token token;
+    while (*at < end && ssdgs__ply_space(**at)) ++*at;
+    token.text = *at;
+    while (*at < end && !ssdgs__ply_space(**at)) ++*at;
+    token.length = (size_t)(*at - token.text);
+    return token;
+}
+
+/* Decimal digits only; 0 on anything else and on overflow. */
+static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
+    size_t i;
+    *count = 0;
+    for (i = 0; i < token.length; i++) {
+        const unsigned digit = token.text[i] - (unsigned)'0';
+        if (digit > 9 || *count > (SIZE_MAX - digit) / 10) return 0;
+        *count = *count * 10 + digit;
+    }
+    return token.length > 0;
+}
+
+/* A decimal number, nan or inf, as the bits of a float, whatever the locale. Seventeen digits count; powers of ten are exact
+   doubles, so the error before rounding to float stays near 1e-16. */
+static int ssdgs__ply_number(ssdgs__ply_token token, uint32_t *bits) {
+    static const char *const words[3] = {"nan", "inf", "infinity"};
+    const unsigned char *p = token.text, *const end = p + token.length;
+    int any = 0, point = 0, exponent = 0, i;
+    uint32_t sign = 0;
+    double value = 0;
+
+    if (token.length == 0 || token.length > 1000) return 0;
+    if (*p == '-' || *p == '+') sign = *p++ == '-' ? 0x80000000u : 0;
+    for (i = 0; i < 3; i++) {
+        const size_t length = strlen(words[i]);
+        size_t k = 0;
+        while (k < length && p + k < end && (p[k] | 32) == words[i][k]) k++;
+        if (k == length && p + k == end) return *bits = sign | (i ? 0x7f800000u : 0x7fc00000u), 1;
+    }
+    for (; p < end && ((*p >= '0' && *p <= '9') || (*p == '.' && !point)); p++) {
+        if (*p == '.') {
+            point = 1;
+        } else {
+            any = 1;
+            if (value < 1e16) value = value * 10 + (*p - '0'), exponent -= point;
+            else exponent += !point;
+        }
+    }
+    if (!any) return 0;
+    if (p < end && (*p | 32) == 'e') {
+        int negative = 0, given = 0;
+        if (++p < end && (*p == '-' || *p == '+')) negative = *p++ == '-';
+        if (p == end) return 0;
+        for (; p < end && *p >= '0' && *p <= '9'; p++) given = given < 9999 ? given * 10 + (*p - '0') : given;
+        exponent += negative ? -given : given;
+    }
+    while (exponent && value > 1e-60 && value < 1e60) {
+        const int step = exponent < 0 ? 1 : -1;
+        double power = 1;
+        for (; exponent && power < 1e22; exponent += step) power *= 10;
+        value = step > 0 ? value / power : value * power;
+    }
+    *bits = sign | ssdgs__ply_bits(value);
+    return p == end;
+}
+
+/* The next header line, split at blanks: the number of tokens found (at most 6), -1 when the header does not go on. */
+static int ssdgs__ply_line(ssdgs__ply *ply, ssdgs__ply_token tokens[6]) {
+    const unsigned char *p = ply->at, *line = p, *end = ply->end;
+    int count = 0;
+    if (end - p > SSDGS__PLY_MAX_LINE) end = p + SSDGS__PLY_MAX_LINE;
+    while (p < end && *p != ply->newline && (ply->newline || (*p != '\r' && *p != '\n'))) p++;
+    if (p == end || p - ply->begin > SSDGS__PLY_MAX_HEADER) return -1;
+    if (!ply->newline) { /* the first line decides between CR, LF and CRLF: a CR must not swallow a data byte 10 */
+        if (*p == '\r' && p + 1 < end && p[1] == '\n') p++;
+        ply->newline = *p;
+    }
+    ply->at = p + 1;
+    ply->line++;
+    while (count < 6 && (tokens[count] = ssdgs__ply_cut(&line, p)).length) count++;
+    return count;
+}
+
+static ssdgs_result ssdgs__ply_refuse(const ssdgs__ply *ply, const char *text) {
+    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: PLY header, line %d: %s", ply->name, ply->line, text);
+}
+
+static int ssdgs__ply_type(ssdgs__ply_token token) {
+    int type = SSDGS__PLY_TYPES - 1;
+    for (; type >= 0; type--)
+        if (ssdgs__ply_is(token, ssdgs__ply_types[type][0]) || ssdgs__ply_is(token, ssdgs__ply_types[type][1])) break;
+    return type;
+}
+
+static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_token *tokens) {
+    ssdgs__ply_element *element = ply->elements + ply->element_count;
+    int i;
+    if (ply->element_count == SSDGS__PLY_MAX_ELEMENTS) return ssdgs__ply_refuse(ply, "more than 64 elements");
+    element->name = tokens[1];
+    if (!ssdgs__ply_count(tokens[2], &element->count)) return ssdgs__ply_refuse(ply, "the count is not a number");
+    for (i = 0; i < ply->element_count; i++)
+        if (ssdgs__ply_same(ply->elements[i].name, element->name)) return ssdgs__ply_refuse(ply, "the second of its name");
+    element->first = ply->property_count;
+    element->kind = SSDGS__PLY_KINDS - 1;
+    while (element->kind >= 0 && !ssdgs__ply_is(element->name, ssdgs__ply_kinds[element->kind])) element->kind--;
+    if (element->kind >= 0) ply->known[element->kind] = element;
+    ply->element_count++;
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_token *tokens, int list) {
+    ssdgs__ply_element *element = ply->elements + ply->element_count - 1;
+    ssdgs__ply_property *property = ply->properties + ply->property_count;
+    ssdgs__ply_cursor cursor;
+    int i;
+    if (ply->element_count == 0) return ssdgs__ply_refuse(ply, "a property before any element");
+    if (ply->property_count == SSDGS__PLY_MAX_PROPERTIES) return ssdgs__ply_refuse(ply, "more than 1024 properties");
+    property->name = tokens[list ? 4 : 2];
+    property->type = ssdgs__ply_type(tokens[list ? 3 : 1]);
+    property->list = list ? ssdgs__ply_type(tokens[2]) : -1;
+    property->word = -1;
+    if (property->type < 0 || (list && property->list < 0)) return ssdgs__ply_refuse(ply, "unknown type");
+    if (property->list >= SSDGS__PLY_FLOAT32) return ssdgs__ply_refuse(ply, "a list's count must be an integer");
+    for (i = element->first; i < ply->property_count; i++)
+        if (ssdgs__ply_same(ply->properties[i].name, property->name)) return ssdgs__ply_refuse(ply, "the second of its name");
+    for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
+        if (!ssdgs__ply_is(property->name, cursor.name)) continue;
+        if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB && property->type != SSDGS__PLY_UINT8) continue;
+        property->word = cursor.word;
+        element->present |= (uint64_t)1 << cursor.word;
+    }
+    element->lists |= list;
+    element->properties++;
+    ply->property_count++;
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
+    ssdgs__ply_token tokens[6];
+    ssdgs_result result = SSDGS_OK;
+    if (ssdgs__ply_line(ply, tokens) != 1 || !ssdgs__ply_is(tokens[0], "ply"))
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: not a PLY file", ply->name);
+    while (result == SSDGS_OK) {
+        const int count = ssdgs__ply_line(ply, tokens);
+        if (count < 0) return ssdgs__ply_refuse(ply, "the header does not go on after it");
+        if (count && (ssdgs__ply_is(tokens[0], "comment") || ssdgs__ply_is(tokens[0], "obj_info"))) continue;
+        if (count == 3 && ssdgs__ply_is(tokens[0], "format") && ply->format == SSDGS__PLY_UNKNOWN) {
+            if (ssdgs__ply_is(tokens[1], "ascii")) ply->format = SSDGS__PLY_ASCII;
+            if (ssdgs__ply_is(tokens[1], "binary_little_endian")) ply->format = SSDGS__PLY_LITTLE;
+            if (ssdgs__ply_is(tokens[1], "binary_big_endian")) ply->format = SSDGS__PLY_BIG;
+            if (!ply->format || !ssdgs__ply_is(tokens[2], "1.0")) return ssdgs__ply_refuse(ply, "unknown format");
+        } else if (count == 3 && ssdgs__ply_is(tokens[0], "element")) {
+            result = ssdgs__ply_add_element(ply, tokens);
+        } else if (count == 5 && ssdgs__ply_is(tokens[0], "property") && ssdgs__ply_is(tokens[1], "list")) {
+            result = ssdgs__ply_add_property(ply, tokens, 1);
+        } else if (count == 3 && ssdgs__ply_is(tokens[0], "property")) {
+            result = ssdgs__ply_add_property(ply, tokens, 0);
+        } else if (count == 1 && ssdgs__ply_is(tokens[0], "end_header") && ply->format) {
+            return SSDGS_OK;
+        } else {
+            return ssdgs__ply_refuse(ply, "not understood");
+        }
+    }
+    return result;
+}
+
+/* One number as float bits, or the count of a list; neither = step over it. 0 when the file ends or holds something else. */
+static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, uint32_t *bits, size_t *count) {
+    const int size = ssdgs__ply_sizes[type];
+    uint64_t raw = 0, negative;
+    double value;
+    int i;
+    if (ply->format == SSDGS__PLY_ASCII) {
+        const ssdgs__ply_token token = ssdgs__ply_cut(&ply->at, ply->end);
+        return count ? ssdgs__ply_count(token, count) : bits ? ssdgs__ply_number(token, bits) : token.length > 0;
+    }
+    if (ply->end - ply->at < size) return 0;
+    for (i = 0; i < size; i++) raw = raw << 8 | ply->at[ply->format == SSDGS__PLY_BIG ? i : size - 1 - i];
+    ply->at += size;
+    negative = type < SSDGS__PLY_FLOAT32 && !(type & 1) ? raw >> (8 * size - 1) : 0;
+    if (count) *count = (size_t)raw;
+    if (count || !bits) return !count || !negative;
+    value = (double)raw - (negative ? (double)((uint64_t)1 << 8 * size) : 0);
+    if (type == SSDGS__PLY_FLOAT64) memcpy(&value, &raw, sizeof value);
+    *bits = type == SSDGS__PLY_FLOAT32 ? (uint32_t)raw : ssdgs__ply_bits(value);
+    return 1;
+}
+
+/* The known words of one row; NULL = step over it. */
+static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, uint32_t *words) {
+    const ssdgs__ply_property *property = ply->properties + element->first;
+    int i, good = 1;
+    for (i = 0; i < element->properties && good; i++, property++) {
+        size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
+        if (property->list < 0) {
+            good = ssdgs__ply_scalar(ply, property->type, words && property->word >= 0 ? &words[property->word] : NULL, NULL);
+            continue;
+        }
+        good = ssdgs__ply_scalar(ply, property->list, NULL, &count) && count <= (size_t)(ply->end - ply->at) / size;
+        for (; good && count; count--) good = ssdgs__ply_scalar(ply, property->type, NULL, NULL);
+    }
+    return good;
+}
+
+/* Finds where every element lies, so that they may come in any order. */
+static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
+    const int ascii = ply->format == SSDGS__PLY_ASCII;
+    int e, i;
+    for (e = 0; e < ply->element_count; e++) {
+        ssdgs__ply_element *element = ply->elements + e;
+        const ssdgs__ply_property *property = ply->properties + element->first;
+        const size_t left = (size_t)(ply->end - ply->at) + (size_t)ascii; /* the last line may lack its end */
+        size_t least = 0, row; /* bytes of a row */
+        int fits;
+        for (i = 0; i < element->properties; i++, property++)
+            least += ascii ? 2 : ssdgs__ply_sizes[property->list < 0 ? property->type : property->list];
+        element->data = ply->at;
+        if (!least) continue;
+        fits = element->count <= left / least;
+        if (fits && !ascii && !element->lists) ply->at += element->count * least;
+        else for (row = 0; fits && row < element->count; row++) fits = ssdgs__ply_row(ply, element, NULL);
+        if (!fits) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %d of %d is cut short or has a broken list",
+                                      ply->name, e + 1, ply->element_count);
+    }
+    return SSDGS_OK;
+}
+
+/* Every property whose word lies in [first, last) must be there. */
+static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int first, int last) {
+    ssdgs__ply_cursor cursor;
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
+        if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s", ply->name,
+                               ssdgs__ply_kinds[kind], cursor.name);
+    }
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
+    ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
+    ssdgs__ply_cursor cursor;
+    uint32_t words[SSDGS__PLY_WORDS];
+    ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, SSDGS__PLY_WORDS);
+    if (result) return result;
+    ply->at = element->data;
+    if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers", ply->name);
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
+        const double value = ssdgs__ply_value(words[cursor.word]);
+        const ssdgs_real real = (ssdgs_real)value;
+        int integer;
+        if (!ssdgs__ply_finite(words[cursor.word]) || (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s makes no sense", ply->name, cursor.name);
+        integer = cursor.field->integer ? (int)value : 0;
+        if (cursor.field->integer) memcpy(ssdgs__ply_setting(settings, &cursor), &integer, sizeof integer);
+        else memcpy(ssdgs__ply_setting(settings, &cursor), &real, sizeof real);
+    }
+    if (settings->version < 1 || settings->version > SSDGS_VERSION)
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name, settings->version);
+    settings->version = SSDGS_VERSION;
+    return ssdgs__settings_check(ply->context, settings) ? SSDGS_ERR_FORMAT : SSDGS_OK;
+}
+
+/* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
+static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc) {
+    double color;
+    if (!ssdgs__ply_finite(bits)) return bits;
+    color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / 255;
+    color = color < 1e-6 ? 1e-6 : color;
+    return ssdgs__ply_bits(color > 20 ? color : log(expm1(color)));
+}
+
+/* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite, infinity, NaN. */
+static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
+    const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, twenty = 0x41a00000u, one = 0x3f800000u;
+    int i, k;
+    for (i = 0; i < planes; i++) {
+        const int clamped = i >= SSDGS_LOG_SCALE && i <= SSDGS_OPACITY; /* scales and opacity may be infinite */
+        if ((words[i] & ~sign) >= infinity + (uint32_t)clamped) return stats->dropped++, 0;
+    }
+    for (i = SSDGS_LOG_SCALE; i <= SSDGS_OPACITY; i++) {
+        if ((words[i] & ~sign) <= twenty) continue;
+        words[i] = (words[i] & sign) | twenty;
+        ++*(i == SSDGS_OPACITY ? &stats->clamped_opacities : &stats->clamped_scales);
+    }
+    for (i = SSDGS_ROTATION; i <= SSDGS_FRAME && i < planes; i += SSDGS_FRAME - SSDGS_ROTATION) {
+        double size = 0;
+        for (k = 0; k < 4; k++) size += ssdgs__ply_value(words[i + k]) * ssdgs__ply_value(words[i + k]);
+        if (size >= 1e-30 && size <= 1e30) continue; /* float can square it */
+        for (k = 0; k < 4; k++) words[i + k] = k ? 0 : one;
+        stats->zero_rotations++;
+    }
+    return 1;
+}
+
+/* Fills the model's arrays from an element's rows. */
+static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model *model, ssdgs_load_stats *stats) {
+    static const char bad[] = "%s: %s %z is not %s";
+    ssdgs__ply_element *element = ply->known[kind];
+    const int dc = (int)(element->present >> SSDGS__PLY_DC & 1), plain = kind == SSDGS__PLY_VERTEX && stats->plain;
+    size_t row, kept = 0;
+    ply->at = element->data;
+    if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
+    for (row = 0; row < element->count; row++) {
+        uint32_t words[SSDGS__PLY_WORDS];
+        ssdgs__ply_cursor cursor;
+        int i;
+        if (!ssdgs__ply_row(ply, element, words))
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row, "a number");
+        for (i = 0; i < 3 && plain; i++)
+            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc);
+        if (kind == SSDGS__PLY_VERTEX && !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats)) continue;
+        for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
+            if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
+            if (!ssdgs__ply_finite(words[cursor.word]))
+                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row, "finite");
+            *ssdgs__ply_cell(model, kept, &cursor) = (ssdgs_real)ssdgs__ply_value(words[cursor.word]);
+        }
+        kept++;
+    }
+    if (kind == SSDGS__PLY_VERTEX) model->count = (int)kept;
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_load_stats *stats) {
+    const ssdgs__ply_element *vertex;
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_result result = ssdgs__ply_header(ply);
+    int kind, ours, color;
+
+    if (!result) result = ssdgs__ply_survey(ply);
+    if (result) return result;
+    vertex = ply->known[SSDGS__PLY_VERTEX];
+    if (!vertex) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: no element vertex", ply->name);
+    if (vertex->count > SSDGS__MAX_GAUSSIANS)
+        return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name, vertex->count);
+
+    ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
+    stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
+    if (ours) {
+        result = ssdgs__ply_read_settings(ply, &settings);
+    } else if (stats->plain) {
+        settings.baked = 1;
+        settings.transfer = SSDGS_TRANSFER_NONE;
+        color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1) ? SSDGS__PLY_DC : SSDGS__PLY_RGB;
+        result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, color, color + 3);
+    } else { /* the published implementation keeps the rest elsewhere */
+        settings = ssdgs_settings_published();
+    }
+    if (!result) result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
+    for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
+        const size_t expected = ssdgs__ply_rows(&settings, kind), rows = ply->known[kind] ? ply->known[kind]->count : 0;
+        if (rows != expected && (ours || ply->known[kind]))
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s has %z rows, the settings need %z", ply->name,
+                               ssdgs__ply_kinds[kind], rows, expected);
+        if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
+    }
+    if (!result) result = ssdgs_model_create(ply->context, &settings, (int)vertex->count, out);
+    for (kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
+        if (kind != SSDGS__PLY_SETTINGS && ply->known[kind]) result = ssdgs__ply_read_rows(ply, kind, *out, stats);
+    return result;
+}
+
+static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size, ssdgs_model **out,
+                                    ssdgs_load_stats *stats) {
+    ssdgs_load_stats own;
+    ssdgs_result result = SSDGS_ERR_MEMORY;
+    ssdgs__ply *ply = (ssdgs__ply *)ssdgs__allocate(context, sizeof *ply);
+    memset(&own, 0, sizeof own);
+    if (ply) {
+        ply->context = context;
+        ply->name = name;
+        ply->begin = ply->at = (const unsigned char *)bytes;
+        ply->end = ply->begin + size;
+        result = ssdgs__ply_read(ply, out, &own);
+        ssdgs__release(context, ply);
+    }
+    if (result) {
+        ssdgs_model_destroy(*out);
+        *out = NULL;
+        memset(&own, 0, sizeof own);
+    }
+    if (stats) *stats = own;
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out,
+                                               ssdgs_load_stats *stats) {
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (out) *out = NULL;
+    if (!context || !bytes || !out) return SSDGS_ERR_ARGUMENT;
+    return ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
+}
+
+#ifndef SSDGS_NO_STDIO
+
+/* Reads a whole file in pieces; what the system says of its size is a hint. */
+static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes, size_t *size) {
+    const uint64_t limit = (uint64_t)8 << 30;
+    unsigned char *buffer = NULL, *larger;
+    size_t room = 0, used = 0;
+    ssdgs_result result = SSDGS_OK;
+    FILE *file = fopen(path, "rb");
+    long hint;
+
+    *bytes = NULL;
+    *size = 0;
+    if (!file) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be opened (errno %d)", path, errno);
+    hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
+    rewind(file);
+    while (used == room && !result) { /* a byte more than the file has tells its end */
+        const size_t more = room ? room : hint > 0 && (uint64_t)hint < limit ? (size_t)hint + 1 : 65536;
+        if (room > limit || more > SIZE_MAX - room) {
+            result = ssdgs__fail(context, SSDGS_ERR_LIMIT, "%s: larger than 8 GiB", path);
+        } else if ((larger = (unsigned char *)ssdgs__allocate(context, room + more)) == NULL) {
+            result = SSDGS_ERR_MEMORY;
+        } else {
+            if (used) memcpy(larger, buffer, used);
+            ssdgs__release(context, buffer);
+            buffer = larger;
+            room += more;
+            used += fread(buffer + used, 1, room - used, file);
+        }
+    }
+    if (!result && ferror(file)) result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be read (errno %d)", path, errno);
+    fclose(file);
+    if (result) {
+        ssdgs__release(context, buffer);
+        return result;
+    }
+    *bytes = buffer;
+    *size = used;
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats) {
+    unsigned char *bytes;
+    size_t size;
+    ssdgs_result result;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (out) *out = NULL;
+    if (!context || !path || !out) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__read_file(context, path, &bytes, &size);
+    if (!result) result = ssdgs__ply_load(context, path, bytes, size, out, stats);
+    ssdgs__release(context, bytes);
+    return result;
+}
+
+/* ---- writing ---- */
+
+#ifdef _WIN32
+#define SSDGS__OPEN_NEW(path) _open(path, _O_WRONLY | _O_CREAT | _O_EXCL | _O_BINARY, _S_IREAD | _S_IWRITE)
+#define SSDGS__WRITE(file, bytes, size) _write(file, bytes, (unsigned)(size))
+#define SSDGS__SYNC(file) _commit(file)
+#define SSDGS__CLOSE(file) _close(file)
+#define SSDGS__UNLINK(path) _unlink(path)
+#define SSDGS__RENAME(from, to) (MoveFileExA(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) ? 0 : -1)
+#define SSDGS__PROCESS() ((unsigned long)_getpid())
+#else
+#define SSDGS__OPEN_NEW(path) open(path, O_WRONLY | O_CREAT | O_EXCL, 0666)
+#define SSDGS__WRITE(file, bytes, size) write(file, bytes, size)
+#define SSDGS__SYNC(file) fsync(file)
+#define SSDGS__CLOSE(file) close(file)
+#define SSDGS__UNLINK(path) unlink(path)
+#define SSDGS__RENAME(from, to) rename(from, to)
+#define SSDGS__PROCESS() ((unsigned long)getpid())
+#endif
+
+enum { SSDGS__WRITER_BUFFER = 65536, SSDGS__WRITER_SUFFIX = 64 };
+
+/* A file that gets its name only when it is complete. The first failure sticks; close reports it. */
+typedef struct ssdgs__writer {
+    ssdgs_context *context;
+    const char *path; /* the caller's, until close */
+    char *temporary;  /* the file's name before; the buffer follows it */
+    unsigned char *buffer;
+    size_t used;
+    int file; /* -1 = none */
+    ssdgs_result result;
+} ssdgs__writer;
+
+static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *context, const char *path) {
+    const size_t room = strlen(path) + SSDGS__WRITER_SUFFIX;
+    int attempt;
+    memset(writer, 0, sizeof *writer);
+    writer->context = context;
+    writer->path = path;
+    writer->file = -1;
+    writer->temporary = (char *)ssdgs__allocate(context, room + SSDGS__WRITER_BUFFER);
+    if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
+    writer->buffer = (unsigned char *)writer->temporary + room;
+    errno = EEXIST;
+    for (attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST; attempt++) { /* a crash may have left that name */
+        snprintf(writer->temporary, room, "%s.tmp.%lx.%lx.%d", path, SSDGS__PROCESS(), (unsigned long)(size_t)context, attempt);
+        writer->file = SSDGS__OPEN_NEW(writer->temporary);
+    }
+    if (writer->file < 0) writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be created (errno %d)", path, errno);
+    return writer->result;
+}
+
+static void ssdgs__writer_flush(ssdgs__writer *writer) {
+    size_t done = 0;
+    while (!writer->result && done < writer->used) {
+        const ptrdiff_t wrote = (ptrdiff_t)SSDGS__WRITE(writer->file, writer->buffer + done, writer->used - done);
+        if (wrote > 0) done += (size_t)wrote;
+        else if (wrote == 0 || errno != EINTR)
+            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be written (errno %d)", writer->path, errno);
+    }
+    writer->used = 0;
+}
+
+static ssdgs_result ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, size_t size) {
+    const unsigned char *from = (const unsigned char *)bytes;
+    while (!writer->result && size) {
+        const size_t room = SSDGS__WRITER_BUFFER - writer->used, part = size < room ? size : room;
+        memcpy(writer->buffer + writer->used, from, part);
+        writer->used += part;
+        from += part;
+        size -= part;
+        if (writer->used == SSDGS__WRITER_BUFFER) ssdgs__writer_flush(writer);
+    }
+    return writer->result;
+}
+
+static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
+    if (writer->file >= 0) {
+        int failed;
+        ssdgs__writer_flush(writer);
+        failed = !writer->result && SSDGS__SYNC(writer->file) != 0 && errno != EINVAL; /* some file systems cannot */
+        failed |= SSDGS__CLOSE(writer->file) != 0;
+        if (!writer->result && (failed || SSDGS__RENAME(writer->temporary, writer->path) != 0))
+            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be finished (errno %d)", writer->path, errno);
+        if (writer->result) SSDGS__UNLINK(writer->temporary);
+#ifndef _WIN32
+        else { /* the new name should survive a power cut too; no harm if that cannot be had */
+            char *slash = strrchr(writer->temporary, '/');
+            if (slash) slash[slash == writer->temporary] = 0;
+            writer->file = open(slash ? writer->temporary : ".", O_RDONLY);
+            if (writer->file >= 0) {
+                fsync(writer->file);
+                close(writer->file);
+            }
+        }
+#endif
+    }
+    ssdgs__release(writer->context, writer->temporary);
+    return writer->result;
+}
+
+static void ssdgs__writer_text(ssdgs__writer *writer, const char *text) { ssdgs__writer_put(writer, text, strlen(text)); }
+
+static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
+    unsigned char bytes[4];
+    int i;
+    for (i = 0; i < 4; i++) bytes[i] = (unsigned char)(word >> 8 * i);
+    ssdgs__writer_put(writer, bytes, 4);
+}
+
+static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)raw : log1p(exp((double)raw)); }
+
+/* What other programs show: the normal, and as f_dc the look under a training set's average light. That light is 1 at the
+   object and comes from anywhere above the surface: c_d / pi x 1/2, and c_sss x 0.02, a typical f_sss. */
+static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *words) {
+    const ssdgs_settings *settings = &model->settings;
+    const ssdgs_real *gaussian = model->gaussians + row;
+    const size_t stride = model->capacity;
+    double q[4], scale, size = 0;
+    int i;
+    for (i = 0; i < 4; i++) {
+        q[i] = (double)gaussian[(size_t)(SSDGS_FRAME + i) * stride];
+        size += q[i] * q[i];
+    }
+    scale = size > 0 ? 2 / size : 0;
+    words[SSDGS__PLY_NORMAL] = ssdgs__ply_bits(scale * (q[1] * q[3] + q[0] * q[2]));
+    words[SSDGS__PLY_NORMAL + 1] = ssdgs__ply_bits(scale * (q[2] * q[3] - q[0] * q[1]));
+    words[SSDGS__PLY_NORMAL + 2] = ssdgs__ply_bits(1 - scale * (q[1] * q[1] + q[2] * q[2]));
+    for (i = 0; i < 3; i++) {
+        const double diffuse = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_DIFFUSE + i) * stride]);
+        const double scattering = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_SCATTERING + i) * stride]);
+        double color = settings->baked ? diffuse : (settings->terms & SSDGS_DIFFUSE_TERM ? diffuse * 0.15915494309189535 : 0) +
+                                                   (settings->terms & SSDGS_SCATTERING_TERM ? scattering * 0.02 : 0);
+        if (settings->transfer == SSDGS_TRANSFER_SRGB) color = (double)ssdgs_srgb_encode((ssdgs_real)color);
+        words[SSDGS__PLY_DC + i] = ssdgs__ply_bits((color - 0.5) / SSDGS__PLY_HARMONIC);
+    }
+}
+
+static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
+    ssdgs_settings settings = model->settings;
+    uint32_t words[SSDGS__PLY_WORDS];
+    ssdgs__ply_cursor cursor;
+    if (kind == SSDGS__PLY_VERTEX) ssdgs__ply_look(model, row, words);
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
+        uint32_t *word = &words[cursor.word];
+        ssdgs_real real;
+        if (cursor.field->integer) {
+            memcpy(word, ssdgs__ply_setting(&settings, &cursor), sizeof *word);
+        } else if (kind == SSDGS__PLY_SETTINGS) {
+            memcpy(&real, ssdgs__ply_setting(&settings, &cursor), sizeof real);
+            *word = ssdgs__ply_bits((double)real);
+        } else if (cursor.word < SSDGS_CHANNELS) {
+            *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
+        }
+        ssdgs__writer_word(writer, *word);
+    }
+}
+
+SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
+    size_t rows[SSDGS__PLY_KINDS], row;
+    char line[128];
+    ssdgs__writer writer;
+    ssdgs__ply_cursor cursor;
+    int kind;
+    if (!model || !path) return SSDGS_ERR_ARGUMENT;
+    ssdgs__writer_open(&writer, model->context, path);
+    ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
+    for (kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
+        rows[kind] = kind == SSDGS__PLY_VERTEX ? (size_t)model->count : ssdgs__ply_rows(&model->settings, kind);
+        snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
+        ssdgs__writer_text(&writer, line);
+        for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
+            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int" : "float", cursor.name);
+            ssdgs__writer_text(&writer, line);
+        }
+    }
+    ssdgs__writer_text(&writer, "end_header\n");
+    for (kind = 0; kind < SSDGS__PLY_KINDS; kind++)
+        for (row = 0; row < rows[kind] && !writer.result; row++) ssdgs__ply_write_row(model, kind, row, &writer);
+    return ssdgs__writer_close(&writer);
+}
+#endif /* SSDGS_NO_STDIO */
+
+#ifndef SSDGS_NO_TRAINER
+/* ==== >>trainer  schedule, one photograph forward and backward, Adam ==== */
+
+/* Parameters that learn together; the first ten are planes of every Gaussian. */
+enum {
+    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR, SSDGS__G_SCATTERING,
+    SSDGS__G_FRAME, SSDGS__G_ASG_WEIGHT, SSDGS__G_MATERIAL, SSDGS__PLANE_GROUPS,
+    SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
+};
+
+static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY, SSDGS_DIFFUSE,
+    SSDGS_SPECULAR, SSDGS_SCATTERING, SSDGS_FRAME, SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
+static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotation", "log scale", "opacity", "diffuse colour", "specular colour",
+    "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma", "scattering network", "shadow network"};
+
+/* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
+typedef struct ssdgs__correction {
+    double value[9], mean[9], square[9];
+    int steps;
+} ssdgs__correction;
+
+struct ssdgs_trainer {
+    ssdgs_context *context;
+    ssdgs_model *model;
+    ssdgs_train_options options;
+    ssdgs_photo *photos;
+    ssdgs__correction *corrections;
+    int photo_count;
+    uint32_t *order;          /* the photographs in this pass's order */
+    size_t stride;            /* of the planes below: the model's capacity */
+    ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
+    ssdgs_real *global_mean, *global_square;
+    size_t statistics_room;
+    ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly it was seen */
+    ssdgs_real *screen_count;
+    ssdgs_real *contribution;
+    double extent;            /* 1.1 x the cameras' radius */
+    int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
+    int iteration, skipped;
+};
+
+SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
+    ssdgs_train_options o;
+    int i;
+    memset(&o, 0, sizeof o);
+    o.version = SSDGS_VERSION;
+    o.iterations = 60000;
+    o.seed = 1;
+    o.dssim = (ssdgs_real)0.2;
+    o.initial_points = 10000;
+    for (i = 0; i < 3; i++) {
+        o.bounds_min[i] = (ssdgs_real)-0.5;
+        o.bounds_max[i] = (ssdgs_real)0.5;
+    }
+    o.max_gaussians = 100000;
+    o.densify_every = 100;
+    o.densify_from = 500;
+    o.densify_until = 50000;
+    o.opacity_reset_every = 3000;
+    o.densify_gradient = (ssdgs_real)2e-4;
+    o.densify_size = (ssdgs_real)0.01;
+    o.prune_opacity = (ssdgs_real)0.005;
+#define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
+    SSDGS__RATE(position, 1.6e-4, 1.6e-6);
+    SSDGS__RATE(opacity, 0.05, 0.05);
+    SSDGS__RATE(scale, 0.005, 0.005);
+    SSDGS__RATE(rotation, 0.001, 0.001);
+    SSDGS__RATE(color, 0.01, 0.01);
+    SSDGS__RATE(asg, 0.01, 1e-4);
+    SSDGS__RATE(frame, 0.01, 1e-4);
+    SSDGS__RATE(material, 0.001, 1e-5);
+    SSDGS__RATE(shadow, 0.001, 1e-5);
+    SSDGS__RATE(scattering, 0.001, 1e-5);
+    SSDGS__RATE(camera_rate, 1e-3, 1e-5);
+    SSDGS__RATE(light_rate, 1e-3, 5e-5);
+#undef SSDGS__RATE
+    return o;
+}
+
+/* The iteration on the scale of a 60,000-iteration run. */
+static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) {
+    return o->iterations < 60000 ? iteration * (60000.0 / o->iterations) : (double)iteration;
+}
+
+/* Terms in use at time t, and per group whether it learns. */
+static int ssdgs__phase(const ssdgs_train_options *o, double t, int learns[SSDGS__GROUPS]) {
+    double scattering = 9e3, specular = 16e3, freeze_scattering = 13e3, thaw_scattering = 20e3, thaw_asg = 20e3;
+    int terms = SSDGS_DIFFUSE_TERM, i;
+    const int joint = o->schedule == SSDGS_SCHEDULE_JOINT, merged = o->schedule == SSDGS_SCHEDULE_MERGED;
+    if (o->schedule == SSDGS_SCHEDULE_SWAPPED) {
+        scattering = 16e3;
+        specular = 9e3;
+        freeze_scattering = thaw_scattering = 0;
+        thaw_asg = 13e3;
+    }
+    for (i = 0; i < SSDGS__GROUPS; i++) learns[i] = 1;
+    if (joint || merged) return joint || t >= 5e3 ? SSDGS_ALL_TERMS : terms;
+    if (t >= 5e3) terms |= SSDGS_SHADOW_TERM;
+    if (t >= scattering) terms |= SSDGS_SCATTERING_TERM;
+    if (t >= specular) terms |= SSDGS_SPECULAR_TERM;
+    learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] = learns[SSDGS__G_MATERIAL] = !(t >= 9e3 && t < 16e3);
+    learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] = !(t >= freeze_scattering && t < thaw_scattering);
+    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++) learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg;
+    return terms;
+}
+
+static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
+    const double x = t < from ? 0 : t > from + over ? 1 : (t - from) / over;
+    return rate.start > 0 && rate.end > 0 ? exp(log((double)rate.start) * (1 - x) + log((double)rate.end) * x) : (double)rate.start;
+}
+
+static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double t) {
+    const ssdgs_train_options *o = &trainer->options;
+    const double whole = o->iterations > 60000 ? o->iterations : 60e3;
+    switch (group) {
+        case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->position, 0, whole, t);
+        case SSDGS__G_ROTATION: return ssdgs__decay(o->rotation, 0, whole, t);
+        case SSDGS__G_SCALE: return ssdgs__decay(o->scale, 0, whole, t);
+        case SSDGS__G_OPACITY: return ssdgs__decay(o->opacity, 0, whole, t);
+        case SSDGS__G_DIFFUSE: case SSDGS__G_SPECULAR: case SSDGS__G_SCATTERING: return ssdgs__decay(o->color, 0, whole, t);
+        case SSDGS__G_FRAME: return ssdgs__decay(o->frame, 40e3, 50e3, t);
+        case SSDGS__G_MATERIAL: return ssdgs__decay(o->material, 50e3, 50e3, t);
+        case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return ssdgs__decay(o->scattering, 50e3, 50e3, t);
+        case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return ssdgs__decay(o->shadow, 50e3, 50e3, t);
+        default: return ssdgs__decay(o->asg, 40e3, 50e3, t);
+    }
+}
+
+/* ---- one photograph ---- */
+
+/* Stored values of a photograph on the background, as planes. Alpha is composited in linear light, or as stored. */
+static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], int transfer, ssdgs_real *planes) {
+    const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    const ssdgs_real unit = photo->format == SSDGS_PIXELS_RGBA8 ? (ssdgs_real)(1.0 / 255) : (ssdgs_real)(1.0 / 65535);
+    ssdgs_real linear_background[3];
+    size_t i;
+    int c;
+    for (c = 0; c < 3; c++) linear_background[c] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c]) : background[c];
+    for (i = 0; i < pixels; i++) {
+        ssdgs_real v[4];
+        for (c = 0; c < 4; c++)
+            v[c] = unit * (ssdgs_real)(photo->format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photo->pixels)[4 * i + (size_t)c]
+                                                                         : ((const uint16_t *)photo->pixels)[4 * i + (size_t)c]);
+        for (c = 0; c < 3; c++) {
+            ssdgs_real x = v[c];
+            if (v[3] <= 0) x = background[c];
+            else if (v[3] < 1 && transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(v[3] * ssdgs_srgb_decode(x) + (1 - v[3]) * linear_background[c]);
+            else if (v[3] < 1) x = v[3] * x + (1 - v[3]) * background[c];
+            planes[pixels * (size_t)c + i] = x;
+        }
+    }
+}
+
+/* exp(w) as a matrix, and the left Jacobian; both by series where the angle is small. */
+static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9]) {
+    const double k[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
+    const double t2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], t = sqrt(t2);
+    const double a = t2 < 1e-3 ? 1 - t2 / 6 * (1 - t2 / 20 * (1 - t2 / 42)) : sin(t) / t;
+    const double b = t2 < 1e-3 ? 0.5 * (1 - t2 / 12 * (1 - t2 / 30 * (1 - t2 / 56))) : (1 - cos(t)) / t2;
+    const double c = t2 < 1e-3 ? (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72))) / 6 : (t - sin(t)) / (t2 * t);
+    int i, j, l;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            double k2 = 0;
+            for (l = 0; l < 3; l++) k2 += k[3 * i + l] * k[3 * l + j];
+            e[3 * i + j] = (i == j) + a * k[3 * i + j] + b * k2;
+            jacobian[3 * i + j] = (i == j) + b * k[3 * i + j] + c * k2;
+        }
+}
+
+static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdgs_camera *camera, ssdgs_light *light) {
+    double e[9], jacobian[9];
+    int i, j, l;
+    *camera = photo->camera;
+    *light = photo->light;
+    ssdgs__rotate_by(value + 3, e, jacobian);
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 4; j++) {
+            double sum = j == 3 ? value[i] : 0;
+            for (l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
+            camera->view[4 * i + j] = (ssdgs_real)sum;
+        }
+        if (light->kind == SSDGS_LIGHT_POINT) light->position[i] = (ssdgs_real)((double)photo->light.position[i] + value[6 + i]);
+    }
+}
+
+/* dL/d(view) of the corrected camera -> dL/d(t', w). */
+static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[9], const ssdgs_real dview[12], double d[6]) {
+    double e[9], jacobian[9], de[9], m[9], delta[3];
+    int i, j, l;
+    ssdgs__rotate_by(value + 3, e, jacobian);
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            de[3 * i + j] = 0;
+            for (l = 0; l < 4; l++) de[3 * i + j] += (double)dview[4 * i + l] * (double)photo->camera.view[4 * j + l];
+        }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            m[3 * i + j] = 0;
+            for (l = 0; l < 3; l++) m[3 * i + j] += de[3 * i + l] * e[3 * j + l];
+        }
+    delta[0] = m[7] - m[5]; /* exp(w + dw) = exp(J dw) exp(w) */
+    delta[1] = m[2] - m[6];
+    delta[2] = m[3] - m[1];
+    for (i = 0; i < 3; i++) {
+        d[i] = (double)dview[4 * i + 3];
+        d[3 + i] = 0;
+        for (j = 0; j < 3; j++) d[3 + i] += jacobian[3 * j + i] * delta[j];
+    }
+}
+
+/* The loss of one photograph under `terms` and all gradients, left in the frame. */
+static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_camera *camera,
+                                          const ssdgs_light *light, const ssdgs_real background[3], int terms, ssdgs_real dssim,
+                                          ssdgs__loss_values *values) {
+    ssdgs_context *context = model->context;
+    const int srgb = model->settings.transfer == SSDGS_TRANSFER_SRGB;
+    const size_t pixels = (size_t)camera->width * (size_t)camera->height;
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_real *image, *slope, *target;
+    ssdgs_result result;
+    size_t i;
+    int c;
+    options.terms = terms;
+    for (c = 0; c < 3; c++) options.background[c] = srgb ? ssdgs_srgb_decode(background[c]) : background[c];
+    result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
+    if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
+    if (result) return result;
+    SSDGS__RESERVE(frame->memory->image, image, ssdgs_real, pixels * 6 + 64);
+    SSDGS__RESERVE(frame->memory->target, target, ssdgs_real, pixels * 3);
+    slope = image + pixels * 3 + 32;
+    ssdgs__photo_planes(photo, background, model->settings.transfer, target);
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < pixels; i++)
+            image[pixels * (size_t)c + i] = frame->pixels[pixels * (size_t)c + i] + frame->transmittance[i] * options.background[c];
+    if (srgb) context->k->srgb_encode(image, slope, image, pixels * 3);
+    result = ssdgs__loss(context, &frame->memory->loss, image, target, camera->width, camera->height, dssim, frame->pixel_gradient, values);
+    if (result) return result;
+    if (srgb)
+        for (i = 0; i < pixels * 3; i++) frame->pixel_gradient[i] *= slope[i];
+    return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
+}
+
+/* ---- Adam over the model ---- */
+
+#define SSDGS__ADAM_CHUNK 8192
+
+typedef struct ssdgs__adam_range {
+    ssdgs_real *parameter, *mean, *square;
+    const ssdgs_real *gradient;
+    size_t n;
+    ssdgs_real rate, correct_mean, correct_square;
+    int group;
+    size_t first_chunk;
+    size_t bad; /* first non-finite gradient + 1, per range */
+} ssdgs__adam_range;
+
+typedef struct ssdgs__adam_job {
+    const ssdgs__kernels *k;
+    ssdgs__adam_range range[SSDGS_CHANNELS + SSDGS__GLOBAL_GROUPS];
+    int ranges;
+    size_t chunks;
+} ssdgs__adam_job;
+
+static void ssdgs__finite_task(void *data, int index) {
+    ssdgs__adam_range *r = ((ssdgs__adam_job *)data)->range + index;
+    size_t i;
+    int bad = 0;
+    for (i = 0; i < r->n; i++) bad |= !ssdgs__finite(r->gradient[i]);
+    for (i = 0; bad && i < r->n && !r->bad; i++)
+        if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
+}
+
+static void ssdgs__adam_task(void *data, int index) {
+    const ssdgs__adam_job *job = (const ssdgs__adam_job *)data;
+    const ssdgs__adam_range *r = job->range;
+    size_t begin, n;
+    while (r + 1 < job->range + job->ranges && r[1].first_chunk <= (size_t)index) r++;
+    begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
+    n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
+    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate, r->correct_mean, r->correct_square);
+}
+
+static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - beta^steps), the power by squaring */
+    double power = 1, square = beta;
+    int n;
+    for (n = steps; n; n >>= 1, square *= square)
+        if (n & 1) power *= square;
+    return (ssdgs_real)(1 / (1 - power));
+}
+
+static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, ssdgs_real *parameter, const ssdgs_real *gradient,
+                            ssdgs_real *mean, ssdgs_real *square, size_t n) {
+    ssdgs__adam_range *r = job->range + job->ranges++;
+    r->parameter = parameter;
+    r->gradient = gradient;
+    r->mean = mean;
+    r->square = square;
+    r->n = n;
+    r->group = group;
+    r->bad = 0;
+    r->rate = (ssdgs_real)ssdgs__group_rate(trainer, group, t);
+    r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
+    r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
+    r->first_chunk = job->chunks;
+    job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
+}
+
+/* Which terms a group serves: it rests while none of them is in use. */
+static int ssdgs__group_used(int group, int terms) {
+    switch (group) {
+        case SSDGS__G_DIFFUSE: return terms & SSDGS_DIFFUSE_TERM;
+        case SSDGS__G_SPECULAR: case SSDGS__G_ASG_WEIGHT: return terms & SSDGS_SPECULAR_TERM;
+        case SSDGS__G_SCATTERING: return terms & SSDGS_SCATTERING_TERM;
+        case SSDGS__G_MATERIAL: return terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM);
+        case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return terms & SSDGS_SHADOW_TERM;
+        case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return terms & SSDGS_SCATTERING_TERM;
+        default: return group < SSDGS__PLANE_GROUPS || terms & SSDGS_SPECULAR_TERM;
+    }
+}
+
+static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double t, int terms, const int learns[SSDGS__GROUPS]) {
+    ssdgs_context *context = trainer->context;
+    ssdgs_model *model = trainer->model;
+    ssdgs__adam_job job;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    int group, c, i;
+    ssdgs__global_groups(&model->settings, first);
+    job.k = context->k;
+    job.ranges = 0;
+    job.chunks = 0;
+    for (group = 0; group < SSDGS__GROUPS; group++) {
+        const int shared = group - SSDGS__PLANE_GROUPS;
+        if (!learns[group] || !ssdgs__group_used(group, terms)) continue;
+        if (shared >= 0) {
+            const size_t at = first[shared], n = first[shared + 1] - at;
+            if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at, trainer->global_mean + at,
+                                   trainer->global_square + at, n);
+        } else {
+            for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
+                const size_t at = (size_t)c * trainer->stride;
+                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at, trainer->mean + at, trainer->square + at,
+                                (size_t)model->count);
+            }
+        }
+    }
+    ssdgs__parallel(context, job.ranges, ssdgs__finite_task, &job);
+    for (i = 0; i < job.ranges; i++)
+        if (job.range[i].bad)
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of %s, element %z, is not finite", trainer->iteration,
+                               ssdgs__group_names[job.range[i].group], job.range[i].bad - 1);
+    ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
+    for (group = 0; group < SSDGS__GROUPS; group++) trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms);
+    return SSDGS_OK;
+}
+
+/* Adam on a photograph's corrections first .. last. */
+static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int first, int last, double rate) {
+    int i;
+    for (i = first; i < last; i++) {
+        const double g = gradient[i];
+        c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
+        c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
+        c->value[i] -= rate * c->mean[i] * (double)ssdgs__bias_correction(0.9, c->steps) /
+                       (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, c->steps)) + 1e-15);
+    }
+}
+
+/* ==== >>density  clone, split, prune: the number of Gaussians ==== */
+
+/* Arrays that hold one value (or plane) per Gaussian and are permuted together. */
+static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
+    ssdgs_context *context = trainer->context;
+    ssdgs_model *model = trainer->model;
+    const size_t n = (size_t)model->count;
+    size_t stride;
+    ssdgs_result result;
+    if (count > model->capacity) count += count / 4;
+    result = ssdgs__planes_grow(context, &model->gaussians, &model->capacity, n, count);
+    stride = trainer->stride;
+    if (!result) result = ssdgs__planes_grow(context, &trainer->mean, &stride, trainer->mean ? n : 0, model->capacity);
+    if (!result) {
+        stride = trainer->stride;
+        result = ssdgs__planes_grow(context, &trainer->square, &stride, trainer->square ? n : 0, model->capacity);
+    }
+    if (!result && trainer->statistics_room < model->capacity) { /* only grown when empty: after density control */
+        ssdgs_real *statistics = (ssdgs_real *)ssdgs__allocate(context, 3 * model->capacity * sizeof(ssdgs_real));
+        if (!statistics) return SSDGS_ERR_MEMORY;
+        ssdgs__release(context, trainer->screen_gradient);
+        trainer->screen_gradient = statistics;
+        trainer->screen_count = statistics + model->capacity;
+        trainer->contribution = statistics + 2 * model->capacity;
+        trainer->statistics_room = model->capacity;
+    }
+    if (!result) trainer->stride = model->capacity;
+    return result;
+}
+
+static void ssdgs__copy_gaussian(ssdgs_real *planes, size_t stride, size_t to, size_t from) {
+    int c;
+    for (c = 0; c < SSDGS_CHANNELS; c++) planes[(size_t)c * stride + to] = planes[(size_t)c * stride + from];
+}
+
+typedef struct ssdgs__ranked { ssdgs_real value; uint32_t index; } ssdgs__ranked;
+
+static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest first, then by index */
+    const ssdgs__ranked *x = (const ssdgs__ranked *)a, *y = (const ssdgs__ranked *)b;
+    if (x->value != y->value) return x->value > y->value ? -1 : 1;
+    return x->index < y->index ? -1 : x->index > y->index;
+}
+
+static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer, int grow) {
+    ssdgs_context *context = trainer->context;
+    ssdgs_model *model = trainer->model;
+    const ssdgs_train_options *o = &trainer->options;
+    const size_t n = (size_t)model->count;
+    const double split_size = (double)o->densify_size * trainer->extent, largest_size = 0.1 * trainer->extent;
+    const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
+    ssdgs__ranked *candidates;
+    unsigned char *drop;
+    size_t i, kept = 0, dropped = 0, wanted = 0, added, room;
+    ssdgs_real *p;
+    ssdgs_result result;
+    int c;
+    candidates = (ssdgs__ranked *)ssdgs__allocate(context, n * (2 * sizeof *candidates + 1) + 1);
+    if (!candidates) return SSDGS_ERR_MEMORY;
+    drop = (unsigned char *)(candidates + 2 * n);
+    p = model->gaussians;
+    for (i = 0; i < n; i++) {
+        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
+        for (c = 1; c < 3; c++) {
+            const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
+            size = s > size ? s : size;
+        }
+        drop[i] = p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size);
+        dropped += drop[i];
+        if (drop[i] || !grow || !(trainer->screen_count[i] > 0)) continue;
+        if (trainer->screen_gradient[i] / trainer->screen_count[i] < o->densify_gradient) continue;
+        candidates[wanted].value = trainer->screen_gradient[i] / trainer->screen_count[i];
+        candidates[wanted++].index = (uint32_t)i;
+    }
+    if (dropped == n) { /* never extinct */
+        drop[0] = 0;
+        dropped--;
+    }
+    qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
+    room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
+    if (wanted > room) { /* over the cap the least contributing make room, a twentieth at a time */
+        ssdgs__ranked *least = candidates + n;
+        size_t spare = wanted - room < n / 20 ? wanted - room : n / 20, m = 0;
+        for (i = 0; i < n; i++)
+            if (!drop[i]) {
+                least[m].value = -trainer->contribution[i];
+                least[m++].index = (uint32_t)i;
+            }
+        qsort(least, m, sizeof *least, ssdgs__ranked_compare);
+        for (i = 0; i < spare && i + 1 < m; i++, room++, dropped++) drop[least[i].index] = 1;
+    }
+    wanted = wanted < room ? wanted : room;
+    result = ssdgs__trainer_grow(trainer, n + wanted);
+    if (result) {
+        ssdgs__release(context, candidates);
+        return result;
+    }
+    p = model->gaussians;
+    for (i = 0, added = 0; i < wanted; i++) {
+        const size_t from = candidates[i].index, to = n + added;
+        const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
+        ssdgs_real q[4], raw[4], r[9];
+        double size = -1e30;
+        int half, j;
+        if (drop[from]) continue;
+        added++;
+        ssdgs__copy_gaussian(p, trainer->stride, to, from);
+        for (c = 0; c < 3; c++) size = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] > size ? (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] : size;
+        if (size <= log(split_size)) continue; /* small: the copy is the clone */
+        for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * trainer->stride + from];
+        ssdgs__rotation_scalar(raw, q, r);
+        for (half = 0; half < 2; half++) { /* large: two samples of it, smaller */
+            const size_t at = half ? to : from;
+            double offset[3];
+            for (c = 0; c < 3; c++) {
+                ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * trainer->stride;
+                offset[c] = ssdgs__normal(key, (uint64_t)(3 * half + c)) * (double)ssdgs__exp_scalar(scale[half ? to : from]);
+                scale[at] -= (ssdgs_real)0.47000362924573558; /* ln 1.6 */
+            }
+            for (c = 0; c < 3; c++)
+                for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * trainer->stride + at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
+            if (half == 0)
+                for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + from] = trainer->square[(size_t)c * trainer->stride + from] = 0;
+        }
+    }
+    for (i = n; i < n + added; i++)
+        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] = trainer->square[(size_t)c * trainer->stride + i] = 0;
+    for (i = 0; i < n + added; i++) {
+        if (i < n && drop[i]) continue;
+        if (kept != i) {
+            ssdgs__copy_gaussian(model->gaussians, trainer->stride, kept, i);
+            ssdgs__copy_gaussian(trainer->mean, trainer->stride, kept, i);
+            ssdgs__copy_gaussian(trainer->square, trainer->stride, kept, i);
+        }
+        kept++;
+    }
+    model->count = (int)kept;
+    memset(trainer->screen_gradient, 0, 3 * trainer->statistics_room * sizeof(ssdgs_real));
+    ssdgs__release(context, candidates);
+    return SSDGS_OK;
+}
+
+static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
+    const ssdgs_real most = (ssdgs_real)-4.5951198501345898; /* logit 0.01 */
+    ssdgs_real *opacity = trainer->model->gaussians + (size_t)SSDGS_OPACITY * trainer->stride;
+    int i;
+    for (i = 0; i < trainer->model->count; i++) {
+        opacity[i] = opacity[i] < most ? opacity[i] : most;
+        trainer->mean[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = trainer->square[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = 0;
+    }
+}
+
+static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame) {
+    const ssdgs_real half_w = (ssdgs_real)frame->camera.width / 2, half_h = (ssdgs_real)frame->camera.height / 2;
+    int i;
+    for (i = 0; i < frame->shaded_count; i++) {
+        const size_t g = frame->shaded[i];
+        const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
+        trainer->screen_gradient[g] += SSDGS__SQRT(x * x + y * y);
+        trainer->screen_count[g] += 1;
+        trainer->contribution[g] += d[6];
+    }
+}
+
+/* ==== >>steps  the trainer's public functions ==== */
+
+static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
+    const ssdgs_rate *rates = &o->position;
+    int i;
+    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "train options: not made by ssdgs_train_options_default()");
+    if (o->iterations < 1 || o->iterations > 100000000) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: %d iterations", o->iterations);
+    if (o->max_gaussians < 1 || o->max_gaussians > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: max_gaussians = %d", o->max_gaussians);
+    if (o->densify_every < 1 || o->opacity_reset_every < 0 || o->schedule < 0 || o->schedule > SSDGS_SCHEDULE_MERGED)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
+    if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity or densify_size is out of range");
+    for (i = 0; i < 10; i++)
+        if (!(rates[i].start >= 0) || !(rates[i].end >= 0) || !ssdgs__finite(rates[i].start))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: a learning rate is negative or not finite");
+    for (i = 0; i < 3; i++)
+        if (!ssdgs__finite(o->bounds_min[i]) || !ssdgs__finite(o->bounds_max[i]) || !(o->bounds_min[i] < o->bounds_max[i]) || !ssdgs__finite(o->background[i]))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds or background");
+    return SSDGS_OK;
+}
+
+/* Random points in the bounds; their size is the mean distance to the three nearest that such points have. */
+static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
+    ssdgs_model *model = trainer->model;
+    const ssdgs_train_options *o = &trainer->options;
+    const int n = o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians;
+    double volume = 1;
+    ssdgs_result result;
+    int i, c;
+    if (n < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points", n);
+    result = ssdgs__trainer_grow(trainer, (size_t)n);
+    if (result) return result;
+    for (c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
+    for (i = 0; i < n; i++) {
+        ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
+        for (c = 0; c < 3; c++) {
+            const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)), size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)((double)o->bounds_min[c] + u * size);
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(1.1576 * 0.62035 * pow(volume / n, 1.0 / 3));
+        }
+    }
+    model->count = n;
+    return SSDGS_OK;
+}
+
+SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
+    ssdgs_context *context;
+    if (!trainer) return;
+    context = trainer->context;
+    ssdgs__release(context, trainer->photos);
+    ssdgs__release(context, trainer->corrections);
+    ssdgs__release(context, trainer->order);
+    ssdgs__release(context, trainer->mean);
+    ssdgs__release(context, trainer->square);
+    ssdgs__release(context, trainer->global_mean);
+    ssdgs__release(context, trainer->global_square);
+    ssdgs__release(context, trainer->screen_gradient);
+    ssdgs__release(context, trainer);
+}
+
+static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
+    int j, l;
+    for (j = 0; j < 3; j++) {
+        centre[j] = 0;
+        for (l = 0; l < 3; l++) centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
+    }
+}
+
+static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
+    ssdgs_context *context = trainer->context;
+    ssdgs_model *model = trainer->model;
+    const ssdgs_train_options *o = &trainer->options;
+    double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0, longest = 0;
+    ssdgs_result result = ssdgs__options_check(context, o);
+    const int fresh = model->count == 0;
+    int i, j;
+    if (result) return result;
+    if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a baked model cannot be trained: it has no reflectance");
+    if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d photographs", photo_count);
+    for (i = 0; i < photo_count; i++) {
+        result = ssdgs__camera_check(context, &photos[i].camera);
+        if (result) return result;
+        if (!photos[i].pixels) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "photograph %d has no pixels", i);
+    }
+    trainer->photos = (ssdgs_photo *)ssdgs__allocate(context, (size_t)photo_count * sizeof *photos);
+    trainer->corrections = (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
+    trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
+    trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
+    trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
+    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
+    memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
+    trainer->photo_count = photo_count;
+    for (i = 0; i < photo_count; i++) {
+        double centre[3];
+        ssdgs__camera_centre(&photos[i].camera, centre);
+        for (j = 0; j < 3; j++) mean[j] += centre[j] / photo_count;
+    }
+    for (i = 0; i < photo_count; i++) {
+        double centre[3], d2 = 0;
+        ssdgs__camera_centre(&photos[i].camera, centre);
+        for (j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
+        radius = sqrt(d2) > radius ? sqrt(d2) : radius;
+    }
+    for (j = 0; j < 3; j++) {
+        const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
+        longest = side > longest ? side : longest;
+    }
+    trainer->extent = 1.1 * (radius > longest ? radius : longest); /* one camera has no radius */
+    if (fresh) {
+        if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.length_unit = (ssdgs_real)(0.5 * longest);
+        for (i = 0; i < photo_count; i++) { /* I / d^2 at the object averages 1 */
+            double d2 = 0, intensity = 0;
+            for (j = 0; j < 3; j++) {
+                const double centre = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+                const double d = (double)photos[i].light.position[j] - centre;
+                d2 += d * d;
+                intensity += (double)photos[i].light.intensity[j] / 3;
+                if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.centre[j] = (ssdgs_real)centre;
+            }
+            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > 1e-12 ? d2 : 1e-12) / photo_count;
+        }
+        model->settings.light_scale = (ssdgs_real)(irradiance > 0 ? 1 / irradiance : 1);
+        ssdgs__globals_reset(model, o->seed);
+        return ssdgs__random_start(trainer);
+    }
+    return ssdgs__trainer_grow(trainer, (size_t)model->count);
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
+                                            const ssdgs_train_options *options, ssdgs_trainer **out) {
+    ssdgs_trainer *trainer;
+    ssdgs_result result;
+    if (!out) return SSDGS_ERR_ARGUMENT;
+    *out = NULL;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    trainer = (ssdgs_trainer *)ssdgs__allocate(model->context, sizeof *trainer);
+    if (!trainer) return SSDGS_ERR_MEMORY;
+    trainer->context = model->context;
+    trainer->model = model;
+    trainer->options = options ? *options : ssdgs_train_options_default();
+    result = ssdgs__trainer_setup(trainer, photos, photo_count);
+    if (result) {
+        ssdgs_trainer_destroy(trainer);
+        return result;
+    }
+    *out = trainer;
+    return SSDGS_OK;
+}
+
+/* The photograph of an iteration: every pass visits each once, in an order drawn for the pass. */
+static int ssdgs__next_photo(ssdgs_trainer *trainer) {
+    const int n = trainer->photo_count, at = trainer->iteration % n;
+    const uint64_t pass = (uint64_t)(trainer->iteration / n);
+    int i;
+    if (at == 0)
+        for (i = 0; i < n; i++) trainer->order[i] = (uint32_t)i;
+    if (at == 0)
+        for (i = n - 1; i > 0; i--) {
+            const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373), pass * (uint64_t)n + (uint64_t)i) * (i + 1));
+            const uint32_t swap = trainer->order[i];
+            trainer->order[i] = trainer->order[j];
+            trainer->order[j] = swap;
+        }
+    return (int)trainer->order[at];
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
+    const ssdgs_train_options *o;
+    ssdgs__loss_values values;
+    ssdgs_frame frame;
+    ssdgs_camera camera;
+    ssdgs_light light;
+    ssdgs_result result;
+    ssdgs__correction *correction;
+    double t, gradient[9], until;
+    int learns[SSDGS__GROUPS], terms, photo, j;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    o = &trainer->options;
+    t = ssdgs__schedule_time(o, trainer->iteration);
+    terms = ssdgs__phase(o, t, learns) & trainer->model->settings.terms;
+    photo = ssdgs__next_photo(trainer);
+    correction = trainer->corrections + photo;
+    ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
+    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, o->background, terms, o->dssim, &values);
+    if (!result) {
+        result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
+        if (result == SSDGS_ERR_NONFINITE) trainer->skipped++;
+        if (result && result != SSDGS_ERR_NONFINITE) return result;
+    } else return result;
+    if (!result) {
+        ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
+        for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+        correction->steps++;
+        if (o->refine_camera && t >= 5e3)
+            ssdgs__correction_step(correction, gradient, 0, 6, ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
+        if (o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT)
+            ssdgs__correction_step(correction, gradient, 6, 9, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
+    }
+    trainer->iteration++;
+    until = ssdgs__schedule_time(o, trainer->iteration);
+    if (!result && until <= o->densify_until) {
+        ssdgs_result grown = SSDGS_OK;
+        ssdgs__gather_statistics(trainer, &frame);
+        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) grown = ssdgs__densify(trainer, 1);
+        if (grown) return grown;
+        if (o->opacity_reset_every && trainer->iteration % o->opacity_reset_every == 0 &&
+            ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until) ssdgs__reset_opacity(trainer);
+    }
+    if (stats) {
+        stats->iteration = trainer->iteration;
+        stats->gaussians = trainer->model->count;
+        stats->shaded = frame.shaded_count;
+        stats->skipped_steps = trainer->skipped;
+        stats->loss = values.loss;
+        stats->psnr = ssdgs__psnr(values.mse);
+    }
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
+    ssdgs_train_stats stats;
+    int bad = 0;
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    while (trainer->iteration < trainer->options.iterations) {
+        const ssdgs_result result = ssdgs_trainer_step(trainer, &stats);
+        if (result && result != SSDGS_ERR_NONFINITE) return result;
+        bad = result ? bad + 1 : 0;
+        if (bad == 10) return result;
+        if (progress && !progress(user, &stats)) return ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d", trainer->iteration);
+    }
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light) {
+    if (!trainer || index < 0 || index >= trainer->photo_count || !camera || !light) return SSDGS_ERR_ARGUMENT;
+    ssdgs__correct(trainer->photos + index, trainer->corrections[index].value, camera, light);
+    return SSDGS_OK;
+}
+
+SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
+    int sizes[SSDGS_MAX_LAYERS + 1], layers;
+    size_t per_gaussian, first[SSDGS__GLOBAL_GROUPS + 1], activations = SSDGS_CHANNELS + SSDGS__ROWS + SSDGS__OUTS + 2;
+    layers = ssdgs__network_sizes(settings, 0, sizes);
+    activations += ssdgs__activation_rows(sizes, layers);
+    layers = ssdgs__network_sizes(settings, 1, sizes);
+    activations += ssdgs__activation_rows(sizes, layers);
+    ssdgs__global_groups(settings, first);
+    /* parameters, gradient and two moments with a quarter of slack, splat records of two views, instances, activations of half */
+    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 16 + 8 + activations / 2 + 3 * (SSDGS__SUMS + 4)) + 160;
+    return per_gaussian * (size_t)options->max_gaussians + first[SSDGS__GLOBAL_GROUPS] * sizeof(ssdgs_real) * (4 + SSDGS__SLOTS) +
+           (size_t)width * (size_t)height * 36 * sizeof(ssdgs_real);
+}
+
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
+                                      ssdgs_real *image, ssdgs_metrics *metrics) {
+    ssdgs_context *context;
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_image out;
+    ssdgs_real *rendered, *target, *planes;
+    ssdgs_result result;
+    size_t pixels, i;
+    int c;
+    if (!model || !photo || !background || !metrics) return SSDGS_ERR_ARGUMENT;
+    memset(metrics, 0, sizeof *metrics);
+    context = model->context;
+    result = ssdgs__camera_check(context, &photo->camera);
+    if (result) return result;
+    pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    rendered = (ssdgs_real *)ssdgs__allocate(context, pixels * 9 * sizeof *rendered);
+    if (!rendered) return SSDGS_ERR_MEMORY;
+    target = rendered + 3 * pixels;
+    planes = rendered + 6 * pixels;
+    memset(&out, 0, sizeof out);
+    out.color = rendered;
+    for (c = 0; c < 3; c++) options.background[c] = model->settings.transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c]) : background[c];
+    result = ssdgs_render_ex(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
+    if (!result) {
+        ssdgs__photo_planes(photo, background, model->settings.transfer, planes);
+        for (i = 0; i < pixels; i++)
+            for (c = 0; c < 3; c++) {
+                ssdgs_real *x = rendered + 3 * i + c;
+                target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
+                if (model->settings.transfer == SSDGS_TRANSFER_SRGB) *x = ssdgs_srgb_encode(*x > 0 ? *x : 0);
+            }
+        if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);
+        result = ssdgs_compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
+    }
+    ssdgs__release(context, rendered);
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
+    ssdgs__correction correction;
+    ssdgs__loss_values values;
+    ssdgs_camera camera;
+    ssdgs_light light;
+    ssdgs_frame frame;
+    ssdgs_result result;
+    int i, j;
+    if (!model || !photo || !background || iterations < 0) return SSDGS_ERR_ARGUMENT;
+    memset(&correction, 0, sizeof correction);
+    for (i = 0; i < iterations; i++) {
+        double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
+        ssdgs__correct(photo, correction.value, &camera, &light);
+        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, (ssdgs_real)0.2, &values);
+        if (result) return result;
+        ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
+        for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+        for (j = 0; j < 9; j++)
+            if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "refinement: a gradient is not finite");
+        correction.steps++;
+        ssdgs__correction_step(&correction, gradient, 0, light.kind == SSDGS_LIGHT_POINT ? 9 : 6, rate);
+    }
+    ssdgs__correct(photo, correction.value, &camera, &light);
+    photo->camera = camera;
+    photo->light = light;
+    return SSDGS_OK;
+}
+
+#ifndef SSDGS_NO_STDIO
+/* ==== >>checkpoint  a run's whole state; native byte order, refused elsewhere ==== */
+
+static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
+    const unsigned char *bytes = (const unsigned char *)data;
+    size_t i;
+    for (i = 0; i < size; i++) hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3);
+    return hash;
+}
+
+typedef struct ssdgs__checkpoint_head {
+    char magic[8];
+    uint32_t byte_order, version, real_size, isa;
+    uint64_t inputs;     /* hash of options, settings' shape and photographs' cameras: what must be the same */
+    uint64_t global_count;
+    int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
+    ssdgs_settings settings;
+} ssdgs__checkpoint_head;
+
+/* Passes every array of the state to visit, in order; the first failure ends it. */
+typedef ssdgs_result (*ssdgs__visit)(void *user, void *data, size_t size);
+
+static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs__visit visit, void *user) {
+    ssdgs_model *model = trainer->model;
+    const size_t n = (size_t)model->count * sizeof(ssdgs_real), globals = model->global_count * sizeof(ssdgs_real);
+    ssdgs_real *planes[3], *statistics[3], *shared[3];
+    ssdgs_result result = SSDGS_OK;
+    int i, c;
+    planes[0] = model->gaussians;
+    planes[1] = trainer->mean;
+    planes[2] = trainer->square;
+    statistics[0] = trainer->screen_gradient;
+    statistics[1] = trainer->screen_count;
+    statistics[2] = trainer->contribution;
+    shared[0] = model->globals;
+    shared[1] = trainer->global_mean;
+    shared[2] = trainer->global_square;
+    for (i = 0; i < 3 && !result; i++) {
+        for (c = 0; c < SSDGS_CHANNELS && !result; c++) result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
+        if (!result) result = visit(user, statistics[i], n);
+        if (!result) result = visit(user, shared[i], globals);
+    }
+    if (!result) result = visit(user, trainer->order, (size_t)trainer->photo_count * sizeof *trainer->order);
+    if (!result) result = visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
+    return result;
+}
+
+static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
+    const ssdgs_settings *s = &trainer->model->settings;
+    int i;
+    memset(head, 0, sizeof *head);
+    memcpy(head->magic, "SSDGSCKP", 8);
+    head->byte_order = 0x01020304u;
+    head->version = SSDGS_VERSION;
+    head->real_size = (uint32_t)sizeof(ssdgs_real);
+    head->isa = (uint32_t)trainer->context->isa;
+    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options, sizeof trainer->options);
+    head->inputs = ssdgs__fold(head->inputs, &s->terms, (size_t)((const char *)&s->light_bias - (const char *)&s->terms));
+    for (i = 0; i < trainer->photo_count; i++) {
+        head->inputs = ssdgs__fold(head->inputs, trainer->photos[i].camera.view, sizeof trainer->photos[i].camera.view);
+        head->inputs = ssdgs__fold(head->inputs, trainer->photos[i].light.position, sizeof trainer->photos[i].light.position);
+    }
+    head->global_count = trainer->model->global_count;
+    head->photo_count = trainer->photo_count;
+    head->count = trainer->model->count;
+    head->iteration = trainer->iteration;
+    head->skipped = trainer->skipped;
+    for (i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
+    head->settings = *s;
+}
+
+typedef struct ssdgs__checkpoint_io { ssdgs__writer *writer; const unsigned char *bytes; uint64_t hash; } ssdgs__checkpoint_io;
+
+static ssdgs_result ssdgs__checkpoint_write(void *user, void *data, size_t size) {
+    ssdgs__checkpoint_io *io = (ssdgs__checkpoint_io *)user;
+    io->hash = ssdgs__fold(io->hash, data, size);
+    return ssdgs__writer_put(io->writer, data, size);
+}
+
+static ssdgs_result ssdgs__checkpoint_read(void *user, void *data, size_t size) {
+    ssdgs__checkpoint_io *io = (ssdgs__checkpoint_io *)user;
+    memcpy(data, io->bytes, size);
+    io->bytes += size;
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
+    ssdgs__checkpoint_head head;
+    ssdgs__checkpoint_io io;
+    ssdgs__writer writer;
+    ssdgs_result result;
+    if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__writer_open(&writer, trainer->context, path);
+    if (result) return result;
+    ssdgs__checkpoint_describe(trainer, &head);
+    io.writer = &writer;
+    io.hash = UINT64_C(0xCBF29CE484222325);
+    ssdgs__checkpoint_write(&io, &head, sizeof head);
+    ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
+    ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
+    return ssdgs__writer_close(&writer);
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
+    ssdgs_context *context;
+    ssdgs__checkpoint_head head, own;
+    ssdgs__checkpoint_io io;
+    ssdgs_result result;
+    unsigned char *bytes = NULL;
+    size_t size = 0, expected;
+    uint64_t hash;
+    const char *reason = NULL;
+    int i;
+    if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
+    context = trainer->context;
+    result = ssdgs__read_file(context, path, &bytes, &size);
+    if (result) return result;
+    ssdgs__checkpoint_describe(trainer, &own);
+    if (size >= sizeof head + 8) memcpy(&head, bytes, sizeof head);
+    if (size < sizeof head + 8 || memcmp(head.magic, own.magic, 8)) reason = "it is not a checkpoint";
+    else if (head.byte_order != own.byte_order || head.real_size != own.real_size || head.version != own.version) reason = "it was written by another version or machine";
+    else if (head.global_count != own.global_count || head.photo_count != own.photo_count || head.inputs != own.inputs) reason = "it belongs to other options, settings or photographs";
+    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS || head.iteration < 0) reason = "its counts are out of range";
+    if (!reason) {
+        expected = sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
+                   3 * sizeof(ssdgs_real) * ((size_t)head.count * (SSDGS_CHANNELS + 1) + (size_t)head.global_count);
+        memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
+        if (size != expected) reason = "it is cut short or too long";
+        else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";
+    }
+    if (reason) {
+        ssdgs__release(context, bytes);
+        return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
+    }
+    result = ssdgs__settings_check(context, &head.settings);
+    if (!result) result = ssdgs__trainer_grow(trainer, (size_t)head.count);
+    if (!result) {
+        if (head.isa != own.isa && context->logger.write)
+            context->logger.write(context->logger.user, SSDGS_OK, "the checkpoint was written with another instruction set: the run goes on, not bit for bit");
+        trainer->model->settings = head.settings;
+        trainer->model->count = head.count;
+        trainer->iteration = head.iteration;
+        trainer->skipped = head.skipped;
+        for (i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
+        io.bytes = bytes + sizeof head;
+        result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
+    }
+    ssdgs__release(context, bytes);
+    return result;
+}
+#endif /* SSDGS_NO_STDIO */
+#endif /* SSDGS_NO_TRAINER */
+
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__TINYC__)
+#pragma GCC pop_options
+#endif
+#endif /* SSDGS_IMPLEMENTATION */
+#else /* SSDGS__ISA: the kernels, included once per instruction set */
+
+/* ==== >>kernels  one body for every instruction set ====
+   V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm (except in the double
+   build) and fuse only through VFMA, so a forward and its backward round alike. */
+
+#if SSDGS__ISA == SSDGS__ISA_SCALAR
+#define SSDGS__NAME(name) ssdgs__##name##_scalar
+#define SSDGS__TARGET
+#define R ssdgs_real
+#define V ssdgs_real
+#define VM int
+#define SSDGS__VW 1
+#define VLOAD(p) (*(p))
+#define VSTORE(p, v) (*(p) = (v))
+#define VSET(c) ((R)(c))
+#define VADD(a, b) ((a) + (b))
+#define VSUB(a, b) ((a) - (b))
+#define VMUL(a, b) ((a) * (b))
+#define VDIV(a, b) ((a) / (b))
+#define VFMA(a, b, c) ((a) * (b) + (c))
+#define VFNMA(a, b, c) ((c) - (a) * (b))
+#define VMIN(a, b) ((a) < (b) ? (a) : (b))
+#define VMAX(a, b) ((a) > (b) ? (a) : (b))
+#define VSQRT(a) SSDGS__SQRT(a)
+#define VLT(a, b) ((a) < (b))
+#define VGE(a, b) ((a) >= (b))
+#define VAND(m, n) ((m) & (n))
+#define VANY(m) (m)
+#define VSEL(m, a, b) ((m) ? (a) : (b))
+#define VROUND(a) ssdgs__round(a)
+#define VPOW2(n) ssdgs__pow2(n)
+#define VEXPONENT(x) ssdgs__exponent(x)
+
+#elif SSDGS__ISA == SSDGS__ISA_SSE2
+#define SSDGS__NAME(name) ssdgs__##name##_sse2
+#define SSDGS__TARGET SSDGS__ATTRIBUTE("sse2")
+#define R float
+#define V __m128
+#define VM __m128
+#define SSDGS__VW 4
+#define VLOAD(p) _mm_loadu_ps(p)
+#define VSTORE(p, v) _mm_storeu_ps(p, v)
+#define VSET(c) _mm_set1_ps((float)(c))
+#define VADD(a, b) _mm_add_ps(a, b)
+#define VSUB(a, b) _mm_sub_ps(a, b)
+#define VMUL(a, b) _mm_mul_ps(a, b)
+#define VDIV(a, b) _mm_div_ps(a, b)
+#define VFMA(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
+#define VFNMA(a, b, c) _mm_sub_ps(c, _mm_mul_ps(a, b))
+#define VMIN(a, b) _mm_min_ps(a, b)
+#define VMAX(a, b) _mm_max_ps(a, b)
+#define VSQRT(a) _mm_sqrt_ps(a)
+#define VLT(a, b) _mm_cmplt_ps(a, b)
+#define VGE(a, b) _mm_cmpge_ps(a, b)
+#define VAND(m, n) _mm_and_ps(m, n)
+#define VANY(m) _mm_movemask_ps(m)
+#define VSEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
+#define VROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
+#define VPOW2(n) _mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(_mm_cvtps_epi32(n), _mm_set1_epi32(127)), 23))
+#define VEXPONENT(x) _mm_cvtepi32_ps(_mm_sub_epi32(_mm_srli_epi32(_mm_castps_si128(x), 23), _mm_set1_epi32(127)))
+
+#elif SSDGS__ISA == SSDGS__ISA_AVX2
+#define SSDGS__NAME(name) ssdgs__##name##_avx2
+#define SSDGS__TARGET SSDGS__ATTRIBUTE("avx2,fma")
+#define R float
+#define V __m256
+#define VM __m256
+#define SSDGS__VW 8
+#define VLOAD(p) _mm256_loadu_ps(p)
+#define VSTORE(p, v) _mm256_storeu_ps(p, v)
+#define VSET(c) _mm256_set1_ps((float)(c))
+#define VADD(a, b) _mm256_add_ps(a, b)
+#define VSUB(a, b) _mm256_sub_ps(a, b)
+#define VMUL(a, b) _mm256_mul_ps(a, b)
+#define VDIV(a, b) _mm256_div_ps(a, b)
+#define VFMA(a, b, c) _mm256_fmadd_ps(a, b, c)
+#define VFNMA(a, b, c) _mm256_fnmadd_ps(a, b, c)
+#define VMIN(a, b) _mm256_min_ps(a, b)
+#define VMAX(a, b) _mm256_max_ps(a, b)
+#define VSQRT(a) _mm256_sqrt_ps(a)
+#define VLT(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
+#define VGE(a, b) _mm256_cmp_ps(a, b, _CMP_GE_OQ)
+#define VAND(m, n) _mm256_and_ps(m, n)
+#define VANY(m) _mm256_movemask_ps(m)
+#define VSEL(m, a, b) _mm256_blendv_ps(b, a, m)
+#define VROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
+#define VPOW2(n) _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(n), _mm256_set1_epi32(127)), 23))
+#define VEXPONENT(x) _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(x), 23), _mm256_set1_epi32(127)))
+
+#elif SSDGS__ISA == SSDGS__ISA_AVX512
+#define SSDGS__NAME(name) ssdgs__##name##_avx512
+#define SSDGS__TARGET SSDGS__ATTRIBUTE("avx512f")
+#define R float
+#define V __m512
+#define VM __mmask16
+#define SSDGS__VW 16
+#define VLOAD(p) _mm512_loadu_ps(p)
+#define VSTORE(p, v) _mm512_storeu_ps(p, v)
+#define VSET(c) _mm512_set1_ps((float)(c))
+#define VADD(a, b) _mm512_add_ps(a, b)
+#define VSUB(a, b) _mm512_sub_ps(a, b)
+#define VMUL(a, b) _mm512_mul_ps(a, b)
+#define VDIV(a, b) _mm512_div_ps(a, b)
+#define VFMA(a, b, c) _mm512_fmadd_ps(a, b, c)
+#define VFNMA(a, b, c) _mm512_fnmadd_ps(a, b, c)
+#define VMIN(a, b) _mm512_min_ps(a, b)
+#define VMAX(a, b) _mm512_max_ps(a, b)
+#define VSQRT(a) _mm512_sqrt_ps(a)
+#define VLT(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
+#define VGE(a, b) _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ)
+#define VAND(m, n) ((__mmask16)((m) & (n)))
+#define VANY(m) ((int)(m))
+#define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
+#define VROUND(a) _mm512_roundscale_ps(a, 0)
+#define VPOW2(n) _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_add_epi32(_mm512_cvtps_epi32(n), _mm512_set1_epi32(127)), 23))
+#define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
+
+#elif SSDGS__ISA == SSDGS__ISA_NEON
+#define SSDGS__NAME(name) ssdgs__##name##_neon
+#define SSDGS__TARGET
+#define R float
+#define V float32x4_t
+#define VM uint32x4_t
+#define SSDGS__VW 4
+#define VLOAD(p) vld1q_f32(p)
+#define VSTORE(p, v) vst1q_f32(p, v)
+#define VSET(c) vdupq_n_f32((float)(c))
+#define VADD(a, b) vaddq_f32(a, b)
+#define VSUB(a, b) vsubq_f32(a, b)
+#define VMUL(a, b) vmulq_f32(a, b)
+#define VDIV(a, b) vdivq_f32(a, b)
+#define VFMA(a, b, c) vfmaq_f32(c, a, b)
+#define VFNMA(a, b, c) vfmsq_f32(c, a, b)
+#define VMIN(a, b) vbslq_f32(vcltq_f32(a, b), a, b)
+#define VMAX(a, b) vbslq_f32(vcgtq_f32(a, b), a, b)
+#define VSQRT(a) vsqrtq_f32(a)
+#define VLT(a, b) vcltq_f32(a, b)
+#define VGE(a, b) vcgeq_f32(a, b)
+#define VAND(m, n) vandq_u32(m, n)
+#define VANY(m) (vmaxvq_u32(m) != 0)
+#define VSEL(m, a, b) vbslq_f32(m, a, b)
+#define VROUND(a) vrndnq_f32(a)
+#define VPOW2(n) vreinterpretq_f32_s32(vshlq_n_s32(vaddq_s32(vcvtnq_s32_f32(n), vdupq_n_s32(127)), 23))
+#define VEXPONENT(x) vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
+#endif
+
+#define SSDGS__FN static SSDGS__TARGET
+#define SSDGS__FI static SSDGS__INLINE SSDGS__TARGET
+#define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
+#define F(name) SSDGS__NAME(name)
+#define VNEG(a) VSUB(VSET(0), a)
+#define VABS(a) VMAX(a, VNEG(a))
+#define VDOT3(ax, ay, az, bx, by, bz) VFMA(az, bz, VFMA(ay, by, VMUL(ax, bx)))
+
+/* Sum of the lanes, in a fixed tree. */
+SSDGS__FI R F(sum)(V v) {
+#if SSDGS__VW == 1
+    return v;
+#else
+    R lane[SSDGS__VW];
+    int n, i;
+    VSTORE(lane, v);
+    for (n = SSDGS__VW / 2; n > 0; n /= 2)
+        for (i = 0; i < n; i++) lane[i] += lane[i + n];
+    return lane[0];
+#endif
+}
+
+/* out[0..3] += the lane sums of a, b, c, d. */
+SSDGS__FI void F(sum4)(R *out, V a, V b, V c, V d) {
+#if SSDGS__ISA == SSDGS__ISA_AVX512
+    __m512 ab = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+    __m512 cd = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+    __m512 abcd = _mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE));
+    __m512 half = _mm512_add_ps(abcd, _mm512_shuffle_f32x4(abcd, abcd, 0x4E));
+    __m128 sum = _mm_add_ps(_mm512_castps512_ps128(half), _mm512_extractf32x4_ps(half, 1));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+#elif SSDGS__ISA == SSDGS__ISA_AVX2
+    __m256 ab = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+    __m256 cd = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+    __m256 abcd = _mm256_add_ps(_mm256_shuffle_ps(ab, cd, 0x44), _mm256_shuffle_ps(ab, cd, 0xEE));
+    __m128 sum = _mm_add_ps(_mm256_castps256_ps128(abcd), _mm256_extractf128_ps(abcd, 1));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+#elif SSDGS__ISA == SSDGS__ISA_SSE2
+    __m128 ab = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
+    __m128 cd = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
+    __m128 sum = _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+#else
+    out[0] += F(sum)(a);
+    out[1] += F(sum)(b);
+    out[2] += F(sum)(c);
+    out[3] += F(sum)(d);
+#endif
+}
+
+/* ==== >>vmath  elementary functions on V ==== */
+
+#ifdef SSDGS_REAL64
+SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
+SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
+SSDGS__FI V F(log)(V x) { return log(x); }
+SSDGS__FI void F(sincos)(V x, V *s, V *c) { *s = sin(x); *c = cos(x); }
+SSDGS__FI V F(atan2_upper)(V y, V x) { return atan2(y, x); }
+SSDGS__FI V F(log1p)(V x) { return log1p(x); }
+#else
+/* 2^x for |x| <= 126, 1 ulp: degree 6 on [-1/2, 1/2]. */
+SSDGS__FI V F(exp2)(V x) {
+    V whole, f, p;
+    x = VMAX(VSET(-126), VMIN(VSET(126), x));
+    whole = VROUND(x);
+    f = VSUB(x, whole);
+    p = VFMA(f, VSET(1.54614449e-4), VSET(1.3400428e-3));
+    p = VFMA(p, f, VSET(9.61805694e-3));
+    p = VFMA(p, f, VSET(5.55032715e-2));
+    p = VFMA(p, f, VSET(2.40226507e-1));
+    p = VFMA(p, f, VSET(6.93147182e-1));
+    p = VFMA(p, f, VSET(1));
+    return VMUL(p, VPOW2(whole));
+}
+
+/* e^x, saturating beyond +-87; ln 2 in two parts keeps the error independent of |x|. */
+SSDGS__FI V F(exp)(V x) {
+    V whole, f, p;
+    x = VMAX(VSET(-87), VMIN(VSET(87), x));
+    whole = VROUND(VMUL(x, VSET(1.44269504088896341)));
+    f = VFNMA(whole, VSET(-2.12194440e-4), VFNMA(whole, VSET(0.693359375), x));
+    p = VFMA(f, VSET(1.9875691500e-4), VSET(1.3981999507e-3));
+    p = VFMA(p, f, VSET(8.3334519073e-3));
+    p = VFMA(p, f, VSET(4.1665795894e-2));
+    p = VFMA(p, f, VSET(1.6666665459e-1));
+    p = VFMA(p, f, VSET(5.0000001201e-1));
+    p = VADD(VFMA(p, VMUL(f, f), f), VSET(1));
+    return VMUL(p, VPOW2(whole));
+}
+
+/* ln x for normal x > 0: 2 atanh((m - 1) / (m + 1)) + e ln 2, m in [sqrt(1/2), sqrt 2). */
+SSDGS__FI V F(log)(V x) {
+    V e = VEXPONENT(x), m = VMUL(x, VPOW2(VNEG(e))), t, t2, p;
+    VM big = VLT(VSET(1.41421356), m);
+    m = VSEL(big, VMUL(m, VSET(0.5)), m);
+    e = VSEL(big, VADD(e, VSET(1)), e);
+    t = VDIV(VSUB(m, VSET(1)), VADD(m, VSET(1)));
+    t2 = VMUL(t, t);
+    p = VFMA(t2, VSET(2.0 / 9), VSET(2.0 / 7));
+    p = VFMA(p, t2, VSET(2.0 / 5));
+    p = VFMA(p, t2, VSET(2.0 / 3));
+    p = VFMA(VMUL(p, t2), t, VMUL(t, VSET(2)));
+    return VFMA(e, VSET(0.693359375), VFMA(e, VSET(-2.12194440e-4), p));
+}
+
+/* ln(1 + x) for 0 <= x <= 1, accurate near 0. */
+SSDGS__FI V F(log1p)(V x) {
+    V t = VDIV(x, VADD(x, VSET(2))), t2 = VMUL(t, t), p;
+    p = VFMA(t2, VSET(2.0 / 17), VSET(2.0 / 15));
+    p = VFMA(p, t2, VSET(2.0 / 13));
+    p = VFMA(p, t2, VSET(2.0 / 11));
+    p = VFMA(p, t2, VSET(2.0 / 9));
+    p = VFMA(p, t2, VSET(2.0 / 7));
+    p = VFMA(p, t2, VSET(2.0 / 5));
+    p = VFMA(p, t2, VSET(2.0 / 3));
+    return VFMA(VMUL(p, t2), t, VMUL(t, VSET(2)));
+}
+
+/* Good to |x| about 1e5: pi/2 in three parts. */
+SSDGS__FI void F(sincos)(V x, V *s, V *c) {
+    V n = VROUND(VMUL(x, VSET(0.636619772367581))), r, r2, ps, pc, q;
+    VM odd, negative_s, negative_c;
+    r = VFNMA(n, VSET(1.5703125), x);
+    r = VFNMA(n, VSET(4.83751296997070e-4), r);
+    r = VFNMA(n, VSET(7.54978995489188e-8), r);
+    r2 = VMUL(r, r);
+    ps = VFMA(r2, VSET(-1.9515295891e-4), VSET(8.3321608736e-3));
+    ps = VFMA(ps, r2, VSET(-1.6666654611e-1));
+    ps = VFMA(VMUL(ps, r2), r, r);
+    pc = VFMA(r2, VSET(2.443315711809948e-5), VSET(-1.388731625493765e-3));
+    pc = VFMA(pc, r2, VSET(4.166664568298827e-2));
+    pc = VFMA(VMUL(pc, r2), r2, VFNMA(r2, VSET(0.5), VSET(1)));
+    q = VFNMA(VROUND(VFMA(n, VSET(0.25), VSET(-0.375))), VSET(4), n); /* quadrant 0..3 */
+    odd = VLT(VABS(VSUB(VABS(VSUB(q, VSET(2))), VSET(1))), VSET(0.5));
+    negative_s = VGE(q, VSET(1.5));
+    negative_c = VLT(VABS(VSUB(q, VSET(1.5))), VSET(1));
+    *s = VSEL(odd, pc, ps);
+    *c = VSEL(odd, ps, pc);
+    *s = VSEL(negative_s, VNEG(*s), *s);
+    *c = VSEL(negative_c, VNEG(*c), *c);
+}
+
+/* atan2(y, x) for y >= 0. */
+SSDGS__FI V F(atan2_upper)(V y, V x) {
+    V ax = VABS(x), high = VMAX(VMAX(ax, y), VSET(1e-30)), t = VDIV(VMIN(ax, y), high), t2, p, base;
+    VM steep = VLT(VSET(0.41421356), t);
+    base = VSEL(steep, VSET(0.78539816339), VSET(0));
+    t = VSEL(steep, VDIV(VSUB(t, VSET(1)), VADD(t, VSET(1))), t);
+    t2 = VMUL(t, t);
+    p = VFMA(t2, VSET(8.05374449538e-2), VSET(-1.38776856032e-1));
+    p = VFMA(p, t2, VSET(1.99777106478e-1));
+    p = VFMA(p, t2, VSET(-3.33329491539e-1));
+    p = VADD(base, VFMA(VMUL(p, t2), t, t));
+    p = VSEL(VLT(ax, y), VSUB(VSET(1.57079632679), p), p);
+    return VSEL(VLT(x, VSET(0)), VSUB(VSET(3.14159265359), p), p);
+}
+#endif
+
+#define VEXP(x) F(exp)(x)
+#define VEXP2(x) F(exp2)(x)
+#define VLOG(x) F(log)(x)
+
+SSDGS__FI V F(sigmoid)(V x) { return VDIV(VSET(1), VADD(VSET(1), VEXP(VNEG(x)))); }
+SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(VABS(x))))); }
+
+/* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the identity. */
+SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
+    V norm2 = VFMA(raw[0], raw[0], VDOT3(raw[1], raw[2], raw[3], raw[1], raw[2], raw[3]));
+    V inverse = VDIV(VSET(1), VSQRT(VMAX(norm2, VSET(1e-30)))), two = VSET(2), one = VSET(1);
+    int i;
+    for (i = 0; i < 4; i++) q[i] = VMUL(raw[i], inverse);
+    r[0] = VFNMA(two, VFMA(q[2], q[2], VMUL(q[3], q[3])), one);
+    r[1] = VMUL(two, VFNMA(q[0], q[3], VMUL(q[1], q[2])));
+    r[2] = VMUL(two, VFMA(q[0], q[2], VMUL(q[1], q[3])));
+    r[3] = VMUL(two, VFMA(q[0], q[3], VMUL(q[1], q[2])));
+    r[4] = VFNMA(two, VFMA(q[1], q[1], VMUL(q[3], q[3])), one);
+    r[5] = VMUL(two, VFNMA(q[0], q[1], VMUL(q[2], q[3])));
+    r[6] = VMUL(two, VFNMA(q[0], q[2], VMUL(q[1], q[3])));
+    r[7] = VMUL(two, VFMA(q[0], q[1], VMUL(q[2], q[3])));
+    r[8] = VFNMA(two, VFMA(q[1], q[1], VMUL(q[2], q[2])), one);
+    return inverse;
+}
+
+/* draw = d(rotation)/d(raw)^T dr: through the matrix, then projected off the radial direction. */
+SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V d[9]) {
+    V w = q[0], x = q[1], y = q[2], z = q[3], g[4], radial;
+    V a = VSUB(d[7], d[5]), b = VSUB(d[2], d[6]), c = VSUB(d[3], d[1]);
+    V xy = VADD(d[1], d[3]), xz = VADD(d[2], d[6]), yz = VADD(d[5], d[7]);
+    int i;
+    g[0] = VDOT3(x, y, z, a, b, c);
+    g[1] = VSUB(VFMA(w, a, VFMA(y, xy, VMUL(z, xz))), VMUL(VMUL(VSET(2), x), VADD(d[4], d[8])));
+    g[2] = VSUB(VFMA(w, b, VFMA(x, xy, VMUL(z, yz))), VMUL(VMUL(VSET(2), y), VADD(d[0], d[8])));
+    g[3] = VSUB(VFMA(w, c, VFMA(x, xz, VMUL(y, yz))), VMUL(VMUL(VSET(2), z), VADD(d[0], d[4])));
+    for (i = 0; i < 4; i++) g[i] = VMUL(VSET(2), g[i]);
+    radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
+    for (i = 0; i < 4; i++) draw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
+}
+
+/* ==== >>project_kernel  eq. 1: EWA projection of Gaussians begin .. end ==== */
+
+/* What both directions need of a projection, per lane. */
+typedef struct F(projection) {
+    V t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], a, b, c, det0, h, det, opacity;
+} F(projection);
+
+SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, const R *g, size_t stride) {
+    V x[3], raw[4], cross[3];
+    int i, j;
+    for (i = 0; i < 3; i++) x[i] = VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride);
+    for (i = 0; i < 4; i++) raw[i] = VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride);
+    for (i = 0; i < 3; i++) {
+        V log_scale = VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride);
+        p->s[i] = VEXP(VMAX(VSET(-20), VMIN(VSET(20), log_scale)));
+        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]), x[0], x[1], x[2]),
+                       VSET(k->view[4 * i + 3]));
+    }
+    p->inverse_q = F(rotation)(raw, p->q, p->r);
+    p->inverse_z = k->orthographic ? VSET(1) : VDIV(VSET(1), VMAX(p->t[2], VSET(k->near_plane)));
+    for (i = 0; i < 2; i++) { /* rows of J W */
+        V focal = VMUL(VSET(i ? k->fy : k->fx), p->inverse_z);
+        V slope = k->orthographic ? VSET(0) : VMUL(p->t[i], p->inverse_z);
+        for (j = 0; j < 3; j++) p->row[i][j] = VMUL(focal, VFNMA(slope, VSET(k->view[8 + j]), VSET(k->view[4 * i + j])));
+        for (j = 0; j < 3; j++) /* m = J W R S */
+            p->m[i][j] = VMUL(p->s[j], VDOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
+    }
+    p->a = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
+    p->b = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
+    p->c = VDOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
+    for (i = 0; i < 3; i++) { /* difference of products, its rounding error put back by the fused operation */
+        V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3], v1 = p->m[1][(i + 1) % 3];
+        V product = VMUL(u1, v1);
+        cross[i] = VADD(VFMA(u0, v0, VNEG(product)), VFNMA(u1, v1, product));
+    }
+    p->det0 = VDOT3(cross[0], cross[1], cross[2], cross[0], cross[1], cross[2]);
+    if (k->blur == SSDGS_BLUR_ADD) {
+        p->h = VSET(0.3);
+    } else {
+        V mean = VMUL(VSET(0.5), VADD(p->a, p->c)), half = VMUL(VSET(0.5), VSUB(p->a, p->c));
+        V largest = VADD(mean, VSQRT(VFMA(half, half, VMUL(p->b, p->b))));
+        p->h = VMAX(VSET(0), VSUB(VSET(0.2), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
+    }
+    p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
+    p->opacity = F(sigmoid)(VMAX(VSET(-20), VMIN(VSET(20), VLOAD(g + (size_t)SSDGS_OPACITY * stride))));
+}
+
+SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
+                          R *record, R *depth) {
+    const V log2e = VSET(1.44269504088896341);
+    size_t i;
+    for (i = begin; i < end; i += SSDGS__VW) {
+        F(projection) p;
+        V inverse_det, opacity, log2_opacity, reach, x, y, ex, ey, d, field[8];
+        VM drawn;
+        R lane[SSDGS__VW];
+        int f, l;
+        F(project_lanes)(&p, k, gaussians + i, stride);
+        inverse_det = VDIV(VSET(1), p.det);
+        opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, inverse_det))) : p.opacity;
+        log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
+        x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
+        y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
+        reach = VMAX(VSET(0), VMUL(VSET(2 * 0.69314718055994531), VSUB(log2_opacity, VSET(k->log2_threshold))));
+        ex = VSQRT(VMUL(reach, VADD(p.a, p.h)));
+        ey = VSQRT(VMUL(reach, VADD(p.c, p.h)));
+        d = k->by_distance ? VSQRT(VDOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
+        /* NaN fails every comparison, so nothing that is not finite is drawn */
+        drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)), VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
+        drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
+        drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
+        drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
+        VSTORE(lane, VSEL(drawn, d, VSET(-1)));
+        for (l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
+        if (!VANY(drawn)) continue;
+        field[0] = x;
+        field[1] = y;
+        field[2] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det));
+        field[3] = VMUL(log2e, VMUL(p.b, inverse_det));
+        field[4] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.a, p.h), inverse_det));
+        field[5] = log2_opacity;
+        field[6] = ex;
+        field[7] = ey;
+        for (f = 0; f < 8; f++) {
+            VSTORE(lane, field[f]);
+            for (l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = lane[l];
+        }
+    }
+}
+
+/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity). Adds to the gradient planes; view_slot (12) is overwritten. */
+SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
+                                   const R *splat, R *gradient, size_t gradient_stride, R *view_slot) {
+    V view_sum[12];
+    size_t i;
+    int j, l;
+    for (j = 0; j < 12; j++) view_sum[j] = VSET(0);
+    for (i = begin; i < end; i += SSDGS__VW) {
+        F(projection) p;
+        R lane[6][SSDGS__VW], any = 0;
+        V g[6], inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3], x[3];
+        for (l = 0; l < SSDGS__VW; l++)
+            for (j = 0; j < 6; j++) {
+                lane[j][l] = splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
+                any = lane[j][l] != 0 ? 1 : any;
+            }
+        if (any == 0) continue;
+        for (j = 0; j < 6; j++) g[j] = VLOAD(lane[j]);
+        F(project_lanes)(&p, k, gaussians + i, stride);
+        inverse_det = VDIV(VSET(1), p.det);
+        ka = VMUL(VADD(p.c, p.h), inverse_det);
+        kb = VNEG(VMUL(p.b, inverse_det));
+        kc = VMUL(VADD(p.a, p.h), inverse_det);
+        /* d(covariance) = -K G K with K the conic */
+        da = VNEG(VFMA(VMUL(ka, ka), g[2], VFMA(VMUL(ka, kb), g[3], VMUL(VMUL(kb, kb), g[4]))));
+        dc = VNEG(VFMA(VMUL(kb, kb), g[2], VFMA(VMUL(kb, kc), g[3], VMUL(VMUL(kc, kc), g[4]))));
+        db = VNEG(VFMA(VMUL(VMUL(VSET(2), ka), kb), g[2],
+                       VFMA(VFMA(ka, kc, VMUL(kb, kb)), g[3], VMUL(VMUL(VMUL(VSET(2), kb), kc), g[4]))));
+        if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
+            V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20))), half = VMUL(VSET(0.5), g[5]);
+            da = VFMA(half, VSUB(VMUL(p.c, inverse_det0), ka), da);
+            dc = VFMA(half, VSUB(VMUL(p.a, inverse_det0), kc), dc);
+            db = VFMA(g[5], VMUL(p.b, VSUB(inverse_det, inverse_det0)), db);
+        }
+        for (j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
+        for (j = 0; j < 3; j++) { /* m = (J W) (R S) */
+            V dm0 = VFMA(VMUL(VSET(2), da), p.m[0][j], VMUL(db, p.m[1][j]));
+            V dm1 = VFMA(VMUL(VSET(2), dc), p.m[1][j], VMUL(db, p.m[0][j]));
+            R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
+            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i), ds = VFMA(dm0, p.m[0][j], VMUL(dm1, p.m[1][j]));
+            VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(20)), ds, VSET(0))));
+            dm0 = VMUL(dm0, p.s[j]);
+            dm1 = VMUL(dm1, p.s[j]);
+            for (l = 0; l < 3; l++) {
+                dr[3 * l + j] = VFMA(dm0, p.row[0][l], VMUL(dm1, p.row[1][l]));
+                du[0][l] = VFMA(dm0, p.r[3 * l + j], du[0][l]);
+                du[1][l] = VFMA(dm1, p.r[3 * l + j], du[1][l]);
+            }
+        }
+        F(rotation_backward)(dq, p.q, p.inverse_q, dr);
+        for (j = 0; j < 4; j++) {
+            R *d = gradient + (size_t)(SSDGS_ROTATION + j) * gradient_stride + i;
+            VSTORE(d, VADD(VLOAD(d), dq[j]));
+        }
+        { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
+            R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
+            V raw = VLOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
+            V logit = VSEL(VLT(VABS(raw), VSET(20)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
+            VSTORE(d, VADD(VLOAD(d), logit));
+        }
+        dt[2] = VSET(0);
+        for (l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
+            V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z), slope = VMUL(p.t[l], p.inverse_z);
+            V w0 = VSET(k->view[4 * l]), w1 = VSET(k->view[4 * l + 1]), w2 = VSET(k->view[4 * l + 2]);
+            V dj = VDOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
+            V dj2 = VDOT3(du[l][0], du[l][1], du[l][2], VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]));
+            V dslope = VFNMA(scaled, dj2, VMUL(focal, g[l])); /* slope = t / z stands in J and in the centre */
+            dt[l] = VMUL(dslope, p.inverse_z);
+            dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
+            dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);
+            for (j = 0; j < 3; j++) {
+                view_sum[4 * l + j] = VFMA(scaled, du[l][j], view_sum[4 * l + j]);
+                view_sum[8 + j] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j]);
+            }
+        }
+        for (j = 0; j < 3; j++) x[j] = VLOAD(gaussians + (size_t)(SSDGS_POSITION + j) * stride + i);
+        for (j = 0; j < 3; j++) {
+            R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
+            V dx = VDOT3(dt[0], dt[1], dt[2], VSET(k->view[j]), VSET(k->view[4 + j]), VSET(k->view[8 + j]));
+            VSTORE(d, VADD(VLOAD(d), dx));
+            for (l = 0; l < 3; l++) view_sum[4 * j + l] = VFMA(dt[j], x[l], view_sum[4 * j + l]);
+            view_sum[4 * j + 3] = VADD(view_sum[4 * j + 3], dt[j]);
+        }
+    }
+    for (j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
+}
+
+/* ==== >>bin_kernel  exact ellipse spans ==== */
+
+/* For each 4-pixel row of micro-tiles row0 .. row0 + rows, the columns of micro-tiles whose pixel centres can lie inside the
+   ellipse alpha >= threshold of the record; first > last where there are none. */
+SSDGS__FN void F(row_spans)(const R *record, R log2_threshold, int row0, int rows, int columns, int16_t *first, int16_t *last) {
+    const R a = -record[2], b = -record[3], c = -record[4], reach = record[5] - log2_threshold, right = -b * record[6] / (2 * c);
+    const R margin = (R)0.01;
+    int i, l;
+    for (i = 0; i < rows; i += SSDGS__VW) {
+        R lane[SSDGS__VW], low[SSDGS__VW], high[SSDGS__VW];
+        V d0, d1, at, disc, dx;
+        for (l = 0; l < SSDGS__VW; l++) lane[l] = (R)(4 * (row0 + i + l));
+        d0 = VADD(VLOAD(lane), VSET((R)0.5 - record[1] - margin));
+        d1 = VADD(d0, VSET(3 + 2 * margin));
+        d0 = VMAX(VMIN(d0, VSET(record[7])), VSET(-record[7]));
+        d1 = VMAX(VMIN(d1, VSET(record[7])), VSET(-record[7]));
+        at = VMAX(d0, VMIN(d1, VSET(right)));
+        disc = VFNMA(VMUL(VSET(4 * a), at), VMUL(VSET(c), at), VFMA(VMUL(VSET(b), at), VMUL(VSET(b), at), VSET(4 * a * reach)));
+        dx = VMUL(VFNMA(VSET(b), at, VSQRT(VMAX(disc, VSET(0)))), VSET(1 / (2 * a)));
+        VSTORE(high, VMUL(VADD(dx, VSET(record[0] - (R)0.5 + margin)), VSET(0.25)));
+        at = VMAX(d0, VMIN(d1, VSET(-right)));
+        disc = VFNMA(VMUL(VSET(4 * a), at), VMUL(VSET(c), at), VFMA(VMUL(VSET(b), at), VMUL(VSET(b), at), VSET(4 * a * reach)));
+        dx = VMUL(VFMA(VSET(b), at, VSQRT(VMAX(disc, VSET(0)))), VSET(-1 / (2 * a)));
+        VSTORE(low, VMUL(VADD(dx, VSET(record[0] - (R)3.5 - margin)), VSET(0.25)));
+        for (l = 0; l < SSDGS__VW && i + l < rows; l++) {
+            const R from = low[l] > 0 ? low[l] : 0, to = high[l] < (R)columns ? high[l] : (R)(columns - 1);
+            first[i + l] = (int16_t)(from < (R)columns ? (int)from + (from > (R)(int)from) : columns);
+            last[i + l] = (int16_t)(to >= 0 ? (int)to : -1);
+        }
+    }
+}
+
+/* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ====
+   The tile's list is taken in batches; in a batch each 4x4 micro-tile runs through the entries that touch it with its pixels in
+   registers. Every walk finds alpha by the same operations in the same order, so all of them take the same decisions. */
+
+typedef struct F(batch) {
+    R record[SSDGS__BATCH][8];
+    unsigned char entry[16][SSDGS__BATCH];
+    int count[16];
+} F(batch);
+
+SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const R *record, unsigned mask, int code) {
+    int i;
+    for (i = 0; i < 8; i++) batch->record[index][i] = record[i];
+    for (; mask; mask &= mask - 1) {
+        const int micro = ssdgs__lowest_bit(mask);
+        batch->entry[micro][batch->count[micro]++] = (unsigned char)(index | code);
+    }
+}
+
+/* Gathers up to SSDGS__BATCH list entries from `from`; returns how many. */
+SSDGS__FI int F(batch_gather)(F(batch) *batch, const ssdgs__tile *tile, uint32_t from, uint32_t *gaussian) {
+    const uint32_t left = tile->count - from, n = left < SSDGS__BATCH ? left : SSDGS__BATCH;
+    uint32_t i;
+    int micro;
+    for (micro = 0; micro < 16; micro++) batch->count[micro] = 0;
+    for (i = 0; i < n; i++) {
+        const uint32_t instance = tile->list[from + i];
+        gaussian[i] = tile->owner[instance];
+        F(batch_add)(batch, (int)i, tile->record + (size_t)gaussian[i] * 8, tile->mask[instance], 0);
+    }
+    return (int)n;
+}
+
+/* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
+SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy, V *raw, VM *drawn) {
+    V p;
+    *dx = VSUB(px, VSET(record[0]));
+    *dy = VSUB(py, VSET(record[1]));
+    p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy, VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
+    *drawn = VGE(p, log2_threshold);
+    *raw = VEXP2(p);
+    return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
+}
+
+SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
+    int v;
+    for (v = 0; v < SSDGS__NV; v++) {
+        px[v] = VADD(VLOAD(ssdgs__lane_x + v * SSDGS__VW), VSET(tile->x + 4 * (micro & 3)));
+        py[v] = VADD(VLOAD(ssdgs__lane_y + v * SSDGS__VW), VSET(tile->y + 4 * (micro >> 2)));
+    }
+}
+
+/* Transmittance walk of the camera: seen[instance] = 1 where a pixel blends it. */
+SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, unsigned char *seen) {
+    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
+    R transmittance[16][16];
+    F(batch) batch;
+    uint32_t gaussian[SSDGS__BATCH], from;
+    int micro, e, v, n, live = 1;
+    for (micro = 0; micro < 16; micro++)
+        for (v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
+    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
+        n = F(batch_gather)(&batch, tile, from, gaussian);
+        live = 0;
+        for (micro = 0; micro < 16; micro++) {
+            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV];
+            F(pixel_centres)(tile, micro, px, py);
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+            for (e = 0; e < batch.count[micro]; e++) {
+                const int index = batch.entry[micro][e];
+                int any = 0;
+                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw, alpha;
+                    VM drawn, blended;
+                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    blended = VAND(drawn, VGE(t[v], stop));
+                    t[v] = VSEL(blended, VFNMA(alpha, t[v], t[v]), t[v]);
+                    any |= VANY(blended);
+                }
+                if (any) seen[tile->list[from + (uint32_t)index]] = 1;
+            }
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                live |= VANY(VGE(t[v], stop));
+            }
+        }
+    }
+}
+
+/* Light walk, eqs. 6, 7 and the depth cue: per instance, sums (n, 4) of rho v, rho, rho x cue, solid angle x blend weight.
+   An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes part in it once its
+   own distance is reached; both at once where nothing lies between. */
+SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
+    const V threshold = VSET(tile->log2_threshold), one = VSET(1);
+    R transmittance[16][16], met[16][16]; /* met: sum of blend weight x distance */
+    F(batch) batch;
+    uint32_t instance[SSDGS__BATCH], sampled = 0, applied = 0;
+    int micro, e, v, n;
+    for (micro = 0; micro < 16; micro++)
+        for (v = 0; v < 16; v++) {
+            transmittance[micro][v] = 1;
+            met[micro][v] = 0;
+        }
+    while (applied < tile->count) {
+        for (micro = 0; micro < 16; micro++) batch.count[micro] = 0;
+        for (n = 0; n < SSDGS__BATCH && applied < tile->count; n++) {
+            const R apply_at = tile->depth[tile->owner[tile->list[applied]]];
+            int code = SSDGS__APPLY;
+            if (sampled < tile->count && tile->depth[tile->owner[tile->list[sampled]]] - tile->bias <= apply_at) {
+                code = SSDGS__SAMPLE;
+                if (sampled == applied && (sampled + 1 == tile->count ||
+                    tile->depth[tile->owner[tile->list[sampled + 1]]] - tile->bias > apply_at)) code |= SSDGS__APPLY;
+            }
+            instance[n] = tile->list[code & SSDGS__SAMPLE ? sampled : applied];
+            F(batch_add)(&batch, n, tile->record + (size_t)tile->owner[instance[n]] * 8, tile->mask[instance[n]], code);
+            batch.record[n][6] = tile->depth[tile->owner[instance[n]]] - tile->depth_origin;
+            sampled += code & SSDGS__SAMPLE ? 1u : 0u;
+            applied += code & SSDGS__APPLY ? 1u : 0u;
+        }
+        for (micro = 0; micro < 16; micro++) {
+            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
+            F(pixel_centres)(tile, micro, px, py);
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
+                w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
+                cosine2 = VDIV(one, VFMA(u, u, VFMA(w, w, one)));
+                omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
+                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+                b[v] = VLOAD(met[micro] + v * SSDGS__VW);
+            }
+            for (e = 0; e < batch.count[micro]; e++) {
+                const int code = batch.entry[micro][e], index = code & (SSDGS__BATCH - 1);
+                const V distance = VSET(batch.record[index][6]);
+                V sum[4];
+                int any = 0;
+                for (v = 0; v < 4; v++) sum[v] = VSET(0);
+                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw, alpha, w;
+                    VM drawn;
+                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    any |= VANY(drawn);
+                    if (code & SSDGS__SAMPLE) {
+                        raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: the opacity cancels in the ratio */
+                        sum[0] = VFMA(raw, t[v], sum[0]);
+                        sum[1] = VADD(sum[1], raw);
+                        sum[2] = VFMA(raw, VFNMA(distance, t[v], VSUB(distance, b[v])), sum[2]);
+                    }
+                    if (code & SSDGS__APPLY) {
+                        w = VMUL(alpha, t[v]);
+                        sum[3] = VFMA(omega[v], w, sum[3]);
+                        b[v] = VFMA(w, distance, b[v]);
+                        t[v] = VSUB(t[v], w);
+                    }
+                }
+                if (any) F(sum4)(sums + (size_t)instance[index] * 4, sum[0], sum[1], sum[2], sum[3]);
+            }
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                VSTORE(met[micro] + v * SSDGS__VW, b[v]);
+            }
+        }
+    }
+}
+
+/* ==== >>composite_kernel  eq. 1: color (n, 4) of Gaussians -> three planes of the tile's pixels ====
+   pixels: [micro-tile][3 colours, transmittance][16 lanes]. */
+SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) {
+    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
+    F(batch) batch;
+    R local[SSDGS__BATCH][4];
+    uint32_t gaussian[SSDGS__BATCH], from;
+    int micro, e, v, i, n, live = 1;
+    for (micro = 0; micro < 16; micro++)
+        for (v = 0; v < 64; v++) pixels[micro * 64 + v] = v < 48 ? (R)0 : ssdgs__start_transmittance(tile, micro, v - 48);
+    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
+        n = F(batch_gather)(&batch, tile, from, gaussian);
+        live = 0;
+        for (e = 0; e < n; e++)
+            for (i = 0; i < 3; i++) local[e][i] = color[(size_t)gaussian[e] * 4 + (size_t)i];
+        for (micro = 0; micro < 16; micro++) {
+            R *pixel = pixels + micro * 64;
+            V px[SSDGS__NV], py[SSDGS__NV], c[3][SSDGS__NV], t[SSDGS__NV];
+            F(pixel_centres)(tile, micro, px, py);
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
+                t[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
+            }
+            for (e = 0; e < batch.count[micro]; e++) {
+                const int index = batch.entry[micro][e];
+                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw, alpha, w;
+                    VM drawn;
+                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    alpha = VSEL(VGE(t[v], stop), alpha, VSET(0));
+                    w = VMUL(alpha, t[v]);
+                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VFMA(w, VSET(local[index][i]), c[i][v]);
+                }
+            }
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                SSDGS__UNROLL for (i = 0; i < 3; i++) VSTORE(pixel + 16 * i + v * SSDGS__VW, c[i][v]);
+                VSTORE(pixel + 48 + v * SSDGS__VW, t[v]);
+                live |= VANY(VGE(t[v], stop));
+            }
+        }
+    }
+}
+
+/* pixels: [micro-tile][3 colour gradients, their dot product with the final colour][16 lanes]. Per instance, sums (n, 12) of
+   g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w, 0, w dC. Walks front to back again: what lies
+   behind an entry is the final colour less what has been passed, so alpha and T are the forward's, bit for bit. */
+SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, const R *pixels, R *sums) {
+    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
+    F(batch) batch;
+    R local[SSDGS__BATCH][4], passed[16][16], transmittance[16][16];
+    uint32_t gaussian[SSDGS__BATCH], from;
+    int micro, e, v, i, n, live = 1;
+    for (micro = 0; micro < 16; micro++)
+        for (v = 0; v < 16; v++) {
+            passed[micro][v] = 0;
+            transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
+        }
+    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
+        n = F(batch_gather)(&batch, tile, from, gaussian);
+        live = 0;
+        for (e = 0; e < n; e++)
+            for (i = 0; i < 3; i++) local[e][i] = color[(size_t)gaussian[e] * 4 + (size_t)i];
+        for (micro = 0; micro < 16; micro++) {
+            const R *pixel = pixels + micro * 64;
+            V px[SSDGS__NV], py[SSDGS__NV], dc[4][SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
+            F(pixel_centres)(tile, micro, px, py);
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                SSDGS__UNROLL for (i = 0; i < 4; i++) dc[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
+                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+                before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
+            }
+            for (e = 0; e < batch.count[micro]; e++) {
+                const int index = batch.entry[micro][e];
+                const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
+                R *out = sums + (size_t)tile->list[from + (uint32_t)index] * SSDGS__SUMS;
+                V sum[12];
+                int any = 0;
+                for (i = 0; i < 12; i++) sum[i] = zero;
+                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw, alpha, w, shade, behind, g, gx, gy;
+                    VM drawn, blended;
+                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    blended = VAND(drawn, VGE(t[v], stop));
+                    any |= VANY(blended);
+                    alpha = VSEL(blended, alpha, zero);
+                    w = VMUL(alpha, t[v]);
+                    shade = VDOT3(red, green, blue, dc[0][v], dc[1][v], dc[2][v]);
+                    before[v] = VFMA(w, shade, before[v]);
+                    behind = VDIV(VSUB(dc[3][v], before[v]), VSUB(one, alpha));
+                    g = VMUL(alpha, VFMA(t[v], shade, VNEG(behind)));
+                    g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
+                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    gx = VMUL(g, dx);
+                    gy = VMUL(g, dy);
+                    sum[0] = VADD(sum[0], g);
+                    sum[1] = VADD(sum[1], gx);
+                    sum[2] = VADD(sum[2], gy);
+                    sum[3] = VFMA(gx, dx, sum[3]);
+                    sum[4] = VFMA(gx, dy, sum[4]);
+                    sum[5] = VFMA(gy, dy, sum[5]);
+                    sum[6] = VADD(sum[6], w);
+                    sum[8] = VFMA(w, dc[0][v], sum[8]);
+                    sum[9] = VFMA(w, dc[1][v], sum[9]);
+                    sum[10] = VFMA(w, dc[2][v], sum[10]);
+                }
+                if (!any) continue;
+                F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
+                F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
+                F(sum4)(out + 8, sum[8], sum[9], sum[10], sum[11]);
+            }
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
+                live |= VANY(VGE(t[v], stop));
+            }
+        }
+    }
+}
+
+/* ==== >>dense_kernel  all three matrix products of a linear layer ====
+   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU]; a is read as
+   a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes run over the
+   columns. Tiles of 4 rows x SSDGS__TV vectors stay in registers; columns must be a multiple of 16. */
+SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int vectors, int row, int column) {
+    V sum[4][4];
+    const R *a = p->a + (size_t)row * p->a_row, *b = p->b + column;
+    R *out = p->out + (size_t)row * p->out_stride + column;
+    int i, v, k;
+    SSDGS__UNROLL for (i = 0; i < rows; i++)
+        SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row + i]) : VSET(0);
+    for (k = 0; k < p->depth; k++, a += p->a_k, b += p->b_stride) {
+        V lanes[4];
+        SSDGS__UNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
+        SSDGS__UNROLL for (i = 0; i < rows; i++) {
+            const V weight = VSET(a[(size_t)i * p->a_row]);
+            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
+        }
+    }
+    SSDGS__UNROLL for (i = 0; i < rows; i++)
+        SSDGS__UNROLL for (v = 0; v < vectors; v++) {
+            R *o = out + (size_t)i * p->out_stride + v * SSDGS__VW;
+            if (p->accumulate) sum[i][v] = VADD(sum[i][v], VLOAD(o));
+            if (p->relu) sum[i][v] = VMAX(sum[i][v], VSET(0));
+            VSTORE(o, sum[i][v]);
+        }
+}
+
+SSDGS__FN void F(dense)(const ssdgs__product *p) {
+    int row, column = 0;
+    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) {
+        for (row = 0; row + 4 <= p->rows; row += 4) F(dense_tile)(p, 4, SSDGS__TV, row, column);
+        for (; row < p->rows; row++) F(dense_tile)(p, 1, SSDGS__TV, row, column);
+    }
+    for (; column < p->columns; column += SSDGS__VW) {
+        for (row = 0; row + 4 <= p->rows; row += 4) F(dense_tile)(p, 4, 1, row, column);
+        for (; row < p->rows; row++) F(dense_tile)(p, 1, 1, row, column);
+    }
+}
+
+/* d(ReLU): gradient (rows, SSDGS__BLOCK) is zeroed where the layer's output is not positive; its row sums join the biases'. */
+SSDGS__FN void F(relu_backward)(R *gradient, const R *output, int rows) {
+    int i;
+    for (i = 0; i < rows * SSDGS__BLOCK; i += SSDGS__VW)
+        VSTORE(gradient + i, VSEL(VLT(VSET(0), VLOAD(output + i)), VLOAD(gradient + i), VSET(0)));
+}
+
+SSDGS__FN void F(row_sums)(R *sums, const R *rows, int count) {
+    int i, s;
+    for (i = 0; i < count; i++) {
+        V sum = VLOAD(rows + i * SSDGS__BLOCK);
+        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) sum = VADD(sum, VLOAD(rows + i * SSDGS__BLOCK + s));
+        sums[i] += F(sum)(sum);
+    }
+}
+
+/* ==== >>encode_kernel  enc_L(v) = (v, sin v, .., sin 2^(L-1) v, cos v, .., cos 2^(L-1) v), each per component ====
+   in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the others by doubling the angle. */
+SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims, int levels) {
+    int d, l, s;
+    for (d = 0; d < dims; d++)
+        for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale)), sine, cosine;
+            VSTORE(out + d * SSDGS__BLOCK + s, x);
+            F(sincos)(x, &sine, &cosine);
+            for (l = 0; l < levels; l++) {
+                const V twice = VADD(sine, sine);
+                VSTORE(out + (dims * (1 + l) + d) * SSDGS__BLOCK + s, sine);
+                VSTORE(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s, cosine);
+                cosine = VFNMA(twice, sine, VSET(1));
+                sine = VMUL(twice, VLOAD(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s));
+            }
+        }
+}
+
+/* din += scale (dv + sum 2^l (dsin cos - dcos sin)), from the encoded values in `out`. */
+SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, int dims, int levels) {
+    int d, l, s;
+    for (d = 0; d < dims; d++)
+        for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+            V sum = VLOAD(dout + d * SSDGS__BLOCK + s), power = VSET(1);
+            for (l = 0; l < levels; l++) {
+                const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s, cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
+                V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine), VMUL(VLOAD(dout + sine), VLOAD(out + cosine)));
+                sum = VFMA(power, turn, sum);
+                power = VADD(power, power);
+            }
+            VSTORE(din + d * SSDGS__BLOCK + s, VFMA(sum, VSET(scale), VLOAD(din + d * SSDGS__BLOCK + s)));
+        }
+}
+
+/* ==== >>asg_kernel  eqs. 9 to 12: directions, Lambert's cosine, Fresnel x ASG of a block under one light ==== */
+
+/* One lane set of the geometry; both directions of the pass run through it. */
+typedef struct F(geometry) {
+    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3], woh, fresnel;
+    VM half;
+} F(geometry);
+
+SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const R *gauss) {
+    V x[3], raw[4], d2, e2, h2, missing;
+    int i;
+    for (i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
+    for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
+    g->inverse_q = F(rotation)(raw, g->q, g->r);
+    for (i = 0; i < 3; i++) {
+        g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), x[i]);
+        g->wo[i] = VSUB(VSET(k->eye[i]), x[i]);
+    }
+    d2 = VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
+    e2 = VMAX(VDOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), VSET(k->least_distance2));
+    g->irradiance = k->directional ? VSET(1) : VDIV(VSET(1), d2);
+    g->inverse_light = k->directional ? VSET(1) : VSQRT(g->irradiance);
+    g->inverse_eye = VDIV(VSET(1), VSQRT(e2));
+    for (i = 0; i < 3; i++) {
+        g->wi[i] = VMUL(g->wi[i], g->inverse_light);
+        g->wo[i] = VMUL(g->wo[i], g->inverse_eye);
+        g->h[i] = VADD(g->wi[i], g->wo[i]);
+    }
+    g->cosine = VDOT3(g->r[2], g->r[5], g->r[8], g->wi[0], g->wi[1], g->wi[2]);
+    h2 = VDOT3(g->h[0], g->h[1], g->h[2], g->h[0], g->h[1], g->h[2]);
+    g->half = VGE(h2, VSET(1e-12)); /* wi = -wo has no half vector: no highlight there */
+    g->inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
+    for (i = 0; i < 3; i++) g->h[i] = VMUL(g->h[i], g->inverse_h);
+    for (i = 0; i < 3; i++) g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
+    g->woh = VDOT3(g->wo[0], g->wo[1], g->wo[2], g->h[0], g->h[1], g->h[2]);
+    missing = VMAX(VSET(0), VSUB(VSET(1), g->woh));
+    h2 = VMUL(missing, missing);
+    g->fresnel = VFMA(VSET(1 - SSDGS__F0), VMUL(VMUL(h2, h2), missing), VSET(SSDGS__F0));
+}
+
+/* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma (angular).
+   With de NULL only the value; else also the exponent's derivatives: to h (3), and to the basis row (12). */
+SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
+    const V x = VDOT3(VSET(b[0]), VSET(b[1]), VSET(b[2]), h[0], h[1], h[2]);
+    const V y = VDOT3(VSET(b[3]), VSET(b[4]), VSET(b[5]), h[0], h[1], h[2]);
+    V value, dx, dy, dz = VSET(0);
+    int i;
+    if (!angular) {
+        value = VEXP(VNEG(VFMA(VMUL(VSET(b[9]), x), x, VMUL(VMUL(VSET(b[10]), y), y))));
+        if (!dh) return value;
+        dx = VMUL(VSET(-2 * b[9]), x);
+        dy = VMUL(VSET(-2 * b[10]), y);
+        db[9] = VNEG(VMUL(x, x));
+        db[10] = VNEG(VMUL(y, y));
+        db[11] = VSET(0);
+    } else {
+        /* (theta q)^2 = (theta / s)^2 ((x/l)^2 + (y/u)^2) with s = |(x, y)|: no acos, no root, smooth at the pole */
+        const V z = VDOT3(VSET(b[6]), VSET(b[7]), VSET(b[8]), h[0], h[1], h[2]);
+        const V s2 = VFMA(x, x, VMUL(y, y)), s = VSQRT(VMAX(s2, VSET(1e-16)));
+        const V theta = F(atan2_upper)(s, z), turn = VDIV(theta, s);
+        const VM pole = VAND(VLT(s2, VSET(1e-8)), VLT(VSET(0), z));
+        const V ratio = VSEL(pole, VFMA(s2, VSET(1.0 / 3), VSET(1)), VMUL(turn, turn));
+        const V xl = VMUL(x, VSET(b[9])), yu = VMUL(y, VSET(b[10])), inverse_sigma = VSET(1 / b[11]);
+        const V q = VFMA(xl, xl, VMUL(yu, yu)), k = VMUL(VSET(-0.5), VMUL(inverse_sigma, inverse_sigma));
+        const V scale = VMUL(inverse_sigma, VSET(0.32964899322074326)); /* 1 / (sqrt 2 pi^(2/3)) */
+        V exponent = VMUL(k, VMUL(ratio, q)), slope;
+        value = VMUL(scale, VEXP(exponent));
+        if (!dh) return value;
+        /* on the unit sphere z^2 + s^2 = 1: d theta = (z ds - s dz); the pole's limit of d(ratio)/d(s2) is 1/3 */
+        slope = VSEL(pole, VSET(1.0 / 3), VDIV(VMUL(turn, VSUB(z, turn)), VMAX(s2, VSET(1e-16))));
+        dx = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), x, VMUL(ratio, VMUL(xl, VSET(b[9])))));
+        dy = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), y, VMUL(ratio, VMUL(yu, VSET(b[10])))));
+        dz = VSEL(pole, VSET(0), VMUL(VMUL(VSET(-2), k), VMUL(q, turn)));
+        db[9] = VMUL(VMUL(VSET(2), k), VMUL(ratio, VMUL(xl, x)));
+        db[10] = VMUL(VMUL(VSET(2), k), VMUL(ratio, VMUL(yu, y)));
+        db[11] = VMUL(VNEG(inverse_sigma), VFMA(VSET(2), exponent, VSET(1)));
+    }
+    for (i = 0; i < 3; i++) {
+        dh[i] = VFMA(dx, VSET(b[i]), VFMA(dy, VSET(b[3 + i]), VMUL(dz, VSET(b[6 + i]))));
+        db[i] = VMUL(dx, h[i]);
+        db[3 + i] = VMUL(dy, h[i]);
+        db[6 + i] = VMUL(dz, h[i]);
+    }
+    return value;
+}
+
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s. */
+SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
+    int s, i, j;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        F(geometry) g;
+        V d = VSET(0);
+        F(geometry_lanes)(&g, k, gauss + s);
+        for (i = 0; i < 3; i++) {
+            VSTORE(rows + (SSDGS__WI + i) * SSDGS__BLOCK + s, g.wi[i]);
+            VSTORE(rows + (SSDGS__WO + i) * SSDGS__BLOCK + s, g.wo[i]);
+            VSTORE(rows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s, g.r[3 * i + 2]);
+        }
+        VSTORE(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, g.irradiance);
+        VSTORE(rows + SSDGS__COSINE * SSDGS__BLOCK + s, VMAX(VSET(0), g.cosine));
+        if (k->specular)
+            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+                V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
+                V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL) : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
+                d = VFMA(weight, lobe, d);
+            }
+        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s, VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
+    }
+}
+
+/* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3), the eye (3)
+   and the bases (8 x 12), each (16 lanes). */
+SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, const R *drows, R *dgauss, R *lane_sums) {
+    int s, i, j;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        F(geometry) g;
+        V dwi[3], dwo[3], dn[3], dr[9], dlocal[3], dh[3], d = VSET(0), df, dlobe, dwoh, missing2, dcosine, radial, dq[4];
+        F(geometry_lanes)(&g, k, gauss + s);
+        for (i = 0; i < 3; i++) {
+            dwi[i] = VLOAD(drows + (SSDGS__WI + i) * SSDGS__BLOCK + s);
+            dwo[i] = VLOAD(drows + (SSDGS__WO + i) * SSDGS__BLOCK + s);
+            dn[i] = VLOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
+            dlocal[i] = VSET(0);
+        }
+        df = VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
+        dlobe = VMUL(df, g.fresnel);
+        if (k->specular)
+            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw), de[3], db[12], lobe, push;
+                R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
+                lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, de, db) : F(asg)(0, k->basis + 12 * j, g.local, de, db);
+                d = VFMA(weight, lobe, d);
+                VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
+                push = VMUL(VMUL(dlobe, weight), lobe);
+                for (i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
+                for (i = 0; i < 12; i++) {
+                    R *sum = lane_sums + (6 + 12 * j + i) * 16;
+                    VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
+                }
+            }
+        /* F = F0 + (1 - F0) (1 - wo.h)^5 */
+        missing2 = VMAX(VSET(0), VSUB(VSET(1), g.woh));
+        missing2 = VMUL(missing2, missing2);
+        dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
+        for (i = 0; i < 3; i++) {
+            dh[i] = VFMA(dwoh, g.wo[i], VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
+            dwo[i] = VFMA(dwoh, g.h[i], dwo[i]);
+            for (j = 0; j < 3; j++) dr[3 * i + j] = VMUL(g.h[i], dlocal[j]);
+        }
+        /* f_d = max(0, n.wi) */
+        dcosine = VSEL(VLT(VSET(0), g.cosine), VLOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), VSET(0));
+        radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+        for (i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
+            const V dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
+            dwi[i] = VFMA(dcosine, g.r[3 * i + 2], VADD(dwi[i], dsum));
+            dwo[i] = VADD(dwo[i], dsum);
+            dr[3 * i + 2] = VADD(dr[3 * i + 2], VFMA(dcosine, g.wi[i], dn[i]));
+        }
+        F(rotation_backward)(dq, g.q, g.inverse_q, dr);
+        for (i = 0; i < 4; i++) {
+            R *out = dgauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s;
+            VSTORE(out, VADD(VLOAD(out), dq[i]));
+        }
+        /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
+        radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
+        radial = VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), radial);
+        missing2 = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+        for (i = 0; i < 3; i++) {
+            R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
+            const V to_light = k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
+            const V to_eye = VMUL(VFNMA(g.wo[i], missing2, dwo[i]), g.inverse_eye);
+            VSTORE(out, VSUB(VLOAD(out), VADD(to_light, to_eye)));
+            VSTORE(lane_sums + i * 16, VADD(VLOAD(lane_sums + i * 16), to_light));
+            VSTORE(lane_sums + (3 + i) * 16, VADD(VLOAD(lane_sums + (3 + i) * 16), to_eye));
+        }
+    }
+}
+
+/* ==== >>dipole_kernel  eq. 5 and its relatives ==== */
+
+/* f_sss of (sigma_s, sigma_a, r); with d, also its three derivatives. virtual_depth = 1 + 4A/3. */
+SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
+    const V one = VSET(1), st = VADD(ss, sa), inverse_st = VDIV(one, st), albedo = VMUL(ss, inverse_st);
+    if (form == SSDGS_DIPOLE_BURLEY) {
+        const V w = VMAX(VMUL(sa, inverse_st), VSET(1e-12)), q = VSQRT(w);
+        /* A = (1 - q)(1 - 0.107 q) / (1 + 1.91 q), with 1 - q = albedo / (1 + q): no cancellation in the dark */
+        const V top = VMUL(VDIV(albedo, VADD(one, q)), VFNMA(VSET(0.107), q, one)), bottom = VFMA(VSET(1.91), q, one);
+        const V a = VDIV(top, bottom), off = VSUB(a, VSET(0.8)), off2 = VMUL(off, VABS(off));
+        const V s = VFMA(VMUL(VSET(7), VABS(off)), VMUL(off, off), VSUB(VSET(1.85), a));
+        const V x = VMUL(VMUL(s, r), st), u = VEXP(VMUL(x, VSET(-1.0 / 3))), u3 = VMUL(VMUL(u, u), u), inverse_r = VDIV(one, r);
+        const V p = VMUL(VMUL(VMUL(a, s), st), VMUL(inverse_r, VSET(0.039788735772973836))), sum = VADD(u3, u); /* 1 / (8 pi) */
+        if (d) {
+            const V slope = VNEG(VFMA(u, VSET(1.0 / 3), u3)), shared = VMUL(p, VFMA(slope, x, sum));
+            const V ds = VDIV(shared, s), da = VFMA(ds, VFMA(VSET(21), off2, VSET(-1)), VMUL(VMUL(p, sum), VDIV(one, a)));
+            const V dq = VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)), VMUL(bottom, bottom)));
+            const V dw = VMUL(dq, VDIV(VSET(0.5), q)), dst = VMUL(shared, inverse_st);
+            d[0] = VFNMA(dw, VMUL(VMUL(sa, inverse_st), inverse_st), dst);
+            d[1] = VFMA(dw, VMUL(albedo, inverse_st), dst);
+            d[2] = VMUL(VMUL(p, inverse_r), VFMA(slope, x, VNEG(sum)));
+        }
+        return VMUL(p, sum);
+    } else {
+        const int printed = form == SSDGS_DIPOLE_PRINTED;
+        const V str = VSQRT(VMUL(VMUL(VSET(3), sa), st)), s = printed ? st : str;
+        const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)), factor = form == SSDGS_DIPOLE_JENSEN ? zv : VMUL(zr, zv);
+        const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))), q = printed ? dr : dv;
+        const V ir = VDIV(one, dr), iv = VDIV(one, dv);
+        const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir))), ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
+        const V br = VFMA(s, dr, one), bv = VFMA(s, q, one), scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
+        const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
+        if (d) {
+            /* real source: z (s d + 1) e^(-s d) / d^3; virtual source: factor (s q + 1) e^(-s dv) / dv^3 */
+            const V ddr = VNEG(VMUL(VMUL(zr, er), VFMA(VMUL(s, dr), s, VMUL(VSET(3), VADD(s, ir)))));
+            const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s))), dq = VMUL(VMUL(factor, ev), s);
+            const V to_dr = printed ? VADD(ddr, dq) : ddr, to_dv = printed ? ddv : VADD(ddv, dq);
+            const V ds = VFNMA(VMUL(zr, er), VMUL(s, VMUL(dr, dr)), VMUL(VMUL(factor, ev), VFNMA(dv, bv, q)));
+            const V dfactor = form == SSDGS_DIPOLE_JENSEN ? VMUL(second, VSET(virtual_depth)) : VMUL(VMUL(VSET(2), second), zv);
+            const V dzv = VMUL(VMUL(to_dv, VMUL(zv, iv)), VSET(virtual_depth));
+            const V dz = VADD(VADD(first, dfactor), VFMA(to_dr, VMUL(zr, ir), dzv));
+            V dst = VNEG(VMUL(dz, VMUL(zr, zr))), dsa = VSET(0);
+            if (printed) {
+                dst = VADD(dst, ds);
+            } else { /* str^2 = 3 sa st */
+                const V k = VMUL(VMUL(ds, VSET(1.5)), VDIV(one, VMAX(str, VMUL(VSET(1e-7), st))));
+                dst = VFMA(k, sa, dst);
+                dsa = VMUL(k, st);
+            }
+            d[0] = VMUL(scale, VFMA(VDIV(f, ss), VMUL(sa, inverse_st), dst));
+            d[1] = VMUL(scale, VFNMA(f, inverse_st, VADD(dst, dsa)));
+            d[2] = VMUL(VMUL(scale, r), VFMA(to_dr, ir, VMUL(to_dv, iv)));
+        }
+        return VMUL(scale, f);
+    }
+}
+
+SSDGS__FI V F(dipole_any)(int form, V ss, V sa, V r, R virtual_depth, V *d) {
+    if (form == SSDGS_DIPOLE_JENSEN) return F(dipole)(SSDGS_DIPOLE_JENSEN, ss, sa, r, virtual_depth, d);
+    if (form == SSDGS_DIPOLE_BURLEY) return F(dipole)(SSDGS_DIPOLE_BURLEY, ss, sa, r, virtual_depth, d);
+    if (form == SSDGS_DIPOLE_PRINTED) return F(dipole)(SSDGS_DIPOLE_PRINTED, ss, sa, r, virtual_depth, d);
+    return F(dipole)(SSDGS_DIPOLE_RELEASED, ss, sa, r, virtual_depth, d);
+}
+
+/* n values, a multiple of the lanes: f, and with derivatives (3, n) those too. For tests and tools. */
+SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f, R *derivatives, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i += SSDGS__VW) {
+        V d[3];
+        VSTORE(f + i, F(dipole_any)(form, VLOAD(ss + i), VLOAD(sa + i), VLOAD(r + i), virtual_depth, d));
+        VSTORE(derivatives + i, d[0]);
+        VSTORE(derivatives + n + i, d[1]);
+        VSTORE(derivatives + 2 * n + i, d[2]);
+    }
+}
+
+/* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light ==== */
+
+/* The shadow factor from the network's output row. */
+SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, const R *visibility, const R *network, int s) {
+    V v;
+    if (!k->shadow) return VSET(1);
+    v = VLOAD(visibility + s);
+    if (!network) return v;
+    if (!k->residual_shadow) return F(sigmoid)(VLOAD(network + s));
+    v = VMAX(VSET(0.01), VMIN(VSET(0.99), v));
+    return F(sigmoid)(VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), VLOAD(network + s)));
+}
+
+/* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
+SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
+    const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1, separation = k->per_channel_optics ? 6 : 2;
+    unit[0] = F(sigmoid)(VLOAD(network + first * SSDGS__BLOCK + s));
+    unit[1] = F(sigmoid)(VLOAD(network + absorb * SSDGS__BLOCK + s));
+    unit[2] = F(sigmoid)(VLOAD(network + separation * SSDGS__BLOCK + s));
+}
+
+/* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
+SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow, const R *optics, R *out) {
+    int s, c;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), factor = F(shadow_factor)(k, visibility, shadow, s);
+        V profile = VSET(0), unit[3];
+        R *o = out + s;
+        for (c = 0; c < 3; c++) {
+            const V power = VMUL(irradiance, VSET(k->intensity[c])), lit = VMUL(power, factor);
+            if (k->diffuse) {
+                const V kd = F(softplus)(VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
+                const V f = VMUL(VMUL(kd, VSET(0.31830988618379067)), VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
+                VSTORE(o + c * SSDGS__BLOCK, VFMA(f, lit, VLOAD(o + c * SSDGS__BLOCK)));
+            }
+            if (k->specular) {
+                const V ks = F(softplus)(VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));
+                const V f = VMUL(ks, VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s));
+                VSTORE(o + (3 + c) * SSDGS__BLOCK, VFMA(f, lit, VLOAD(o + (3 + c) * SSDGS__BLOCK)));
+            }
+            if (k->scattering) {
+                const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
+                if (c == 0 || k->per_channel_optics) {
+                    F(optics)(k, optics, c, s, unit);
+                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)), VFMA(unit[1], VSET(2), VSET(0.05)),
+                                            VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, NULL);
+                }
+                VSTORE(o + (6 + c) * SSDGS__BLOCK,
+                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? lit : power, VLOAD(o + (6 + c) * SSDGS__BLOCK)));
+            }
+        }
+        VSTORE(o + 9 * SSDGS__BLOCK, VADD(factor, VLOAD(o + 9 * SSDGS__BLOCK)));
+    }
+}
+
+/* dcolor (3, BLOCK). Adds to dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
+SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
+                                  const R *optics, const R *dcolor, R *dgauss, R *drows, R *dshadow, R *doptics, R *dvisibility) {
+    int s, c, i;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), factor = F(shadow_factor)(k, visibility, shadow, s);
+        const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s), gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
+        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), profile = VSET(0), unit[3], d[3], dunit[3];
+        for (i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
+        for (c = 0; c < 3; c++) {
+            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c])), lit = VMUL(VMUL(g, irradiance), factor);
+            V surface = VSET(0); /* what S multiplies, per irradiance */
+            if (k->diffuse) { /* (c_d / pi) f_d S */
+                const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
+                const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067));
+                R *out = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
+                VSTORE(out, VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(out)));
+                surface = VMUL(kd, cosine);
+                dcosine = VFMA(lit, kd, dcosine);
+            }
+            if (k->specular) { /* c_s f_s S */
+                const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
+                R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
+                VSTORE(out, VFMA(VMUL(lit, gloss), F(sigmoid)(raw), VLOAD(out)));
+                surface = VFMA(ks, gloss, surface);
+                dgloss = VFMA(lit, ks, dgloss);
+            }
+            dirradiance = VFMA(VMUL(g, factor), surface, dirradiance);
+            if (k->scattering) { /* c_sss f_sss */
+                const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s), kss = F(softplus)(raw);
+                R *out = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
+                const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
+                V dprofile;
+                if (c == 0 || k->per_channel_optics) {
+                    F(optics)(k, optics, c, s, unit);
+                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)), VFMA(unit[1], VSET(2), VSET(0.05)),
+                                            VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, d);
+                }
+                VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
+                dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
+                if (k->shadow_on_scattering) surface = VFMA(kss, profile, surface);
+                dprofile = VMUL(lamp, kss);
+                for (i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
+                if (k->per_channel_optics)
+                    for (i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
+                        VSTORE(doptics + (3 * i + c) * SSDGS__BLOCK + s, VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
+                        dunit[i] = VSET(0);
+                    }
+            }
+            dfactor = VFMA(VMUL(g, irradiance), surface, dfactor);
+        }
+        if (k->scattering) {
+            if (!k->per_channel_optics)
+                for (i = 0; i < 2; i++)
+                    VSTORE(doptics + i * SSDGS__BLOCK + s, VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
+            VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s, VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
+        }
+        if (k->shadow && !shadow) VSTORE(dvisibility + s, dfactor);
+        if (k->shadow && shadow) {
+            const V dlogit = VMUL(dfactor, VFNMA(factor, factor, factor)), v = VLOAD(visibility + s);
+            VSTORE(dshadow + s, dlogit);
+            if (k->residual_shadow) { /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
+                const VM inside = VAND(VLT(VSET(0.01), v), VLT(v, VSET(0.99)));
+                VSTORE(dvisibility + s, VSEL(inside, VDIV(dlogit, VMAX(VFNMA(v, v, v), VSET(1e-3))), VSET(0)));
+            } else {
+                VSTORE(dvisibility + s, VSET(0));
+            }
+        }
+        VSTORE(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, dirradiance);
+        VSTORE(drows + SSDGS__COSINE * SSDGS__BLOCK + s, dcosine);
+        VSTORE(drows + SSDGS__GLOSS * SSDGS__BLOCK + s, dgloss);
+    }
+}
+
+/* ==== >>image_kernels  transfer curve, SSIM, Adam ==== */
+
+/* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
+SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i += SSDGS__VW) {
+        const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
+        const VM linear = VLT(x, VSET(0.0031308));
+        const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
+        VSTORE(out + i, VSEL(linear, VMUL(x, VSET(12.92)), VSUB(power, VSET(0.055))));
+        if (slope) VSTORE(slope + i, VSEL(linear, VSET(12.92), VDIV(power, VMUL(safe, VSET(2.4)))));
+    }
+}
+
+SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i += SSDGS__VW) {
+        const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
+        const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
+        VSTORE(out + i, VSEL(VLT(x, VSET(0.04045)), VMUL(x, VSET(1 / 12.92)), power));
+    }
+}
+
+/* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of "black"; values
+   are stored less 1/2, which leaves variances as they are and keeps them from cancelling. Writes d(SSIM)/d(mean, E[i^2],
+   E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows of the stride. */
+SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch, R *d_mean, R *d_square,
+                           R *d_product, R sums[3]) {
+    const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
+    V total[3];
+    int x, t, m;
+    for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
+        V sum[5];
+        for (m = 0; m < 5; m++) sum[m] = zero;
+        for (t = -5; t <= 5; t++) {
+            const V w = VSET(ssdgs__window[t + 5]);
+            const V i = VLOAD(image + t * (ptrdiff_t)stride + x), j = VLOAD(reference + t * (ptrdiff_t)stride + x);
+            const V wi = VMUL(w, i), wj = VMUL(w, j);
+            sum[0] = VADD(sum[0], wi);
+            sum[1] = VADD(sum[1], wj);
+            sum[2] = VFMA(wi, i, sum[2]);
+            sum[3] = VFMA(wj, j, sum[3]);
+            sum[4] = VFMA(wi, j, sum[4]);
+        }
+        for (m = 0; m < 5; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+    }
+    for (m = 0; m < 3; m++) total[m] = zero;
+    for (x = 0; x < width; x += SSDGS__VW) {
+        V e[5], mi, mj, vi, vj, cov, a1, a2, b1, b2, inverse, ssim, by_cov, by_var, diff, by_mean;
+        const VM inside = VLT(VLOAD(ssdgs__count), VSET(width - x));
+        VM varies;
+        for (m = 0; m < 5; m++) {
+            const R *row = scratch + (size_t)m * stride + 16 + x;
+            e[m] = zero;
+            for (t = -5; t <= 5; t++) e[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), e[m]);
+        }
+        mi = VADD(e[0], half);
+        mj = VADD(e[1], half);
+        vi = VFNMA(e[0], e[0], e[2]);
+        varies = VLT(zero, vi);
+        vi = VMAX(vi, zero);
+        vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
+        cov = VFNMA(e[0], e[1], e[4]);
+        a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
+        a2 = VFMA(VSET(2), cov, c2);
+        b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
+        b2 = VADD(VADD(vi, vj), c2);
+        inverse = VDIV(VSET(1), VMUL(b1, b2));
+        ssim = VMUL(VMUL(a1, a2), inverse);
+        by_cov = VMUL(VMUL(VSET(2), a1), inverse);
+        by_var = VSEL(varies, VNEG(VDIV(ssim, b2)), zero);
+        by_mean = VMUL(VSET(2), VFNMA(VMUL(ssim, mi), VDIV(VSET(1), b1), VMUL(VMUL(mj, a2), inverse)));
+        by_mean = VFNMA(by_cov, e[1], VFNMA(VMUL(VSET(2), by_var), e[0], by_mean));
+        VSTORE(d_mean + x, VSEL(inside, by_mean, zero));
+        VSTORE(d_square + x, VSEL(inside, by_var, zero));
+        VSTORE(d_product + x, VSEL(inside, by_cov, zero));
+        diff = VSEL(inside, VSUB(VLOAD(image + x), VLOAD(reference + x)), zero);
+        total[0] = VADD(total[0], VSEL(inside, ssim, zero));
+        total[1] = VADD(total[1], VABS(diff));
+        total[2] = VFMA(diff, diff, total[2]);
+    }
+    for (m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
+}
+
+/* gradient = by_l1 sign(i - j) + by_ssim (B[d_mean] + 2 i B[d_square] + j B[d_product]), B the window again. */
+SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int width, size_t stride, R *scratch, const R *d_mean,
+                                    const R *d_square, const R *d_product, R by_l1, R by_ssim, R *gradient) {
+    int x, t, m;
+    for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
+        V sum[3];
+        for (m = 0; m < 3; m++) sum[m] = VSET(0);
+        for (t = -5; t <= 5; t++) {
+            const V w = VSET(ssdgs__window[t + 5]);
+            sum[0] = VFMA(w, VLOAD(d_mean + t * (ptrdiff_t)stride + x), sum[0]);
+            sum[1] = VFMA(w, VLOAD(d_square + t * (ptrdiff_t)stride + x), sum[1]);
+            sum[2] = VFMA(w, VLOAD(d_product + t * (ptrdiff_t)stride + x), sum[2]);
+        }
+        for (m = 0; m < 3; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+    }
+    for (x = 0; x < width; x += SSDGS__VW) {
+        const V i = VLOAD(image + x), j = VLOAD(reference + x), diff = VSUB(i, j), zero = VSET(0);
+        V b[3], g;
+        for (m = 0; m < 3; m++) {
+            const R *row = scratch + (size_t)m * stride + 16 + x;
+            b[m] = zero;
+            for (t = -5; t <= 5; t++) b[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), b[m]);
+        }
+        g = VMUL(VSET(by_ssim), VFMA(VMUL(VSET(2), i), b[1], VFMA(j, b[2], b[0])));
+        g = VADD(g, VSEL(VLT(zero, diff), VSET(by_l1), VSEL(VLT(diff, zero), VSET(-by_l1), zero)));
+        VSTORE(gradient + x, g);
+    }
+}
+
+/* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
+   Gradients below 1e-18 count as 0: their squares are not representable. */
+SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
+    V g = VLOAD(gradient), m, v;
+    g = VSEL(VLT(VABS(g), VSET(1e-18)), VSET(0), g);
+    m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
+    v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
+    VSTORE(mean, m);
+    VSTORE(square, v);
+    m = VMUL(VSET(rate), VMUL(m, VSET(correct_mean)));
+    v = VADD(VSQRT(VMUL(v, VSET(correct_square))), VSET(1e-15));
+    VSTORE(parameter, VSUB(VLOAD(parameter), VDIV(m, v)));
+}
+
+SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean, R correct_square) {
+    R tail[4][SSDGS__VW];
+    size_t i, l;
+    for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW)
+        F(adam_lanes)(parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square);
+    if (i == n) return;
+    for (l = 0; l < SSDGS__VW; l++) {
+        tail[0][l] = i + l < n ? parameter[i + l] : 0;
+        tail[1][l] = i + l < n ? gradient[i + l] : 0;
+        tail[2][l] = i + l < n ? mean[i + l] : 0;
+        tail[3][l] = i + l < n ? square[i + l] : 0;
+    }
+    F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate, correct_mean, correct_square);
+    for (l = 0; i + l < n; l++) {
+        parameter[i + l] = tail[0][l];
+        mean[i + l] = tail[2][l];
+        square[i + l] = tail[3][l];
+    }
+}
+
+static const ssdgs__kernels F(kernels) = {
+    F(project), F(project_backward), F(row_spans), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
+    F(dense), F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward), F(dipole_profile),
+    F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(adam)
+};
+
+#undef SSDGS__NAME
+#undef SSDGS__TARGET
+#undef R
+#undef V
+#undef VM
+#undef SSDGS__VW
+#undef VLOAD
+#undef VSTORE
+#undef VSET
+#undef VADD
+#undef VSUB
+#undef VMUL
+#undef VDIV
+#undef VFMA
+#undef VFNMA
+#undef VMIN
+#undef VMAX
+#undef VSQRT
+#undef VLT
+#undef VGE
+#undef VAND
+#undef VANY
+#undef VSEL
+#undef VROUND
+#undef VPOW2
+#undef VEXPONENT
+#undef VEXP
+#undef VEXP2
+#undef VLOG
+#undef VNEG
+#undef VABS
+#undef VDOT3
+#undef F
+#undef SSDGS__FN
+#undef SSDGS__FI
+#undef SSDGS__NV
+#endif /* SSDGS__ISA */
+
+/*
+MIT License
+
+Copyright (c) 2026 the ssdgs.h authors
+
+Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated documentation
+files (the "Software"), to deal in the Software without restriction, including without limitation the rights to use, copy,
+modify, merge, publish, distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the Software
+is furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in all copies or substantial portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES
+OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE
+LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR
+IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/

@@ -1,0 +1,3 @@
+/* One of two translation units: the one with the implementation. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"

@@ -1,0 +1,707 @@
+/* Every stage against the golden files, on every instruction set; built again in double (real64), where the bounds are 1e-9. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+#define BLOCK SSDGS__BLOCK
+static const int real64 = sizeof(ssdgs_real) == 8;
+static gold_file file;
+static ssdgs_context *context;
+
+static double gradient_bound(void) { return real64 ? 1e-9 : 2e-4; }
+static double value_bound(void) { return real64 ? 1e-9 : 2e-5; }
+
+static ssdgs_real *reals(size_t n) { return (ssdgs_real *)calloc(n + 64, sizeof(ssdgs_real)); }
+
+static ssdgs_real *gold_reals(const char *name) {
+    size_t n, i;
+    const double *from = gold(&file, name, &n);
+    ssdgs_real *to = reals(n);
+    for (i = 0; i < n; i++) to[i] = (ssdgs_real)from[i];
+    return to;
+}
+
+/* (n, width) rows of a golden array into planes of a stride. */
+static void to_planes(const char *name, ssdgs_real *planes, size_t stride) {
+    const gold_array *a = gold_find(&file, name);
+    size_t i, c, width = a->count / a->dims[0];
+    for (i = 0; i < a->dims[0]; i++)
+        for (c = 0; c < width; c++) planes[c * stride + i] = (ssdgs_real)a->data[i * width + c];
+}
+
+static void check_planes(const char *name, const ssdgs_real *planes, size_t stride, double bound) {
+    const gold_array *a = gold_find(&file, name);
+    size_t i, c, width = a->count / a->dims[0];
+    double *rows = (double *)malloc(a->count * sizeof *rows);
+    for (i = 0; i < a->dims[0]; i++)
+        for (c = 0; c < width; c++) rows[i * width + c] = (double)planes[c * stride + i];
+    CHECK_L2(rows, a->data, a->count, bound, name);
+    free(rows);
+}
+
+/* (h, w, c) golden image against planes. */
+static void check_image(const char *name, const ssdgs_real *planes, double bound) {
+    const gold_array *a = gold_find(&file, name);
+    const size_t pixels = (size_t)a->dims[0] * a->dims[1], channels = a->dims[2];
+    double *rows = (double *)malloc(a->count * sizeof *rows);
+    size_t i;
+    for (i = 0; i < a->count; i++) rows[i] = (double)planes[pixels * (i % channels) + i / channels];
+    CHECK_NEAR(rows, a->data, a->count, bound, 0, name);
+    free(rows);
+}
+
+static void gold_planes(const char *name, ssdgs_real *planes) {
+    const gold_array *a = gold_find(&file, name);
+    const size_t pixels = (size_t)a->dims[0] * a->dims[1], channels = a->dims[2];
+    size_t i;
+    for (i = 0; i < a->count; i++) planes[pixels * (i % channels) + i / channels] = (ssdgs_real)a->data[i];
+}
+
+static ssdgs_camera gold_camera(void) {
+    const double *view = gold(&file, "view", NULL), *intrinsics = gold(&file, "intrinsics", NULL), *size = gold(&file, "size", NULL);
+    ssdgs_camera c;
+    int i;
+    memset(&c, 0, sizeof c);
+    for (i = 0; i < 12; i++) c.view[i] = (ssdgs_real)view[i];
+    c.fx = (ssdgs_real)intrinsics[0];
+    c.fy = (ssdgs_real)intrinsics[1];
+    c.cx = (ssdgs_real)intrinsics[2];
+    c.cy = (ssdgs_real)intrinsics[3];
+    c.width = (int)size[0];
+    c.height = (int)size[1];
+    return c;
+}
+
+static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
+    ssdgs_model *model = NULL;
+    ssdgs_model_view view;
+    if (!CHECK(!ssdgs_model_create(context, settings, (int)gold_find(&file, "mean")->dims[0], &model))) exit(1);
+    view = ssdgs_model_get(model);
+    to_planes("mean", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
+    to_planes("quat", view.gaussians + SSDGS_ROTATION * view.stride, view.stride);
+    to_planes("log_scale", view.gaussians + SSDGS_LOG_SCALE * view.stride, view.stride);
+    to_planes("opacity_logit", view.gaussians + SSDGS_OPACITY * view.stride, view.stride);
+    return model;
+}
+
+static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count, const double *background) {
+    ssdgs_render_options options = ssdgs_render_options_default();
+    int i;
+    options.stop = 0;
+    for (i = 0; i < 3 && background; i++) options.background[i] = (ssdgs_real)background[i];
+    if (!CHECK(!ssdgs__frame_begin(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
+}
+
+static void test_raster(void) {
+    ssdgs_model *model;
+    ssdgs_camera camera;
+    ssdgs_frame frame;
+    ssdgs_real *color, *image;
+    double *out, expected[16];
+    size_t n, i, pixels;
+    int c;
+    if (!gold_open(&file, "raster")) return;
+    model = gold_geometry(NULL);
+    camera = gold_camera();
+    n = (size_t)model->count;
+    pixels = (size_t)camera.width * (size_t)camera.height;
+    begin(&frame, model, &camera, NULL, 0, gold(&file, "background", NULL));
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
+    color = gold_reals("color");
+    for (i = 0; i < n; i++)
+        for (c = 0; c < 3; c++) frame.color[4 * i + (size_t)c] = color[3 * i + (size_t)c];
+    CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
+    out = (double *)malloc(n * 8 * sizeof *out);
+    for (i = 0; i < n; i++) {
+        const ssdgs_real *r = frame.views[0].record + 8 * i;
+        out[2 * i] = (double)r[0];
+        out[2 * i + 1] = (double)r[1];
+        out[2 * n + 4 * i] = (double)r[2] * -2 * log(2);
+        out[2 * n + 4 * i + 1] = out[2 * n + 4 * i + 2] = (double)r[3] * -log(2);
+        out[2 * n + 4 * i + 3] = (double)r[4] * -2 * log(2);
+        out[6 * n + i] = (double)frame.views[0].depth[i];
+    }
+    CHECK_NEAR(out, gold(&file, "mean2d", NULL), 2 * n, value_bound(), 1e-6, "raster: mean2d");
+    CHECK_NEAR(out + 2 * n, gold(&file, "conic", NULL), 4 * n, value_bound(), 1e-5, "raster: conic");
+    CHECK_NEAR(out + 6 * n, gold(&file, "depth", NULL), n, value_bound(), 0, "raster: depth");
+    image = reals(pixels * 3);
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < pixels; i++)
+            image[pixels * (size_t)c + i] = frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
+    check_image("image", image, value_bound());
+    CHECK_NEAR(frame.transmittance, gold(&file, "transmittance", NULL), pixels, value_bound(), 0, "raster: transmittance");
+    gold_planes("grad_image", frame.pixel_gradient);
+    CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD));
+    memset(frame.gradient, 0, frame.gaussians.stride * SSDGS_CHANNELS * sizeof(ssdgs_real));
+    CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_PROJECT_BACKWARD));
+    for (i = 0; i < n; i++) {
+        out[i] = (double)frame.splat_gradient[SSDGS_SPLAT_GRADIENTS * i + 6];
+        for (c = 0; c < 3; c++) out[n + 3 * i + (size_t)c] = (double)frame.color_gradient[4 * i + (size_t)c];
+    }
+    CHECK_L2(out, gold(&file, "blend_weight", NULL), n, gradient_bound(), "raster: blend_weight");
+    CHECK_L2(out + n, gold(&file, "grad_color", NULL), 3 * n, gradient_bound(), "raster: grad_color");
+    check_planes("grad_mean", frame.gradient + SSDGS_POSITION * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
+    check_planes("grad_quat", frame.gradient + SSDGS_ROTATION * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
+    check_planes("grad_log_scale", frame.gradient + SSDGS_LOG_SCALE * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
+    check_planes("grad_opacity_logit", frame.gradient + SSDGS_OPACITY * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
+    memcpy(expected, gold(&file, "grad_view", NULL), sizeof expected);
+    CHECK_L2(frame.view_gradient, expected, 12, gradient_bound(), "raster: grad_view");
+    free(out);
+    free(color);
+    free(image);
+    ssdgs_model_destroy(model);
+    gold_close(&file);
+}
+
+static void test_light_pass(const char *name) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_light light;
+    ssdgs_camera camera;
+    ssdgs_frame frame;
+    ssdgs_model *model;
+    ssdgs_splat_view *v;
+    const double *at;
+    size_t n;
+    int i;
+    if (!gold_open(&file, name)) return;
+    settings.light_bias = (ssdgs_real)gold(&file, "bias", NULL)[0];
+    settings.light_blur = SSDGS_BLUR_ADD;
+    model = gold_geometry(&settings);
+    camera = gold_camera();
+    at = gold(&file, "light", NULL);
+    memset(&light, 0, sizeof light);
+    for (i = 0; i < 3; i++) {
+        light.position[i] = (ssdgs_real)at[i];
+        light.intensity[i] = 1;
+    }
+    begin(&frame, model, &camera, &light, 1, NULL);
+    frame.view_count = 2; /* the file's own light camera in place of the fitted one */
+    v = frame.views + 1;
+    memcpy(v->view, camera.view, sizeof v->view);
+    v->orthographic = 0;
+    v->by_distance = 1;
+    v->width = camera.width;
+    v->height = camera.height;
+    v->fx = camera.fx;
+    v->fy = camera.fy;
+    v->cx = camera.cx;
+    v->cy = camera.cy;
+    v->near_plane = (ssdgs_real)0.01;
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
+    n = (size_t)model->count;
+    CHECK_NEAR(v->depth, gold(&file, "distance", NULL), n, value_bound(), 0, "light pass: distance");
+    CHECK_NEAR(frame.visibility, gold(&file, "visibility", NULL), n, value_bound(), 0, "light pass: visibility");
+    CHECK_NEAR(frame.depth_cue, gold(&file, "depth_cue", NULL), n, value_bound(), 0, "light pass: depth cue");
+    CHECK_NEAR(frame.flux, gold(&file, "flux", NULL), n, value_bound() * 1e-2, value_bound(), "light pass: flux");
+    ssdgs_model_destroy(model);
+    gold_close(&file);
+}
+
+/* Points through reflect and reflect_backward, in blocks. objective: given the rows of a block, fills their gradients. */
+typedef struct asg_run {
+    ssdgs_model *model;
+    ssdgs__lighting k;
+    ssdgs_real *gauss, *dgauss, *rows, *drows; /* planes of a stride n padded to whole blocks */
+    ssdgs_real sums[SSDGS__LANE_SUMS];
+    size_t n, stride;
+} asg_run;
+
+static void asg_forward(asg_run *run) {
+    size_t at;
+    for (at = 0; at < run->stride; at += BLOCK) context->k->reflect(&run->k, run->gauss + at * SSDGS_CHANNELS, run->rows + at * SSDGS__ROWS);
+}
+
+/* Adds to dgauss and sums. */
+static void asg_backward(asg_run *run) {
+    ssdgs_real *lanes = reals(SSDGS__LANE_SUMS * 16);
+    size_t at;
+    for (at = 0; at < run->stride; at += BLOCK)
+        context->k->reflect_backward(&run->k, run->gauss + at * SSDGS_CHANNELS, run->drows + at * SSDGS__ROWS, run->dgauss + at * SSDGS_CHANNELS, lanes);
+    for (at = 0; at < SSDGS__LANE_SUMS * 16; at++) run->sums[at / 16] += lanes[at];
+    free(lanes);
+}
+
+static ssdgs_real *row_of(ssdgs_real *blocks, int rows, int row, size_t point) {
+    return blocks + (point / BLOCK * (size_t)rows + (size_t)row) * BLOCK + point % BLOCK;
+}
+
+static void check_points(asg_run *run, const char *name, int channel, int width, double bound) {
+    double *d = (double *)malloc(run->n * (size_t)width * sizeof *d);
+    size_t i;
+    for (i = 0; i < run->n * (size_t)width; i++) d[i] = (double)*row_of(run->dgauss, SSDGS_CHANNELS, channel + (int)(i % (size_t)width), i / (size_t)width);
+    CHECK_L2(d, gold(&file, name, NULL), run->n * (size_t)width, bound, name);
+    free(d);
+}
+
+static void test_asg(const char *name, int angular) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_light lamp;
+    ssdgs_camera camera;
+    ssdgs_frame frame;
+    ssdgs_model_view view;
+    asg_run run;
+    double *value;
+    size_t i, first[SSDGS__GLOBAL_GROUPS + 1];
+    int c;
+    if (!gold_open(&file, name)) return;
+    memset(&run, 0, sizeof run);
+    settings.asg = angular ? SSDGS_ASG_ANGULAR : SSDGS_ASG_GEOMETRIC;
+    run.n = gold_find(&file, "position")->dims[0];
+    run.stride = (run.n + BLOCK - 1) / BLOCK * BLOCK;
+    if (!CHECK(!ssdgs_model_create(context, &settings, (int)run.n, &run.model))) exit(1);
+    view = ssdgs_model_get(run.model);
+    to_planes("position", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
+    to_planes("frame_quat", view.gaussians + SSDGS_FRAME * view.stride, view.stride);
+    to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * view.stride, view.stride);
+    for (i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
+    for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, angular ? "asg_lambda_mu_raw" : "asg_log_lambda_mu", NULL)[i];
+    for (i = 0; i < 8 && angular; i++) view.asg_sigma[i] = (ssdgs_real)gold(&file, "asg_sigma_raw", NULL)[i];
+    memset(&lamp, 0, sizeof lamp);
+    memset(&camera, 0, sizeof camera);
+    camera.width = camera.height = 8;
+    camera.fx = camera.fy = 8;
+    for (c = 0; c < 3; c++) {
+        lamp.position[c] = (ssdgs_real)gold(&file, "light", NULL)[c];
+        lamp.intensity[c] = 1;
+        camera.view[4 * c + c] = 1;
+        camera.view[4 * c + 3] = (ssdgs_real)-gold(&file, "camera", NULL)[c];
+    }
+    begin(&frame, run.model, &camera, &lamp, 1, NULL);
+    run.k = ssdgs__lighting_of(&frame, 0);
+    run.gauss = reals(run.stride * SSDGS_CHANNELS);
+    run.dgauss = reals(run.stride * SSDGS_CHANNELS);
+    run.rows = reals(run.stride * SSDGS__ROWS);
+    run.drows = reals(run.stride * SSDGS__ROWS);
+    value = (double *)malloc(3 * run.n * sizeof *value);
+    for (i = 0; i < run.stride; i++)
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            *row_of(run.gauss, SSDGS_CHANNELS, c, i) = view.gaussians[(size_t)c * view.stride + (i < run.n ? i : run.n - 1)];
+    if (angular) {
+        /* The file has D without Fresnel: D = f_s / F, dD = (df_s - D dF) / F. A constant lobe gives F and its gradient. */
+        asg_run constant = run;
+        double bound = gradient_bound();
+        memset(constant.k.basis, 0, sizeof constant.k.basis);
+        constant.k.angular = 0;
+        constant.dgauss = reals(run.stride * SSDGS_CHANNELS);
+        constant.rows = reals(run.stride * SSDGS__ROWS);
+        constant.drows = reals(run.stride * SSDGS__ROWS);
+        asg_forward(&run);
+        asg_forward(&constant);
+        for (i = 0; i < run.n; i++) {
+            double weights = 0, fresnel, d;
+            for (c = 0; c < 8; c++) weights += log1p(exp((double)*row_of(run.gauss, SSDGS_CHANNELS, SSDGS_ASG_WEIGHT + c, i)));
+            fresnel = (double)*row_of(constant.rows, SSDGS__ROWS, SSDGS__GLOSS, i) / weights;
+            d = value[i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__GLOSS, i) / fresnel;
+            *row_of(run.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(gold(&file, "grad_D", NULL)[i] / fresnel);
+            *row_of(constant.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(-gold(&file, "grad_D", NULL)[i] * d / (fresnel * weights));
+        }
+        CHECK_NEAR(value, gold(&file, "D", NULL), run.n, value_bound(), real64 ? 0 : 2e-5, "asg_angular: D");
+        asg_backward(&run);
+        check_points(&run, "grad_asg_weight_raw", SSDGS_ASG_WEIGHT, 8, bound);
+        constant.sums[0] = 0;
+        asg_backward(&constant);
+        for (i = 0; i < run.stride * SSDGS_CHANNELS; i++) run.dgauss[i] += constant.dgauss[i];
+        free(constant.dgauss);
+        free(constant.rows);
+        free(constant.drows);
+    } else {
+        asg_forward(&run);
+        for (i = 0; i < run.n; i++) { /* the file's objective is (f_s, f_d) / d^2 against the given gradients */
+            const double fs = value[i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__GLOSS, i);
+            const double fd = value[run.n + i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__COSINE, i);
+            const double e = value[2 * run.n + i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__IRRADIANCE, i);
+            const double dfs = gold(&file, "grad_f_specular", NULL)[i], dfd = gold(&file, "grad_f_diffuse", NULL)[i];
+            *row_of(run.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(dfs * e);
+            *row_of(run.drows, SSDGS__ROWS, SSDGS__COSINE, i) = (ssdgs_real)(dfd * e);
+            *row_of(run.drows, SSDGS__ROWS, SSDGS__IRRADIANCE, i) = (ssdgs_real)(dfs * fs + dfd * fd);
+        }
+        CHECK_NEAR(value, gold(&file, "f_specular", NULL), run.n, value_bound(), 0, "shading: f_specular");
+        CHECK_NEAR(value + run.n, gold(&file, "f_diffuse", NULL), run.n, value_bound(), 0, "shading: f_diffuse");
+        CHECK_NEAR(value + 2 * run.n, gold(&file, "inv_dist2", NULL), run.n, value_bound(), 0, "shading: 1 / d^2");
+        asg_backward(&run);
+        check_points(&run, "grad_asg_weight_raw", SSDGS_ASG_WEIGHT, 8, gradient_bound());
+        CHECK_L2(run.sums, gold(&file, "grad_light", NULL), 3, gradient_bound(), "shading: grad_light");
+        CHECK_L2(run.sums + 3, gold(&file, "grad_camera", NULL), 3, gradient_bound(), "shading: grad_camera");
+    }
+    check_points(&run, "grad_position", SSDGS_POSITION, 3, gradient_bound());
+    check_points(&run, "grad_frame_quat", SSDGS_FRAME, 4, gradient_bound());
+    ssdgs__asg_backward(&frame, run.sums + 6);
+    ssdgs__global_groups(&settings, first);
+    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(), "grad_asg_quat");
+    CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SHARPNESS], gold(&file, angular ? "grad_asg_lambda_mu_raw" : "grad_asg_log_lambda_mu", NULL), 16,
+             gradient_bound(), "grad of the ASG sharpness");
+    if (angular) CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SIGMA], gold(&file, "grad_asg_sigma_raw", NULL), 8, gradient_bound(), "grad_asg_sigma_raw");
+    free(run.gauss);
+    free(run.dgauss);
+    free(run.rows);
+    free(run.drows);
+    free(value);
+    ssdgs_model_destroy(run.model);
+    gold_close(&file);
+}
+
+static void test_dipole(void) {
+    static const char *const forms[4] = {"jensen", "printed", "released", "burley"};
+    static const char *const by[3] = {"sigma_s", "sigma_a", "r"};
+    ssdgs_real *ss, *sa, *r, *f, *d;
+    const double *eta;
+    size_t n, i;
+    int form, j;
+    char name[64];
+    if (!gold_open(&file, "dipole")) return;
+    ss = gold_reals("sigma_s");
+    sa = gold_reals("sigma_a");
+    r = gold_reals("r");
+    eta = gold(&file, "eta", &n);
+    f = reals(n);
+    d = reals(3 * n);
+    for (form = 0; form < 4; form++) {
+        for (i = 0; i < n; i++) { /* eta may differ from value to value: each in a vector of its own */
+            const double e = eta[i], fdr = -1.440 / (e * e) + 0.710 / e + 0.668 + 0.0636 * e;
+            ssdgs_real in[3][16], out[4][16], derivative[48];
+            for (j = 0; j < 16; j++) {
+                in[0][j] = ss[i];
+                in[1][j] = sa[i];
+                in[2][j] = r[i];
+            }
+            context->k->dipole_profile(form, in[0], in[1], in[2], (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr)), out[0], derivative, 16);
+            f[i] = out[0][0];
+            for (j = 0; j < 3; j++) d[(size_t)j * n + i] = derivative[16 * j];
+        }
+        CHECK_NEAR(f, gold(&file, forms[form], NULL), n, real64 ? 1e-12 : 1e-9, real64 ? 1e-9 : 3e-5, forms[form]);
+        for (j = 0; j < 3; j++) {
+            snprintf(name, sizeof name, "%s_d_%s", forms[form], by[j]);
+            CHECK_NEAR(d + (size_t)j * n, gold(&file, name, NULL), n, real64 ? 1e-11 : 1e-8, real64 ? 1e-8 : 3e-4, name);
+        }
+    }
+    free(ss);
+    free(sa);
+    free(r);
+    free(f);
+    free(d);
+    gold_close(&file);
+}
+
+/* A network with its inputs and its head, in one block of 64. */
+static void test_network(const char *name, int shadow, int residual, int defaults) {
+    ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
+    ssdgs_frame frame;
+    ssdgs__block_layout l;
+    ssdgs__lighting k;
+    ssdgs_real *memory, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
+    const char *prefix = shadow && residual ? "res_" : "";
+    char key[64];
+    double *out;
+    int s, c, layers;
+    const int *sizes;
+    size_t count;
+    if (!gold_open(&file, name)) return;
+    settings.residual_shadow = residual;
+    settings.shadow_width = 32;
+    settings.shadow_layers = 4;
+    memset(&frame, 0, sizeof frame);
+    frame.context = context;
+    frame.settings = settings;
+    frame.terms = SSDGS_ALL_TERMS;
+    frame.light_count = 1;
+    if (defaults || residual) frame.settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
+    l = ssdgs__layout(&frame);
+    memory = reals(l.size);
+    gauss = memory + l.gauss;
+    outs = memory + l.outs;
+    part = memory + l.lights;
+    to_planes("x", gauss + SSDGS_POSITION * BLOCK, BLOCK);
+    to_planes("material", gauss + SSDGS_MATERIAL * BLOCK, BLOCK);
+    to_planes("wi", part + SSDGS__WI * BLOCK, BLOCK);
+    if (shadow) to_planes("visibility", part + l.visibility, BLOCK);
+    if (!shadow) {
+        to_planes("wo", part + SSDGS__WO * BLOCK, BLOCK);
+        to_planes("normal", part + SSDGS__NORMAL * BLOCK, BLOCK);
+        if (defaults) to_planes("depth_cue", part + l.cue, BLOCK);
+    }
+    for (s = 0; s < BLOCK; s++) { /* unit irradiance, c = 1 */
+        part[SSDGS__IRRADIANCE * BLOCK + s] = 1;
+        part[SSDGS__COSINE * BLOCK + s] = 1;
+        for (c = 0; c < 3; c++) gauss[(SSDGS_SCATTERING + c) * BLOCK + s] = gauss[(SSDGS_DIFFUSE + c) * BLOCK + s] = (ssdgs_real)0.54132485461291811;
+    }
+    weights = gold_reals("weights");
+    gold(&file, "weights", &count);
+    memset(&k, 0, sizeof k);
+    for (c = 0; c < 3; c++) k.intensity[c] = 1;
+    k.dipole = SSDGS_DIPOLE_JENSEN;
+    k.scattering = !shadow;
+    k.shadow = k.diffuse = shadow;
+    k.residual_shadow = residual;
+    k.per_channel_optics = settings.per_channel_optics;
+    {
+        const double eta = 1.3, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+        k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
+    }
+    sizes = shadow ? l.shadow : l.scattering;
+    layers = shadow ? l.shadow_layers : l.scattering_layers;
+    CHECK((size_t)sizes[0] == (size_t)gold(&file, "layer_sizes", NULL)[0]);
+    {
+        ssdgs_real *activations = part + (shadow ? l.shadow_at : l.scattering_at), *head = activations + BLOCK * (ssdgs__activation_rows(sizes, layers) - (size_t)sizes[layers]);
+        ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, activations);
+        ssdgs__network_forward(context->k, sizes, layers, weights, activations);
+        context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, outs);
+        out = (double *)malloc(BLOCK * 3 * sizeof *out);
+        memset(one, 0, sizeof one);
+        if (shadow) {
+            for (s = 0; s < BLOCK; s++) out[s] = (double)outs[9 * BLOCK + s];
+            snprintf(key, sizeof key, "%sS", prefix);
+            CHECK_NEAR(out, gold(&file, key, NULL), BLOCK, value_bound(), 0, key);
+            for (s = 0; s < BLOCK; s++) one[s] = (ssdgs_real)(gold(&file, "grad_S", NULL)[s] * 3.14159265358979323846);
+        } else {
+            const int per = defaults ? 3 : 1;
+            for (s = 0; s < BLOCK; s++)
+                for (c = 0; c < per; c++) out[s * per + c] = (double)outs[(6 + c) * BLOCK + s];
+            CHECK_NEAR(out, gold(&file, "f_sss", NULL), BLOCK * per, real64 ? 1e-12 : 2e-9, real64 ? 1e-9 : 2e-5, name);
+            for (s = 0; s < BLOCK; s++)
+                for (c = 0; c < per; c++) one[c * BLOCK + s] = (ssdgs_real)gold(&file, "grad_f", NULL)[s * per + c];
+        }
+        dgauss = reals(SSDGS_CHANNELS * BLOCK);
+        drows = reals(SSDGS__ROWS * BLOCK);
+        dnet = reals((size_t)(l.widest + 1) * BLOCK);
+        spare = reals((size_t)(l.widest + 1) * BLOCK);
+        transposed = reals((size_t)(l.widest + 16) * BLOCK);
+        dvisibility = reals(BLOCK);
+        dother = reals((size_t)(l.widest + 1) * BLOCK);
+        dweights = reals(count + 64);
+        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, dgauss, drows, shadow ? dnet : dother,
+                                    shadow ? dother : dnet, dvisibility);
+        memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
+        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, activations, dnet, spare, transposed, dweights);
+        ssdgs__encode_inputs_backward(&frame, &l, shadow, activations, dinputs, dgauss, drows, dvisibility);
+    }
+    snprintf(key, sizeof key, "%sgrad_weights", prefix);
+    CHECK_L2(dweights, gold(&file, key, NULL), count, gradient_bound(), key);
+    snprintf(key, sizeof key, "%sgrad_x", prefix);
+    check_planes(key, dgauss + SSDGS_POSITION * BLOCK, BLOCK, gradient_bound());
+    snprintf(key, sizeof key, "%sgrad_material", prefix);
+    check_planes(key, dgauss + SSDGS_MATERIAL * BLOCK, BLOCK, gradient_bound());
+    snprintf(key, sizeof key, "%sgrad_wi", prefix);
+    check_planes(key, drows + SSDGS__WI * BLOCK, BLOCK, gradient_bound());
+    if (shadow) {
+        snprintf(key, sizeof key, "%sgrad_visibility", prefix);
+        check_planes(key, dvisibility, BLOCK, gradient_bound());
+    } else {
+        check_planes("grad_wo", drows + SSDGS__WO * BLOCK, BLOCK, gradient_bound());
+        check_planes("grad_normal", drows + SSDGS__NORMAL * BLOCK, BLOCK, gradient_bound());
+    }
+    free(memory);
+    free(weights);
+    free(out);
+    free(dgauss);
+    free(drows);
+    free(dnet);
+    free(spare);
+    free(transposed);
+    free(dvisibility);
+    free(dother);
+    free(dweights);
+    gold_close(&file);
+}
+
+static void test_loss(void) {
+    ssdgs_real *image, *target, *gradient;
+    ssdgs__buffer memory = {0, 0};
+    ssdgs__loss_values values;
+    const gold_array *a;
+    double *rows, got[4], want[4];
+    size_t pixels, i;
+    if (!gold_open(&file, "loss")) return;
+    a = gold_find(&file, "image");
+    pixels = (size_t)a->dims[0] * a->dims[1];
+    image = reals(3 * pixels);
+    target = reals(3 * pixels);
+    gradient = reals(3 * pixels);
+    gold_planes("image", image);
+    gold_planes("target", target);
+    CHECK(!ssdgs__loss(context, &memory, image, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient, &values));
+    got[0] = values.l1;
+    got[1] = values.ssim;
+    got[2] = values.loss;
+    got[3] = ssdgs__psnr(values.mse);
+    want[0] = gold(&file, "l1", NULL)[0];
+    want[1] = gold(&file, "ssim", NULL)[0];
+    want[2] = gold(&file, "loss", NULL)[0];
+    want[3] = gold(&file, "psnr", NULL)[0];
+    CHECK_NEAR(got, want, 4, real64 ? 1e-10 : 1e-6, real64 ? 1e-9 : 1e-6, "loss: l1, ssim, loss, psnr");
+    rows = (double *)malloc(3 * pixels * sizeof *rows);
+    for (i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
+    CHECK_L2(rows, gold(&file, "grad_image", NULL), 3 * pixels, gradient_bound(), "loss: grad_image");
+    free(rows);
+    free(image);
+    free(target);
+    free(gradient);
+    ssdgs__release(context, memory.memory);
+    gold_close(&file);
+}
+
+static void test_adam(void) {
+    ssdgs_real *p, *g, *m, *v;
+    size_t n, steps, t;
+    ssdgs_real rate;
+    if (!gold_open(&file, "adam")) return;
+    p = gold_reals("start");
+    g = gold_reals("grads");
+    gold(&file, "start", &n);
+    steps = gold_find(&file, "grads")->dims[0];
+    m = reals(n);
+    v = reals(n);
+    rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
+    for (t = 0; t < steps; t++) {
+        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1), ssdgs__bias_correction(0.999, (int)t + 1));
+        CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6, "adam: trajectory");
+    }
+    free(p);
+    free(g);
+    free(m);
+    free(v);
+    gold_close(&file);
+}
+
+/* All four terms, both networks, the loss, and back to every parameter, the light and the pose. */
+static void test_full(const char *name, int defaults) {
+    ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
+    ssdgs_model *model;
+    ssdgs_model_view view;
+    ssdgs_camera camera;
+    ssdgs_light light;
+    ssdgs_photo photo;
+    ssdgs_frame frame;
+    ssdgs__buffer memory = {0, 0};
+    ssdgs__loss_values values;
+    ssdgs_real *image, *slope, *target;
+    double *rows, pose[6], zero[9], loss[1];
+    size_t n, i, pixels, first[SSDGS__GLOBAL_GROUPS + 1], stride;
+    int c;
+    if (!gold_open(&file, name)) return;
+    if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
+    model = gold_geometry(&settings);
+    view = ssdgs_model_get(model);
+    stride = view.stride;
+    to_planes("kd_raw", view.gaussians + SSDGS_DIFFUSE * stride, stride);
+    to_planes("ks_raw", view.gaussians + SSDGS_SPECULAR * stride, stride);
+    to_planes("ksss_raw", view.gaussians + SSDGS_SCATTERING * stride, stride);
+    to_planes("frame_quat", view.gaussians + SSDGS_FRAME * stride, stride);
+    to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * stride, stride);
+    to_planes("material", view.gaussians + SSDGS_MATERIAL * stride, stride);
+    for (i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
+    for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
+    CHECK(gold_find(&file, "sss_weights")->count == view.scattering_count);
+    CHECK(gold_find(&file, "shadow_weights")->count == view.shadow_count);
+    for (i = 0; i < view.scattering_count; i++) view.scattering[i] = (ssdgs_real)gold(&file, "sss_weights", NULL)[i];
+    for (i = 0; i < view.shadow_count; i++) view.shadow[i] = (ssdgs_real)gold(&file, "shadow_weights", NULL)[i];
+    camera = gold_camera();
+    n = (size_t)model->count;
+    pixels = (size_t)camera.width * (size_t)camera.height;
+    memset(&light, 0, sizeof light);
+    for (c = 0; c < 3; c++) {
+        light.position[c] = (ssdgs_real)gold(&file, "light", NULL)[c];
+        light.intensity[c] = 1;
+    }
+    begin(&frame, model, &camera, &light, 1, gold(&file, "background", NULL));
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
+    for (i = 0; i < n; i++) { /* given and fixed; every Gaussian is compared, so every one is shaded */
+        frame.visibility[i] = (ssdgs_real)gold(&file, "visibility", NULL)[i];
+        frame.depth_cue[i] = (ssdgs_real)gold(&file, "depth_cue", NULL)[i];
+        frame.seen[i] = 1;
+    }
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
+    rows = (double *)malloc((3 * pixels + 3 * n) * sizeof *rows);
+#define COMPONENT(array, golden, width)                                                                                          \
+    do {                                                                                                                         \
+        for (i = 0; i < n * (width); i++) rows[i] = (double)frame.array[4 * (i / (width)) + i % (width)];                        \
+        CHECK_NEAR(rows, gold(&file, golden, NULL), n * (width), value_bound(), 0, golden);                                      \
+    } while (0)
+    COMPONENT(color, "color", 3);
+    COMPONENT(shadow, "shadow", 1);
+    for (c = 0; c < 3; c++) { /* the file's diffuse and specular are before S */
+        const char *const names[3] = {"diffuse", "specular", "scatter"};
+        const ssdgs_real *from[3];
+        from[0] = frame.diffuse;
+        from[1] = frame.specular;
+        from[2] = frame.scattering;
+        for (i = 0; i < 3 * n; i++) rows[i] = (double)from[c][4 * (i / 3) + i % 3] / (c < 2 ? gold(&file, "shadow", NULL)[i / 3] : 1);
+        CHECK_NEAR(rows, gold(&file, names[c], NULL), 3 * n, value_bound(), 0, names[c]);
+    }
+    image = reals(3 * pixels);
+    slope = reals(3 * pixels);
+    target = reals(3 * pixels);
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < pixels; i++)
+            image[pixels * (size_t)c + i] = frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
+    check_image("image", image, value_bound());
+    if (defaults) context->k->srgb_encode(image, slope, image, 3 * pixels);
+    gold_planes("target", target);
+    CHECK(!ssdgs__loss(context, &memory, image, target, camera.width, camera.height, 0, frame.pixel_gradient, &values));
+    loss[0] = values.loss;
+    CHECK_NEAR(loss, gold(&file, "loss", NULL), 1, value_bound(), 0, "full: loss");
+    for (i = 0; i < 3 * pixels && defaults; i++) frame.pixel_gradient[i] *= slope[i];
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
+#define GRADIENT(golden, plane) check_planes(golden, frame.gradient + (size_t)(plane) * stride, stride, gradient_bound())
+    GRADIENT("grad_mean", SSDGS_POSITION);
+    GRADIENT("grad_quat", SSDGS_ROTATION);
+    GRADIENT("grad_log_scale", SSDGS_LOG_SCALE);
+    GRADIENT("grad_opacity_logit", SSDGS_OPACITY);
+    GRADIENT("grad_kd_raw", SSDGS_DIFFUSE);
+    GRADIENT("grad_ks_raw", SSDGS_SPECULAR);
+    GRADIENT("grad_ksss_raw", SSDGS_SCATTERING);
+    GRADIENT("grad_frame_quat", SSDGS_FRAME);
+    GRADIENT("grad_asg_weight_raw", SSDGS_ASG_WEIGHT);
+    GRADIENT("grad_material", SSDGS_MATERIAL);
+    ssdgs__global_groups(&settings, first);
+    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(), "full: grad_asg_quat");
+    CHECK_L2(frame.global_gradient + first[1], gold(&file, "grad_asg_log_lambda_mu", NULL), 16, gradient_bound(), "full: grad_asg_log_lambda_mu");
+    CHECK_L2(frame.global_gradient + first[3], gold(&file, "grad_sss_weights", NULL), view.scattering_count, gradient_bound(), "full: grad_sss_weights");
+    CHECK_L2(frame.global_gradient + first[4], gold(&file, "grad_shadow_weights", NULL), view.shadow_count, gradient_bound(), "full: grad_shadow_weights");
+    CHECK_L2(frame.light_gradient, gold(&file, "grad_light", NULL), 3, gradient_bound(), "full: grad_light");
+    memset(&photo, 0, sizeof photo);
+    memset(zero, 0, sizeof zero);
+    photo.camera = camera;
+    ssdgs__correct_backward(&photo, zero, frame.view_gradient, pose);
+    CHECK_L2(pose, gold(&file, "grad_pose", NULL), 6, gradient_bound(), "full: grad_pose");
+    free(rows);
+    free(image);
+    free(slope);
+    free(target);
+    ssdgs__release(context, memory.memory);
+    ssdgs_model_destroy(model);
+    gold_close(&file);
+}
+
+int main(void) {
+    const char *only = getenv("SSDGS_TEST_ISA");
+    int isa, found = 0;
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.isa = (ssdgs_isa)isa;
+        if (only && strcmp(only, ssdgs_isa_string((ssdgs_isa)isa))) continue;
+        if (ssdgs_context_create(&desc, &context)) {
+            printf("skipped: %s\n", ssdgs_isa_string((ssdgs_isa)isa));
+            continue;
+        }
+        printf("%s%s\n", ssdgs_isa_string((ssdgs_isa)isa), real64 ? " in double" : "");
+        found = 1;
+        test_raster();
+        test_light_pass("shadow_bias0");
+        test_light_pass("shadow_bias1");
+        test_asg("shading", 0);
+        test_asg("asg_angular", 1);
+        test_dipole();
+        test_network("sss_mlp", 0, 0, 0);
+        test_network("sss_mlp_default", 0, 1, 1);
+        test_network("shadow_mlp", 1, 0, 0);
+        test_network("shadow_mlp", 1, 1, 1);
+        test_loss();
+        test_adam();
+        test_full("full", 0);
+        test_full("full_default", 1);
+        ssdgs_context_destroy(context);
+    }
+    CHECK(found);
+    TEST_END();
+}

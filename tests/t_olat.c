@@ -1,0 +1,810 @@
+/* examples/olat.h: PNG of every kind, hostile PNG, the writer, JSON, numbers, datasets good and bad, failing memory.
+   cc -o build/t_olat tests/t_olat.c -lm && build/t_olat       (writes under build/) */
+#ifndef _DEFAULT_SOURCE
+#define _DEFAULT_SOURCE /* mkfifo */
+#endif
+#include "../ssdgs.h"
+#include "test.h"
+
+/* ---- memory that counts and fails on demand ---- */
+
+static long live, calls, fail_at; /* blocks; allocations so far; the one to refuse, 0 = none */
+
+static void *meter_resize(void *old, size_t size) {
+    void *memory;
+    if (++calls == fail_at) return NULL;
+    memory = realloc(old, size);
+    if (memory && !old) live++;
+    return memory;
+}
+
+static void *meter_clear(size_t count, size_t size) {
+    void *memory = meter_resize(NULL, count * size + 1);
+    if (memory) memset(memory, 0, count * size);
+    return memory;
+}
+
+static void meter_free(void *memory) {
+    if (memory) live--;
+    free(memory);
+}
+
+#define malloc(size) meter_resize(NULL, size)
+#define realloc(memory, size) meter_resize(memory, size)
+#define calloc(count, size) meter_clear(count, size)
+#define free(memory) meter_free(memory)
+#include "../examples/olat.h"
+#undef malloc
+#undef realloc
+#undef calloc
+#undef free
+
+#define FOLDER "build/t_olat"
+
+static char error[512];
+
+static uint32_t random_state = 1;
+static uint32_t random_bits(void) {
+    random_state = random_state * 1664525u + 1013904223u;
+    return random_state >> 8;
+}
+
+/* ---- a PNG encoder of stored blocks ---- */
+
+typedef struct picture {
+    int width, height, color, depth, interlaced, transparent; /* transparent: has a tRNS chunk */
+} picture;
+
+static unsigned char file[1 << 16];
+static size_t file_size;
+
+static int picture_channels(const picture *p) { return p->color == 2 ? 3 : p->color == 4 ? 2 : p->color == 6 ? 4 : 1; }
+static int palette_size(const picture *p) { return p->depth == 8 ? 200 : 1 << p->depth; }
+
+/* Few values where they are wide, so that the transparent colour occurs. */
+static unsigned sample(const picture *p, int x, int y, int c) {
+    unsigned value = (unsigned)(x * 7 + y * 13 + c * 5 + x * y) % 9u * 0x1c2fu;
+    if (p->color == 3) return (unsigned)(x * 31 + y * 17) % (unsigned)palette_size(p);
+    return value >> (16 - p->depth) & ((1u << p->depth) - 1);
+}
+
+static unsigned palette_value(int index, int c) { return (unsigned)(index * (3 + c) + 50 * c) & 255u; }
+
+static void put_chunk(const char *type, const unsigned char *data, size_t length) {
+    unsigned char *p = file + file_size;
+    olat__put_be32(p, (uint32_t)length);
+    memcpy(p + 4, type, 4);
+    if (length) memcpy(p + 8, data, length);
+    olat__put_be32(p + 8 + length, olat__crc32(p + 4, length + 4));
+    file_size += length + 12;
+}
+
+static void put_header(int width, int height, int depth, int color, int interlaced) {
+    unsigned char ihdr[13] = {0};
+    memcpy(file, "\x89PNG\r\n\x1a\n", 8);
+    file_size = 8;
+    olat__put_be32(ihdr, (uint32_t)width);
+    olat__put_be32(ihdr + 4, (uint32_t)height);
+    ihdr[8] = (unsigned char)depth;
+    ihdr[9] = (unsigned char)color;
+    ihdr[12] = (unsigned char)interlaced;
+    put_chunk("IHDR", ihdr, 13);
+}
+
+/* The rows of one pass, with every filter in turn. */
+static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigned char *raw) {
+    unsigned char row[600], above[600];
+    size_t done = 0;
+    int channels = picture_channels(p), x, y, c, filter = 0;
+    int bytes = ((p->width - x0 + dx - 1) / dx * channels * p->depth + 7) / 8, back = (channels * p->depth + 7) / 8, i;
+    if (x0 >= p->width) return 0;
+    memset(above, 0, sizeof above);
+    for (y = y0; y < p->height; y += dy, filter = (filter + 1) % 5) {
+        int bit = 0;
+        memset(row, 0, sizeof row);
+        for (x = x0; x < p->width; x += dx) {
+            for (c = 0; c < channels; c++, bit += p->depth) {
+                unsigned s = sample(p, x, y, c);
+                if (p->depth == 16) row[bit / 8] = (unsigned char)(s >> 8), row[bit / 8 + 1] = (unsigned char)(s & 255);
+                else row[bit / 8] = (unsigned char)(row[bit / 8] | s << (8 - p->depth - bit % 8));
+            }
+        }
+        raw[done++] = (unsigned char)filter;
+        for (i = 0; i < bytes; i++) {
+            int a = i < back ? 0 : row[i - back], b = above[i], d = i < back ? 0 : above[i - back], e = a + b - d, guess = 0;
+            if (filter == 1) guess = a;
+            if (filter == 2) guess = b;
+            if (filter == 3) guess = (a + b) / 2;
+            if (filter == 4) {
+                guess = d;
+                if (abs(e - b) <= abs(e - d)) guess = b;
+                if (abs(e - a) <= abs(e - b) && abs(e - a) <= abs(e - d)) guess = a;
+            }
+            raw[done++] = (unsigned char)((row[i] - guess) & 255);
+        }
+        memcpy(above, row, sizeof above);
+    }
+    return done;
+}
+
+static void encode(const picture *p) {
+    static const int passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4}, {0, 2, 2, 4}, {1, 0, 2, 2},
+        {0, 1, 1, 2}, {0, 0, 1, 1}};
+    static unsigned char raw[1 << 14], packed[1 << 15];
+    unsigned char palette[768], key[6];
+    size_t size = 0, used = 2, at = 0;
+    int i;
+    put_header(p->width, p->height, p->depth, p->color, p->interlaced);
+    put_chunk("teXt", raw, 5); /* ancillary: to be skipped */
+    for (i = 0; i < 3 * palette_size(p) && p->color == 3; i++) palette[i] = (unsigned char)palette_value(i / 3, i % 3);
+    if (p->color == 3) put_chunk("PLTE", palette, (size_t)(3 * palette_size(p)));
+    for (i = 0; i < 3; i++) { /* the colour of pixel (1, 1), with bits beyond the depth that must be masked */
+        unsigned s = sample(p, 1, 1, i) | (p->depth < 16 ? 0xA0u << p->depth : 0);
+        key[2 * i] = (unsigned char)(s >> 8 & 255), key[2 * i + 1] = (unsigned char)(s & 255);
+    }
+    for (i = 0; i < palette_size(p) / 2 && p->color == 3; i++) palette[i] = (unsigned char)palette_value(i, 3);
+    if (p->transparent && p->color == 3) put_chunk("tRNS", palette, (size_t)palette_size(p) / 2);
+    else if (p->transparent) put_chunk("tRNS", key, p->color == 2 ? 6 : 2);
+    for (i = p->interlaced ? 0 : 7; i < (p->interlaced ? 7 : 8); i++) {
+        size += put_rows(p, passes[i][0], passes[i][1], passes[i][2], passes[i][3], raw + size);
+    }
+    packed[0] = 0x78, packed[1] = 1;
+    do { /* stored blocks of at most 700 bytes */
+        size_t part = size - at < 700 ? size - at : 700;
+        packed[used] = at + part == size;
+        packed[used + 1] = (unsigned char)(part & 255), packed[used + 2] = (unsigned char)(part >> 8);
+        packed[used + 3] = packed[used + 1] ^ 255, packed[used + 4] = packed[used + 2] ^ 255;
+        memcpy(packed + used + 5, raw + at, part);
+        used += part + 5;
+        at += part;
+    } while (at < size);
+    olat__put_be32(packed + used, olat__adler32(raw, size));
+    used += 4;
+    put_chunk("IDAT", packed, used / 3); /* chunks may end anywhere, and be empty */
+    put_chunk("IDAT", packed, 0);
+    put_chunk("IDAT", packed + used / 3, used - used / 3);
+    put_chunk("IEND", NULL, 0);
+}
+
+static void expected(const picture *p, int x, int y, unsigned rgba[4]) {
+    unsigned top = (1u << p->depth) - 1, scale = p->depth < 8 ? 255 / top : 1, s[4];
+    int c;
+    for (c = 0; c < 4; c++) s[c] = sample(p, x, y, c);
+    if (p->color == 3) {
+        for (c = 0; c < 3; c++) rgba[c] = palette_value((int)s[0], c);
+        rgba[3] = p->transparent && s[0] < (unsigned)palette_size(p) / 2 ? palette_value((int)s[0], 3) : 255;
+        return;
+    }
+    for (c = 0; c < 3; c++) rgba[c] = scale * s[p->color & 2 ? c : 0];
+    rgba[3] = scale * (p->color == 4 ? s[1] : p->color == 6 ? s[3] : top);
+    if (!p->transparent || s[0] != sample(p, 1, 1, 0)) return;
+    if (p->color == 2 && (s[1] != sample(p, 1, 1, 1) || s[2] != sample(p, 1, 1, 2))) return;
+    rgba[3] = 0;
+}
+
+static int decodes_right(const picture *p) {
+    int width, height, x, y, c, wrong = 0;
+    ssdgs_pixels format;
+    void *pixels;
+    encode(p);
+    if (olat_decode_png(file, file_size, &width, &height, &format, &pixels, error)) {
+        printf("%d x %d, colour %d, depth %d: %s\n", p->width, p->height, p->color, p->depth, error);
+        return 0;
+    }
+    wrong = width != p->width || height != p->height || (format == SSDGS_PIXELS_RGBA16) != (p->depth == 16);
+    for (y = 0; y < p->height && !wrong; y++) {
+        for (x = 0; x < p->width; x++) {
+            unsigned rgba[4];
+            expected(p, x, y, rgba);
+            for (c = 0; c < 4; c++) {
+                size_t i = 4 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c;
+                uint16_t wide = 0;
+                if (p->depth == 16) memcpy(&wide, (const unsigned char *)pixels + 2 * i, 2);
+                else wide = ((const unsigned char *)pixels)[i];
+                wrong |= wide != rgba[c];
+            }
+        }
+    }
+    meter_free(pixels);
+    if (wrong) printf("%d x %d, colour %d, depth %d, interlaced %d, tRNS %d\n", p->width, p->height, p->color, p->depth,
+                      p->interlaced, p->transparent);
+    return !wrong;
+}
+
+static void test_kinds(void) {
+    static const int kinds[15][2] = {{0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {2, 8}, {2, 16}, {3, 1}, {3, 2}, {3, 4}, {3, 8},
+        {4, 8}, {4, 16}, {6, 8}, {6, 16}};
+    static const int sides[8] = {1, 2, 3, 4, 5, 8, 9, 33};
+    int kind, i, k, interlaced, transparent;
+    for (kind = 0; kind < 15; kind++) {
+        for (i = 0; i < 8; i++) {
+            for (k = 0; k < 8; k++) {
+                for (interlaced = 0; interlaced < 2; interlaced++) {
+                    for (transparent = 0; transparent < (kinds[kind][0] & 4 ? 1 : 2); transparent++) {
+                        picture p;
+                        p.width = sides[i], p.height = sides[k], p.color = kinds[kind][0], p.depth = kinds[kind][1];
+                        p.interlaced = interlaced, p.transparent = transparent;
+                        CHECK(decodes_right(&p));
+                    }
+                }
+            }
+        }
+    }
+    CHECK(live == 0);
+}
+
+/* ---- hostile PNG ---- */
+
+/* Decodes an exact copy, so that a sanitizer sees a byte read too many; 1: refused with a message, 2: decoded, 0: wrong. */
+static int refused(const unsigned char *bytes, size_t size) {
+    unsigned char *copy = (unsigned char *)malloc(size + !size);
+    int width, height, failed;
+    ssdgs_pixels format;
+    void *pixels = NULL;
+    if (!copy) return 0;
+    memcpy(copy, bytes, size);
+    memset(error, 0, sizeof error);
+    failed = olat_decode_png(copy, size, &width, &height, &format, &pixels, error);
+    free(copy);
+    if (!failed) meter_free(pixels);
+    if (live != 0) return 0;
+    return failed ? error[0] && !pixels && width == 0 && height == 0 : 2;
+}
+
+static int refused_with(const char *message) {
+    int good = refused(file, file_size) == 1 && strstr(error, message);
+    if (!good) printf("wanted \"%s\", got \"%s\"\n", message, error);
+    return good;
+}
+
+/* Colours (x x + 3 y) & 63, 7 y & 63, 5 x y & 31, packed by zlib with dynamic codes. */
+static const unsigned char dynamic_png[] = {
+    137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 20, 0, 0, 0, 12, 8, 2, 0, 0, 0, 237, 110, 10, 172, 0,
+    0, 2, 5, 73, 68, 65, 84, 120, 218, 29, 202, 237, 118, 162, 48, 20, 133, 225, 195, 135, 57, 128, 36, 164, 192, 65, 192, 8,
+    163, 209, 177, 77, 107, 107, 106, 107, 177, 117, 38, 247, 127, 87, 195, 100, 255, 218, 235, 93, 15, 0, 64, 0, 16, 3, 164, 0,
+    18, 160, 3, 216, 3, 88, 248, 191, 7, 255, 111, 190, 63, 121, 179, 245, 125, 235, 255, 92, 32, 66, 136, 113, 129, 152, 229,
+    88, 84, 88, 43, 236, 142, 56, 124, 96, 20, 97, 82, 35, 63, 98, 121, 199, 85, 133, 234, 5, 3, 68, 182, 199, 101, 132, 114,
+    143, 132, 216, 191, 224, 8, 76, 0, 138, 44, 19, 117, 33, 134, 70, 36, 163, 40, 141, 80, 95, 130, 49, 33, 87, 162, 55, 34,
+    118, 66, 52, 162, 125, 19, 97, 38, 242, 163, 104, 102, 127, 244, 254, 77, 12, 144, 18, 100, 84, 112, 26, 74, 226, 29, 169,
+    29, 45, 79, 212, 127, 83, 154, 82, 219, 19, 158, 168, 9, 105, 209, 81, 253, 78, 17, 167, 210, 80, 144, 146, 52, 52, 114, 18,
+    239, 180, 129, 92, 1, 87, 181, 84, 9, 169, 121, 242, 160, 226, 179, 106, 255, 168, 124, 238, 27, 85, 159, 85, 178, 240, 253,
+    83, 197, 82, 181, 39, 223, 79, 222, 127, 42, 5, 133, 6, 169, 187, 74, 151, 173, 94, 142, 58, 126, 212, 155, 139, 110, 64,
+    23, 133, 78, 126, 233, 224, 162, 251, 68, 87, 163, 206, 39, 189, 168, 244, 112, 214, 171, 66, 203, 179, 78, 43, 29, 78, 122,
+    13, 165, 129, 202, 12, 141, 81, 107, 211, 239, 76, 251, 108, 154, 171, 169, 35, 83, 150, 70, 106, 35, 174, 38, 95, 154, 108,
+    103, 146, 31, 195, 26, 19, 95, 76, 56, 251, 139, 247, 63, 166, 7, 178, 208, 216, 168, 179, 108, 176, 233, 193, 230, 175,
+    182, 184, 217, 146, 89, 34, 219, 254, 182, 235, 155, 29, 132, 13, 14, 54, 254, 107, 177, 179, 217, 213, 114, 178, 242, 106,
+    171, 206, 54, 127, 109, 7, 237, 4, 221, 148, 168, 73, 110, 167, 246, 113, 2, 59, 37, 247, 73, 166, 83, 59, 247, 39, 255, 31,
+    124, 15, 188, 185, 249, 126, 243, 63, 152, 90, 88, 59, 80, 142, 143, 174, 223, 59, 124, 118, 245, 135, 11, 156, 19, 185, 91,
+    175, 93, 242, 226, 200, 185, 176, 118, 197, 179, 83, 177, 75, 71, 215, 220, 93, 180, 118, 242, 238, 54, 163, 203, 98, 183,
+    130, 129, 193, 200, 202, 29, 139, 143, 172, 121, 101, 201, 23, 235, 67, 150, 23, 108, 24, 152, 124, 99, 97, 200, 234, 21,
+    99, 175, 172, 69, 150, 237, 152, 114, 76, 204, 222, 121, 143, 172, 129, 45, 135, 29, 95, 29, 184, 48, 124, 97, 185, 250,
+    230, 213, 130, 103, 37, 15, 182, 188, 125, 231, 197, 130, 179, 158, 111, 44, 175, 51, 190, 60, 240, 48, 228, 221, 150, 203,
+    144, 227, 129, 15, 25, 167, 127, 145, 32, 66, 133, 78, 150, 100, 227, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130
+};
+
+static void test_dynamic(void) {
+    int width, height, x, y, wrong = 0;
+    ssdgs_pixels format;
+    void *pixels;
+    if (!CHECK(!olat_decode_png(dynamic_png, sizeof dynamic_png, &width, &height, &format, &pixels, error))) return;
+    for (y = 0; y < height; y++) {
+        for (x = 0; x < width; x++) {
+            const unsigned char *p = (const unsigned char *)pixels + 4 * (y * width + x);
+            wrong |= p[0] != ((x * x + 3 * y) & 63) || p[1] != ((7 * y) & 63) || p[2] != ((5 * x * y) & 31) || p[3] != 255;
+        }
+    }
+    meter_free(pixels);
+    CHECK(width == 20 && height == 12 && !wrong);
+}
+
+static void test_damage(void) {
+    static const unsigned char changes[4] = {1, 0x20, 0x80, 0xFF};
+    picture p = {5, 4, 3, 4, 1, 1};
+    size_t i, idat = 33, length = olat__be32(dynamic_png + idat);
+    int which, k, wrong;
+    for (which = 0; which < 2; which++) {
+        if (which) encode(&p);
+        else memcpy(file, dynamic_png, file_size = sizeof dynamic_png);
+        for (i = 0; i < file_size; i++) CHECK(refused(file, i) == 1);
+        for (i = 0, wrong = 0; i < file_size; i++) {
+            for (k = 0; k < 4; k++) {
+                file[i] ^= changes[k];
+                wrong |= refused(file, file_size) == 0;
+                file[i] ^= changes[k];
+            }
+            CHECK(!wrong);
+        }
+        CHECK(refused(file, file_size) == 2);
+    }
+    memcpy(file, dynamic_png, file_size = sizeof dynamic_png);
+    for (i = 0, wrong = 0; i < 8 * length; i++) { /* with the CRC mended, damage reaches inflate */
+        file[idat + 8 + i / 8] ^= (unsigned char)(1 << i % 8);
+        olat__put_be32(file + idat + 8 + length, olat__crc32(file + idat + 4, length + 4));
+        wrong |= refused(file, file_size) == 0;
+        file[idat + 8 + i / 8] ^= (unsigned char)(1 << i % 8);
+    }
+    CHECK(!wrong);
+}
+
+/* An 8 x 8 grey image whose deflate stream are these bits, spaces left out. */
+static void put_stream(const char *bits) {
+    unsigned char packed[128] = {0x78, 1};
+    size_t n = 16;
+    for (; *bits; bits++) {
+        if (*bits == ' ') continue;
+        if (*bits == '1') packed[n / 8] = (unsigned char)(packed[n / 8] | 1 << n % 8);
+        n++;
+    }
+    put_header(8, 8, 8, 0, 0);
+    put_chunk("IDAT", packed, (n + 7) / 8 + 4);
+    put_chunk("IEND", NULL, 0);
+}
+
+static void test_streams(void) {
+    static const char *const streams[][2] = {
+        {"1 11", "unknown type"},
+        {"1 00 00000 00000000 00000000 00000000 00000000", "complement"},
+        {"1 00 00000 11111111 00000000 00000000 11111111 0", "end early"},
+        {"0 10 0000000 1 10 0000000", "less data"},
+        {"1 10 0000001 00000", "before the data"},
+        {"1 10 00110000 11000110", "bad length code"},
+        {"1 10 00110000 0000001 11110", "bad distance code"},
+        {"1 10 00110000 11000101 00000 00000", "more data"},
+        {"1 01 01111 00000 0000", "too many codes"},
+        {"1 01 00000 00000 0000 000 000 000 000", "bad lengths"},
+        {"1 01 00000 00000 0000 100 100 100 000", "bad lengths"},
+        {"1 01 00000 00000 0000 100 100 000 000 0", "repeat before"},
+        {"1 01 00000 00000 0000 000 000 100 100 1 1111111 1 1111111", "too many code lengths"},
+        {"1 01 00000 00000 0000 000 000 100 100 1 1111111 1 1011011", "end of a block"}};
+    static unsigned char raw[8 * 9 + 1];
+    unsigned char packed[128] = {0x78, 1, 1, 72, 0, 255 - 72, 255};
+    size_t i;
+    for (i = 0; i < sizeof streams / sizeof *streams; i++) {
+        put_stream(streams[i][0]);
+        CHECK(refused_with(streams[i][1]));
+    }
+    memcpy(packed + 7, raw, 72);
+    olat__put_be32(packed + 79, olat__adler32(raw, 72));
+    put_header(8, 8, 8, 0, 0), put_chunk("IDAT", packed, 83), put_chunk("IEND", NULL, 0);
+    CHECK(refused(file, file_size) == 2);
+    packed[79] ^= 1;
+    put_header(8, 8, 8, 0, 0), put_chunk("IDAT", packed, 83), put_chunk("IEND", NULL, 0);
+    CHECK(refused_with("Adler"));
+    packed[79] ^= 1, packed[7 + 27] = 5;
+    olat__put_be32(packed + 79, olat__adler32(packed + 7, 72));
+    put_header(8, 8, 8, 0, 0), put_chunk("IDAT", packed, 83), put_chunk("IEND", NULL, 0);
+    CHECK(refused_with("unknown filter"));
+}
+
+static void test_chunks(void) {
+    unsigned char data[800] = {0};
+    put_header(40000, 1, 8, 0, 0);
+    CHECK(refused_with("32768"));
+    put_header(32768, 32768, 8, 0, 0);
+    CHECK(refused_with("2^28"));
+    put_header(0, 5, 8, 0, 0);
+    CHECK(refused_with("no pixels"));
+    put_header(5, 5, 3, 0, 0);
+    CHECK(refused_with("bit depth"));
+    put_header(5, 5, 16, 3, 0);
+    CHECK(refused_with("bit depth"));
+    put_header(5, 5, 8, 9, 0);
+    CHECK(refused_with("colour type"));
+    put_header(5, 5, 8, 0, 2);
+    CHECK(refused_with("interlace"));
+    put_header(5, 5, 8, 0, 0), put_chunk("IEND", NULL, 0);
+    CHECK(refused_with("IDAT is missing"));
+    put_header(5, 5, 8, 3, 0), put_chunk("IDAT", data, 9);
+    CHECK(refused_with("PLTE is missing"));
+    put_header(5, 5, 2, 3, 0), put_chunk("PLTE", data, 15);
+    CHECK(refused_with("longer than"));
+    put_header(5, 5, 8, 3, 0), put_chunk("PLTE", data, 7);
+    CHECK(refused_with("bad length"));
+    put_header(5, 5, 8, 3, 0), put_chunk("PLTE", data, 6), put_chunk("PLTE", data, 6);
+    CHECK(refused_with("out of place"));
+    put_header(5, 5, 8, 3, 0), put_chunk("PLTE", data, 6), put_chunk("tRNS", data, 3);
+    CHECK(refused_with("tRNS"));
+    put_header(5, 5, 8, 6, 0), put_chunk("tRNS", data, 8);
+    CHECK(refused_with("alpha"));
+    put_header(5, 5, 8, 0, 0), put_chunk("IDAT", data, 9), put_chunk("teXt", data, 1), put_chunk("IDAT", data, 9);
+    CHECK(refused_with("consecutive"));
+    put_header(5, 5, 8, 0, 0), put_chunk("ABCD", data, 1);
+    CHECK(refused_with("unknown critical"));
+    put_header(16384, 16384, 16, 6, 0), put_chunk("IDAT", data, 700), put_chunk("IEND", NULL, 0);
+    CHECK(refused_with("less data")); /* without allocating gigabytes */
+    file_size = 0, put_chunk("IEND", NULL, 0);
+    CHECK(refused_with("not a PNG"));
+    {
+        picture p = {5, 4, 3, 4, 0, 0}; /* all sixteen entries are used: cut the palette */
+        picture wide = {9, 9, 3, 4, 0, 0};
+        size_t at = 33 + 17, length;
+        CHECK(decodes_right(&p));
+        encode(&wide);
+        length = olat__be32(file + at);
+        memmove(file + at + 8 + 3, file + at + 8 + length, file_size - (at + 8 + length));
+        file_size -= length - 3;
+        olat__put_be32(file + at, 3);
+        olat__put_be32(file + at + 11, olat__crc32(file + at + 4, 7));
+        CHECK(refused_with("beyond the palette"));
+    }
+}
+
+/* ---- the writer ---- */
+
+static long file_bytes(const char *path) {
+    FILE *stream = fopen(path, "rb");
+    long size = -1;
+    if (stream && !fseek(stream, 0, SEEK_END)) size = ftell(stream);
+    if (stream) fclose(stream);
+    return size;
+}
+
+static int round_trip(int width, int height, int channels, int pattern) {
+    size_t count = (size_t)width * (size_t)height, i;
+    int got_width, got_height, c, wrong;
+    unsigned char *pixels = (unsigned char *)malloc(count * (size_t)channels);
+    ssdgs_pixels format;
+    void *got = NULL;
+    for (i = 0; i < count * (size_t)channels; i++) {
+        size_t x = i / (size_t)channels % (size_t)width, y = i / (size_t)channels / (size_t)width;
+        size_t value = pattern == 0 ? random_bits() : pattern == 1 ? 200 : pattern == 2 ? x + 2 * y : i % 700;
+        pixels[i] = (unsigned char)(value & 255);
+    }
+    wrong = olat_write_png(FOLDER "/written.png", width, height, channels, pixels, error) ||
+            olat_read_png(FOLDER "/written.png", &got_width, &got_height, &format, &got, error) ||
+                got_width != width || got_height != height;
+    for (i = 0; i < count && !wrong; i++) {
+        const unsigned char *p = (const unsigned char *)got + 4 * i, *q = pixels + (size_t)channels * i;
+        for (c = 0; c < 4; c++) wrong |= p[c] != (c == 3 ? (channels == 4 ? q[3] : 255) : q[channels == 1 ? 0 : c]);
+    }
+    meter_free(got);
+    free(pixels);
+    return !wrong && live == 0;
+}
+
+static void test_writer(void) {
+    static const int channels[3] = {1, 3, 4}, sizes[6][2] = {{1, 1}, {3, 2}, {17, 9}, {1, 300}, {256, 3}, {301, 199}};
+    static unsigned char flat[256 * 256 * 3];
+    char name[128];
+    int c, s, pattern;
+    for (c = 0; c < 3; c++) {
+        for (s = 0; s < 6; s++) {
+            for (pattern = 0; pattern < 4; pattern++) CHECK(round_trip(sizes[s][0], sizes[s][1], channels[c], pattern));
+        }
+    }
+    CHECK(!olat_write_png(FOLDER "/written.png", 256, 256, 3, flat, error) && file_bytes(FOLDER "/written.png") < 1500);
+    CHECK(olat_write_png(FOLDER "/none/written.png", 1, 1, 3, flat, error) && strstr(error, "none/written.png"));
+    CHECK(olat_write_png(FOLDER "/dir.png", 1, 1, 3, flat, error) && strstr(error, "dir.png")); /* a folder: rename fails */
+    snprintf(name, sizeof name, FOLDER "/dir.png.tmp.%ld.0", (long)getpid());
+    CHECK(file_bytes(name) < 0);
+    CHECK(olat_write_png(FOLDER "/x.png", 0, 1, 3, flat, error) && olat_write_png(FOLDER "/x.png", 1, 40000, 3, flat, error));
+    CHECK(olat_write_png(FOLDER "/x.png", 1, 1, 2, flat, error) && olat_write_png(FOLDER "/x.png", 32768, 32768, 4, flat, error));
+    CHECK(file_bytes(FOLDER "/x.png") < 0 && live == 0);
+}
+
+/* ---- JSON ---- */
+
+static olat__json json;
+static char json_path[] = "test.json";
+
+static int parse(const char *text, size_t size) {
+    char *copy = (char *)malloc(size + 1);
+    memcpy(copy, text, size);
+    copy[size] = 0;
+    memset(&json, 0, sizeof json);
+    memset(error, 0, sizeof error);
+    json.path = json_path, json.error = error, json.text = copy, json.end = copy + size;
+    olat__json_parse(&json);
+    meter_free(json.nodes);
+    json.nodes = NULL;
+    free(copy);
+    return !json.failed;
+}
+
+static int refuses(const char *text, const char *message) {
+    int good = !parse(text, strlen(text)) && strstr(error, message) && live == 0;
+    if (!good) printf("%s: wanted \"%s\", got \"%s\"\n", text, message, error);
+    return good;
+}
+
+static void test_json(void) {
+    static const char *const good[] = {
+        "{}", " [ ] ", "0", "-0", "null", "true", "false", "\"\"", "[1,2,[3,{\"a\":[]}]]", "-1.5e+10", "1E-2", "1e-400",
+        "123456789012345678901234567890", "[1]\r\n\t ", "{\"a\":1,\"b\":{\"a\":2},\"\":3}",
+        "\"\\u00e9\\ud83d\\ude00\\n\\/\"", "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"", "\"\\u0000\"", "\xEF\xBB\xBF{}", "\"\x7f\""};
+    static const char *const bad[][2] = {
+        {"", "ends early"}, {"[", "ends early"}, {"[1", "ends early"}, {"[1,", "ends early"}, {"{", "key was expected"},
+        {"[1,]", "value was expected"}, {"[,1]", "value was expected"}, {"{\"a\":1,}", "key was expected"},
+        {"{\"a\" 1}", "':'"}, {"{\"a\":}", "value was"}, {"{a:1}", "key was"}, {"[1 2]", "comma"}, {"[1}", "comma"},
+        {"{\"a\":1]", "comma"}, {"]", "value was"}, {"1 2", "text after"}, {"[]]", "text after"}, {"01", "value was"},
+        {"-", "value was"}, {"+1", "value was"}, {".5", "value was"}, {"1.", "value was"}, {"1.e3", "value was"},
+        {"1e", "value was"}, {"1e+", "value was"}, {"1.2.3", "value was"}, {"0x10", "text after"}, {"tru", "value was"},
+        {"nul", "value was"}, {"truee", "text after"}, {"'a'", "value was"}, {"NaN", "not finite"},
+        {"[1, -Infinity]", "not finite"}, {"Infinity", "not finite"}, {"nan", "not finite"}, {"1e309", "too large"},
+        {"-1e999999999999999", "too large"}, {"\"", "inside a string"}, {"\"a\n\"", "control"}, {"\"\\x\"", "escape"},
+        {"\"\\u12g4\"", "escape"}, {"\"\\ud800\"", "escape"}, {"\"\\ud800\\u0041\"", "escape"}, {"\"\\udc00\"", "escape"},
+        {"\"\\", "escape"}, {"\"\\u12", "escape"}, {"\"\xff\"", "UTF-8"}, {"\"\xc0\x80\"", "UTF-8"},
+        {"\"\xed\xa0\x80\"", "UTF-8"}, {"\"\xf4\x90\x80\x80\"", "UTF-8"}, {"\"\xe2\x82\"", "UTF-8"},
+        {"\"\xe0\x80\x80\"", "UTF-8"}, {"{\"a\":1,\"b\":2,\"a\":3}", "a: the key appears twice"},
+        {"{\"a\":1,\"\\u0061\":3}", "twice"}, {"{\"x\":[0,\n{\"y\":NaN}]}", "line 2: x[1].y: NaN"}, {"[1,\n2\n,}", "line 3"}};
+    static const char text[] = "{\"frames\": [ {\"name\": \"\\u00e9\\\"x\", \"m\": [[1, -2.5e-3],"
+                               " [true, null]]},\n {} ], \"w\": 12}";
+    static char deep[200], buffer[sizeof text];
+    size_t i;
+    int k, wrong = 0;
+    for (i = 0; i < sizeof good / sizeof *good; i++) {
+        if (!CHECK(parse(good[i], strlen(good[i])) && live == 0)) printf("%s: %s\n", good[i], error);
+    }
+    for (i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(refuses(bad[i][0], bad[i][1]));
+    CHECK(!parse("[1\0]", 4) && !parse("\"a\0b\"", 5) && !parse("1\0", 2));
+    memset(deep, '[', 64), memset(deep + 64, ']', 64);
+    CHECK(parse(deep, 128));
+    memset(deep, '[', 65), memset(deep + 65, ']', 65);
+    CHECK(refuses(deep, "64 levels"));
+    CHECK(parse(text, sizeof text - 1));
+    for (i = 0; i < sizeof text - 1; i++) CHECK(!parse(text, i) && error[0] && live == 0);
+    for (i = 0; i < sizeof text - 1; i++) {
+        for (k = 0; k < 256; k++) {
+            memcpy(buffer, text, sizeof text);
+            buffer[i] = (char)(unsigned char)k;
+            if (!parse(buffer, sizeof text - 1)) wrong |= !error[0];
+            wrong |= live != 0;
+        }
+    }
+    CHECK(!wrong);
+}
+
+static int same_number(const char *text, double want) {
+    double got = -1;
+    size_t length = olat__parse_number(text, &got);
+    int good = length == strlen(text) && memcmp(&got, &want, sizeof got) == 0;
+    if (!good) printf("%s: got %.17g, want %.17g\n", text, got, want);
+    return good;
+}
+
+static void test_numbers(void) {
+    static char text[3000];
+    int i, k, n;
+    CHECK(same_number("0", 0.0) && same_number("0.000", 0.0) && same_number("0e999999999999999999", 0.0));
+    CHECK(same_number("9007199254740993", 9007199254740992.0) && same_number("9007199254740995", 9007199254740996.0));
+    CHECK(same_number("0.1", 0.1) && same_number("1e23", 1e23) && same_number("8.5e-3", 8.5e-3) && same_number("-12.5", -12.5));
+    CHECK(same_number("1.7976931348623158e308", 1.7976931348623157e308) &&
+        same_number("4.9406564584124654e-324", ldexp(1, -1074)));
+    CHECK(same_number("2.2250738585072011e-308", ldexp(4503599627370495.0, -1074)) && same_number("2.47e-324", 0.0));
+    memset(text, '0', sizeof text); /* 2^53 + 1 is a tie, and a digit far beyond decides it */
+    memcpy(text, "9007199254740993.", 17);
+    strcpy(text + 2900, "1");
+    CHECK(same_number(text, 9007199254740994.0));
+    memset(text, '0', sizeof text); /* 10^-2000 10^2003 */
+    memcpy(text, "0.", 2);
+    strcpy(text + 2001, "1e2003");
+    CHECK(same_number(text, 1000.0));
+    strcpy(text + 2001, "1e-9223372036854775808");
+    CHECK(same_number(text, 0.0));
+    for (i = 0; i < 6000; i++) {
+        n = 0;
+        if (random_bits() & 1) text[n++] = '-';
+        text[n++] = (char)('1' + random_bits() % 9);
+        for (k = (int)(random_bits() % (i % 10 ? 20 : 900)); k > 0; k--) text[n++] = (char)('0' + random_bits() % 10);
+        if (random_bits() & 3) {
+            text[n++] = '.';
+            for (k = 1 + (int)(random_bits() % 20); k > 0; k--) text[n++] = (char)('0' + random_bits() % 10);
+        }
+        k = (int)(random_bits() % 600) - 330;
+        if (n < 50 && i % 3) n += sprintf(text + n, i % 2 ? "e%d" : "E%+d", k);
+        text[n] = 0;
+        CHECK(same_number(text, strtod(text, NULL)));
+    }
+}
+
+/* ---- datasets ---- */
+
+static void write_text(const char *name, const char *text) {
+    FILE *stream = fopen(name, "wb");
+    if (!stream) return;
+    fputs(text, stream);
+    fclose(stream);
+}
+
+#define POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0],[0,0,1,4],[0,0,0,1]]"
+#define FILE_A "\"file_path\":\"./a\","
+#define LIGHT "\"pl_pos\":[1,2,3],"
+#define FRAME "{" FILE_A LIGHT POSE "}"
+#define TOP "{\"camera_angle_x\":1.0,\n\"frames\":["
+
+static olat_dataset set;
+
+static int loads(const char *text, int flags) {
+    write_text(FOLDER "/set.json", text);
+    memset(error, 0, sizeof error);
+    if (!olat_load(FOLDER, "set.json", flags, &set, error)) return 1;
+    printf("%s: %s\n", text, error);
+    return 0;
+}
+
+static int load_fails(const char *text, int flags, const char *message) {
+    int good;
+    write_text(FOLDER "/set.json", text);
+    memset(error, 0, sizeof error);
+    good = olat_load(FOLDER, "set.json", flags, &set, error) && !set.frames && !set.count && live == 0 && strstr(error, message);
+    if (!good) printf("%s\n    wanted \"%s\", got \"%s\"\n", text, message, error);
+    if (live) olat_free(&set);
+    return good;
+}
+
+static int near_all(const ssdgs_real *got, const double *want, int count) {
+    int i, good = 1;
+    for (i = 0; i < count; i++) good &= fabs((double)got[i] - want[i]) <= 1e-6 * (1 + fabs(want[i]));
+    return good;
+}
+
+static void test_datasets(void) {
+    static const double view[12] = {1, 0, 0, -0.5, 0, -1, 0, 0, 0, 0, -1, 4}, light[3] = {1, 2, 3}, rgb[3] = {2, 3, 4},
+        one[3] = {7, 7, 7};
+    static const double turned[12] = {0, -1, 0, 2, 0, 0, -1, 3, 1, 0, 0, -1}, dir[3] = {0, 0.6, 0.8};
+    static const char *const bad_paths[][2] = {
+        {"../a", "'..'"}, {"b/../../a", "'..'"}, {"..\\\\a", "'..'"}, {"/etc/a", "not relative"},
+        {"\\\\\\\\host\\\\a", "not relative"}, {"C:/a", "not relative"}, {"", "empty"}, {"b//a", "empty name"},
+        {"b/", "empty name"}, {"a\\u0000", "control"}, {"a\\u001b[2J", "control"}, {"NUL", "device"}, {"b/com1.png", "device"},
+        {"a.", "dot or a space"}, {"b /a", "dot or a space"}, {"missing", "missing.png: cannot be opened"},
+        {"dir", "not a regular file"}, {"fifo", "not a regular file"}, {"broken", "broken.png: byte 0"}};
+    static const char *const bad[][2] = {
+        {"[]", "frames is missing"}, {"{}", "frames is missing"}, {"{\"frames\":{}}", "frames: an array"},
+        {"{\"frames\":[]}", "frames"}, {TOP "1]}", "line 2: frames[0]: an object"},
+        {"{\"frames\":[" FRAME "]}", "camera_angle_x, camera_intrinsics or fl_x is missing"},
+        {TOP FRAME ",\n{" LIGHT POSE "}]}", "line 3: frames[1]: file_path or img_path is missing"},
+        {TOP "{" FILE_A POSE "}]}", "pl_pos or pl_dir is missing"},
+        {TOP "{" FILE_A LIGHT "\"a\":0}]}", "transform_matrix or R_opt is missing"},
+        {TOP "{" FILE_A LIGHT "\"pl_dir\":[0,0,1]," POSE "}]}", "both"},
+        {TOP "{" FILE_A "\"pl_dir\":[0,0,2]," POSE "}]}", "unit vector"},
+        {TOP "{" FILE_A "\"pl_pos\":[1,2]," POSE "}]}", "frames[0].pl_pos: 3 numbers"},
+        {TOP "{" FILE_A "\"pl_pos\":\"x\"," POSE "}]}", "pl_pos: 3 numbers"},
+        {TOP "{" FILE_A "\"pl_pos\":[1,\n2,null]," POSE "}]}", "line 3: frames[0].pl_pos[2]: a number"},
+        {TOP "{" FILE_A "\"pl_pos\":[1,2,1e20]," POSE "}]}", "out of range"},
+        {TOP "{" FILE_A "\"pl_pos\":[1,NaN,3]," POSE "}]}", "frames[0].pl_pos[1]: NaN"},
+        {TOP "{" FILE_A LIGHT LIGHT POSE "}]}", "frames[0].pl_pos: the key appears twice"},
+        {TOP "{" FILE_A LIGHT "\"pl_intensity\":[1,2]," POSE "}]}", "pl_intensity: 3 numbers"},
+        {TOP "{" FILE_A LIGHT "\"pl_intensity\":-1," POSE "}]}", "negative"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[1,2,3]}]}", "3 x 4"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[]}]}", "3 x 4"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":7}]}", "3 x 4"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0],[0,0,1,0]]}]}", "transform_matrix[1]: 4 numbers"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,2]]}]}", "0 0 0 1"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,-1,0,0],[0,0,1,4]]}]}", "mirrors"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0.01,0,0],[0,1,0,0],[0,0,1,4]]}]}", "not a rotation"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1.01,0,0],[0,0,1,4]]}]}", "not a rotation"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[0,0,0,0],[0,0,0,0],[0,0,0,0]]}]}", "not a rotation"},
+        {TOP "{" FILE_A LIGHT "\"R_opt\":[[1,0,0],[0,1,0],[0,0,1]]}]}", "T_opt is missing"},
+        {TOP "{" FILE_A LIGHT "\"R_opt\":[[2,0,0],[0,2,0],[0,0,2]],\"T_opt\":[0,0,0]}]}", "not a rotation"},
+        {TOP "{\"file_path\":7," LIGHT POSE "}]}", "file_path: a string"},
+        {TOP "{\"file_ext\":\".exr\"," FILE_A LIGHT POSE "}]}", "file_ext"},
+        {TOP "{\"file_ext\":3," FILE_A LIGHT POSE "}]}", "file_ext"},
+        {"{\"camera_angle_x\":4,\"frames\":[" FRAME "]}", "camera_angle_x"},
+        {"{\"camera_angle_x\":\"1\",\"frames\":[" FRAME "]}", "camera_angle_x: a number"},
+        {"{\"camera_intrinsics\":[1,2,3],\"frames\":[" FRAME "]}", "4 numbers"},
+        {"{\"camera_intrinsics\":[1,2,-3,3],\"frames\":[" FRAME "]}", "positive"},
+        {"{\"fl_y\":3,\"frames\":[" FRAME "]}", "positive"}, {"{\"fl_x\":3,\"cx\":1,\"frames\":[" FRAME "]}", "cx and cy"},
+        {"{\"fl_x\":3,\"w\":7,\"frames\":[" FRAME "]}", "6 x 4 pixels"}, {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
+        {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
+    unsigned char pixels[6 * 4 * 3];
+    char text[1200];
+    size_t i;
+    ssdgs_photo *photos;
+    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
+    mkdir(FOLDER "/b", 0777);
+    CHECK(!olat_write_png(FOLDER "/a.png", 6, 4, 3, pixels, error) && !olat_write_png(FOLDER "/b/c.png", 3, 2, 1, pixels, error));
+    write_text(FOLDER "/broken.png", "this is no image");
+    remove(FOLDER "/fifo.png");
+    CHECK(mkfifo(FOLDER "/fifo.png", 0666) == 0);
+
+    if (CHECK(loads("{\"camera_angle_x\":1.0,\"w\":99,\"frames\":[{" FILE_A LIGHT POSE ",\"pl_intensity\":[2,3,4]},"
+              "{\"img_path\":\"b\\\\c.png\",\"pl_dir\":[0,0.6,0.8],"
+              "\"pl_intensity\":7,\"R_opt\":[[0,0,1],[-1,0,0],[0,-1,0]],\"T_opt\":[2,3,-1]}]}", 0))) {
+        const olat_frame *a = set.frames, *b = set.frames + 1;
+        CHECK(set.count == 2 && a->has_image && a->camera.width == 6 && a->camera.height == 4 && a->format == SSDGS_PIXELS_RGBA8);
+        CHECK(!strcmp(a->file, FOLDER "/./a.png") && !strcmp(b->file, FOLDER "/b/c.png") && ((unsigned char *)a->pixels)[5] == 4);
+        CHECK(fabs((double)a->camera.fx - 3 / tan(0.5)) < 1e-5 &&
+            fabs((double)a->camera.fy - 3 / tan(0.5)) < 1e-5 && near_all(&a->camera.cx, light + 2, 1));
+        CHECK(near_all(a->camera.view, view, 12) && near_all(a->light.position, light, 3) &&
+            near_all(a->light.intensity, rgb, 3) && a->light.kind == SSDGS_LIGHT_POINT);
+        CHECK(near_all(b->camera.view, turned, 12) && near_all(b->light.position, dir, 3) &&
+            near_all(b->light.intensity, one, 3) && b->light.kind == SSDGS_LIGHT_DIRECTIONAL);
+        photos = olat_photos(&set);
+        CHECK(photos && photos[1].pixels == b->pixels && photos[1].camera.width == 3 &&
+            photos[0].light.intensity[0] == a->light.intensity[0]);
+        meter_free(photos);
+    }
+    olat_free(&set);
+    if (CHECK(loads("{\"fl_x\":10,\"fl_y\":11,\"cx\":2,\"cy\":1,\"w\":6,\"h\":4,\"k1\":0,\"frames\":["
+              "{\"file_path\":\"a.PNG\",\"camera_intrinsics\":[4,5,6,7]," LIGHT POSE "},{" LIGHT POSE "},"
+              "{\"camera_angle_x\":1,\"w\":8," LIGHT "\"transform_matrix\":[[2,0,0,0.5],[0,2,0,0],[0,0,2,4]]},"
+              "{" LIGHT "\"transform_matrix\":[[1,0,0],[0,1,0],[0,0,1]]}]}", OLAT_NO_IMAGES))) {
+        const olat_frame *f = set.frames;
+        const double own[4] = {6, 7, 4, 5}, shared[4] = {10, 11, 2, 1}, focal = 4 / tan(0.5);
+        CHECK(set.count == 4 && !f[0].pixels && !f[0].has_image &&
+            !strcmp(f[0].file, FOLDER "/a.PNG") && !f[1].file && f[1].camera.width == 6 && f[1].camera.height == 4);
+        CHECK(near_all(&f[0].camera.fx, own, 4) && near_all(&f[1].camera.fx, shared, 4) &&
+            near_all(&f[2].camera.fx, &focal, 1) && near_all(f[2].camera.view, view, 12));
+        CHECK(near_all(f[3].camera.view, view, 3) && fabs((double)f[3].camera.view[11]) < 1e-6);
+    }
+    olat_free(&set);
+    CHECK(loads(TOP "{" LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
+        set.frames[0].camera.width == 256 && set.frames[0].camera.height == 256);
+    olat_free(&set);
+    CHECK(loads(TOP "{\"file_path\":\"../t_olat/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
+    olat_free(&set);
+    CHECK(live == 0);
+
+    for (i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(load_fails(bad[i][0], 0, bad[i][1]));
+    for (i = 0; i < sizeof bad_paths / sizeof *bad_paths; i++) {
+        snprintf(text, sizeof text, TOP "{\"file_path\":\"%s\"," LIGHT POSE "}]}", bad_paths[i][0]);
+        CHECK(load_fails(text, 0, bad_paths[i][1]));
+        CHECK(!strchr(error, 27));
+    }
+    CHECK(olat_load(FOLDER, "none.json", 0, &set, error) && strstr(error, "none.json") && live == 0);
+    CHECK(olat_load(FOLDER, "b", 0, &set, error) && strstr(error, "regular") && live == 0);
+}
+
+static void test_memory(void) {
+    static const unsigned char grey[4] = {1, 2, 3, 4};
+    long n;
+    int done;
+    write_text(FOLDER "/set.json", TOP FRAME "," FRAME "]}");
+    for (n = 1, done = 0; !done && n < 100; n++) {
+        calls = 0, fail_at = n;
+        memset(error, 0, sizeof error);
+        done = !olat_load(FOLDER, "set.json", 0, &set, error);
+        if (done) olat_free(&set);
+        CHECK(live == 0 && (done || strstr(error, "out of memory")));
+    }
+    CHECK(done && n > 10);
+    for (n = 1, done = 0; !done && n < 20; n++) {
+        calls = 0, fail_at = n;
+        done = !olat_write_png(FOLDER "/grey.png", 2, 2, 1, grey, error);
+        CHECK(live == 0 && (done || strstr(error, "out of memory")));
+    }
+    fail_at = 0;
+    CHECK(done);
+}
+
+static void test_cow(void) {
+    static const char *const splits[2] = {"transforms_train.json", "transforms_test.json"};
+    FILE *stream = fopen("examples/data/waxcow/transforms_test.json", "rb");
+    int s, i;
+    if (!stream) {
+        printf("examples/data/waxcow: skipped\n");
+        return;
+    }
+    fclose(stream);
+    for (s = 0; s < 2; s++) {
+        if (!CHECK(!olat_load("examples/data/waxcow", splits[s], 0, &set, error))) printf("%s\n", error);
+        CHECK(set.count == (s ? 14 : 50));
+        for (i = 0; i < set.count; i++) {
+            const olat_frame *f = &set.frames[i];
+            const unsigned char *p = (const unsigned char *)f->pixels;
+            CHECK(f->camera.width == 128 && f->camera.height == 128 &&
+                fabs((double)f->camera.fx - 196.9715) < 1e-3 && f->camera.view[11] > 1);
+            CHECK(p[3] == 0 && p[4 * (64 * 128 + 64) + 3] == 255); /* the cow is in the middle */
+        }
+        olat_free(&set);
+    }
+    CHECK(live == 0);
+}
+
+int main(void) {
+    mkdir("build", 0777);
+    mkdir(FOLDER, 0777);
+    mkdir(FOLDER "/dir.png", 0777);
+    test_kinds();
+    test_dynamic();
+    test_damage();
+    test_streams();
+    test_chunks();
+    test_writer();
+    test_json();
+    test_numbers();
+    test_datasets();
+    test_memory();
+    test_cow();
+    TEST_END();
+}

@@ -1,0 +1,695 @@
+/* Model files: the round trip, the variants of PLY a reader meets, hostile files, failing memory and disks.
+   cc -I. -o build/t_ply tests/t_ply.c -lm -lpthread && build/t_ply       (writes under build/) */
+#ifndef _DEFAULT_SOURCE
+#define _DEFAULT_SOURCE /* directories, limits */
+#endif
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include <stdio.h>
+#ifndef _WIN32
+#include <dirent.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#endif
+
+static int passed, failed;
+
+static void check(int good, int line, const char *what) {
+    if (good) passed++;
+    else if (failed++ < 20) printf("t_ply.c:%d: failed: %s\n", line, what);
+}
+#define CHECK(condition) check((condition) != 0, __LINE__, #condition)
+
+/* ---- memory that counts and fails on demand ---- */
+
+typedef struct meter { long live, calls, fail_at; int for_ever; } meter;
+
+static void *meter_allocate(void *user, size_t bytes) {
+    meter *m = (meter *)user;
+    void *memory;
+    m->calls++;
+    if (m->fail_at && (m->calls == m->fail_at || (m->for_ever && m->calls > m->fail_at))) return NULL;
+    memory = malloc(bytes);
+    if (memory) m->live++;
+    return memory;
+}
+
+static void meter_release(void *user, void *memory) {
+    if (memory) ((meter *)user)->live--;
+    free(memory);
+}
+
+static meter memory;
+static ssdgs_context *context;
+
+/* ---- models ---- */
+
+static uint32_t random_state = 1;
+static uint32_t random_bits(void) { return random_state = random_state * 1664525u + 1013904223u; }
+
+static ssdgs_real from_bits(uint32_t bits) {
+    float x;
+    memcpy(&x, &bits, 4);
+    return (ssdgs_real)x;
+}
+
+static ssdgs_real uniform(double low, double high) { /* a float in every build */
+    return (ssdgs_real)(float)(low + (high - low) * (random_bits() >> 8) / 16777216.0);
+}
+
+static ssdgs_model *make_model(int count) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    ssdgs_model_view view;
+    size_t k;
+    int channel, i;
+    settings.scattering_layers = settings.shadow_layers = 2;
+    settings.scattering_width = 2;
+    settings.shadow_width = 3;
+    settings.dipole = SSDGS_DIPOLE_BURLEY;
+    settings.centre[1] = (ssdgs_real)(float)-0.3;
+    settings.eta = (ssdgs_real)(float)1.3;
+    settings.light_scale = (ssdgs_real)(float)1e-7;
+    if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
+    view = ssdgs_model_get(model);
+    for (channel = 0; channel < SSDGS_CHANNELS; channel++)
+        for (i = 0; i < count; i++) view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
+    if (count > 2) { /* least, largest, minus zero */
+        view.gaussians[SSDGS_DIFFUSE * view.stride] = from_bits(0x00800000u);
+        view.gaussians[SSDGS_DIFFUSE * view.stride + 1] = from_bits(0xff7fffffu);
+        view.gaussians[SSDGS_DIFFUSE * view.stride + 2] = from_bits(0x80000000u);
+    }
+    for (k = 0; k < SSDGS_ASG_COUNT * 4; k++) view.asg_basis[k] = uniform(-1, 1);
+    for (k = 0; k < SSDGS_ASG_COUNT * 2; k++) view.asg_sharpness[k] = uniform(-1, 1);
+    for (k = 0; k < SSDGS_ASG_COUNT; k++) view.asg_sigma[k] = uniform(-1, 1);
+    for (k = 0; k < view.scattering_count; k++) view.scattering[k] = uniform(-1, 1);
+    for (k = 0; k < view.shadow_count; k++) view.shadow[k] = uniform(-1, 1);
+    return model;
+}
+
+static int same_globals(ssdgs_model *a, ssdgs_model *b) {
+    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    const size_t real = sizeof *u.shadow;
+    return u.scattering_count == v.scattering_count && u.shadow_count == v.shadow_count &&
+           !memcmp(u.asg_basis, v.asg_basis, SSDGS_ASG_COUNT * 4 * real) &&
+           !memcmp(u.asg_sharpness, v.asg_sharpness, SSDGS_ASG_COUNT * 2 * real) &&
+           !memcmp(u.asg_sigma, v.asg_sigma, SSDGS_ASG_COUNT * real) &&
+           !memcmp(u.scattering, v.scattering, u.scattering_count * real) && !memcmp(u.shadow, v.shadow, u.shadow_count * real);
+}
+
+static int same_gaussians(ssdgs_model *a, ssdgs_model *b) {
+    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    int channel, equal = u.count == v.count;
+    for (channel = 0; equal && channel < SSDGS_CHANNELS; channel++)
+        equal = !memcmp(u.gaussians + (size_t)channel * u.stride, v.gaussians + (size_t)channel * v.stride,
+                        (size_t)u.count * sizeof(ssdgs_real));
+    return equal;
+}
+
+static int same(ssdgs_model *a, ssdgs_model *b) {
+    return a && b && same_gaussians(a, b) && same_globals(a, b) &&
+           !memcmp(ssdgs_model_settings(a), ssdgs_model_settings(b), sizeof(ssdgs_settings));
+}
+
+/* ---- bytes, and files in them ---- */
+
+typedef struct bytes { unsigned char *data; size_t size, room; } bytes;
+
+static void put(bytes *to, const void *from, size_t size) {
+    if (to->size + size > to->room) {
+        to->room = 2 * (to->size + size) + 1024;
+        to->data = (unsigned char *)realloc(to->data, to->room);
+        if (!to->data) exit(1);
+    }
+    memcpy(to->data + to->size, from, size);
+    to->size += size;
+}
+
+static void text(bytes *to, const char *words) { put(to, words, strlen(words)); }
+
+static bytes slurp(const char *path) {
+    bytes all = {NULL, 0, 0};
+    unsigned char part[4096];
+    size_t got;
+    FILE *file = fopen(path, "rb");
+    while (file && (got = fread(part, 1, sizeof part, file)) > 0) put(&all, part, got);
+    if (file) fclose(file);
+    return all;
+}
+
+/* Loads from a block of the exact size, so that a sanitizer sees every byte read beyond it. */
+static ssdgs_result load(const void *data, size_t size, ssdgs_model **model, ssdgs_load_stats *stats) {
+    void *copy = malloc(size ? size : 1);
+    ssdgs_result result;
+    if (!copy) exit(1);
+    if (size) memcpy(copy, data, size);
+    result = ssdgs_model_load_memory(context, copy, size, model, stats);
+    free(copy);
+    return result;
+}
+
+/* Must be refused, with a message, and leave nothing behind. */
+static int refused(const void *data, size_t size) {
+    const long live = memory.live;
+    ssdgs_model *model = NULL;
+    const ssdgs_result result = load(data, size, &model, NULL);
+    const int good = (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !model && ssdgs_error_message(context)[0] &&
+                     memory.live == live;
+    ssdgs_model_destroy(model);
+    return good;
+}
+
+static int refused_text(const char *data) { return refused(data, strlen(data)); }
+
+/* ---- a second writer: turns a saved file into its variants ---- */
+
+static uint32_t word_at(const unsigned char *p) {
+    return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+typedef struct column { char name[32]; int integer; } column;
+typedef struct table { char name[32]; int rows, columns; struct column column[64]; const unsigned char *data; } table;
+typedef struct document { struct table table[8]; int tables; } document;
+
+static document parse(const bytes *file) {
+    document d;
+    const char *line = (const char *)file->data;
+    const unsigned char *data;
+    int i;
+    memset(&d, 0, sizeof d);
+    for (; strncmp(line, "end_header", 10) != 0; line = strchr(line, '\n') + 1) {
+        table *t = d.tables ? &d.table[d.tables - 1] : NULL;
+        char type[8];
+        if (sscanf(line, "element %31s %d", d.table[d.tables].name, &d.table[d.tables].rows) == 2) d.tables++;
+        else if (t && sscanf(line, "property %7s %31s", type, t->column[t->columns].name) == 2)
+            t->column[t->columns++].integer = !strcmp(type, "int");
+    }
+    data = (const unsigned char *)line + 11;
+    for (i = 0; i < d.tables; i++) {
+        d.table[i].data = data;
+        data += (size_t)d.table[i].rows * (size_t)d.table[i].columns * 4;
+    }
+    CHECK(data == file->data + file->size);
+    return d;
+}
+
+enum { ASCII = 0, LITTLE, BIG };
+typedef struct variant {
+    int format;
+    const char *newline;
+    int wide;         /* double for float, short for int */
+    int reversed;     /* elements and properties in reverse order */
+    int extras;       /* properties, lists and elements that nobody knows */
+    const char *skip; /* this property or element is left out */
+} variant;
+
+static void put_value(bytes *to, const variant *v, const char *type, double value) {
+    unsigned char raw[8];
+    size_t size = 0, i;
+    char digits[40];
+    if (v->format == ASCII) {
+        sprintf(digits, type[0] == 'f' ? "%.9g " : type[0] == 'd' ? "%.17E\t" : "%.0f ", value);
+        text(to, digits);
+        return;
+    }
+    if (type[0] == 'f') {
+        const float x = (float)value;
+        uint32_t bits;
+        memcpy(&bits, &x, 4);
+        for (size = 4, i = 0; i < 4; i++) raw[i] = (unsigned char)(bits >> 8 * i);
+    } else if (type[0] == 'd') {
+        uint64_t bits;
+        memcpy(&bits, &value, 8);
+        for (size = 8, i = 0; i < 8; i++) raw[i] = (unsigned char)(bits >> 8 * i);
+    } else {
+        const int32_t x = (int32_t)value;
+        size = strstr(type, "short") ? 2 : strstr(type, "char") ? 1 : 4;
+        for (i = 0; i < size; i++) raw[i] = (unsigned char)((uint32_t)x >> 8 * i);
+    }
+    for (i = 0; i < size; i++) put(to, &raw[v->format == BIG ? size - 1 - i : i], 1);
+}
+
+static bytes emit(const document *d, const variant *v) {
+    static const char *const formats[3] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    const char *real = v->wide ? "double" : "float", *integer = v->wide ? "short" : "int";
+    bytes to = {NULL, 0, 0};
+    int pass, t, row, c;
+    char line[128];
+    sprintf(line, "ply%sformat %s 1.0%sobj_info of a test%s", v->newline, formats[v->format], v->newline, v->newline);
+    text(&to, line);
+    for (pass = 0; pass < 2; pass++) { /* header, data */
+        if (v->extras && !pass) {
+            sprintf(line, "element face 2%sproperty list uchar int corners%selement void 99999999%scomment  %s", v->newline,
+                    v->newline, v->newline, v->newline);
+            text(&to, line);
+        }
+        for (c = 0; v->extras && pass && c < 8; c++) put_value(&to, v, c == 0 || c == 4 ? "uchar" : "int", 3);
+        for (t = 0; t < d->tables; t++) {
+            const table *from = &d->table[v->reversed ? d->tables - 1 - t : t];
+            if (v->skip && !strcmp(from->name, v->skip)) continue;
+            if (!pass) {
+                sprintf(line, "element\t%s  %d %s", from->name, from->rows, v->newline);
+                text(&to, line);
+            }
+            for (row = 0; row < (pass ? from->rows : 1); row++) {
+                if (v->extras && !pass) {
+                    sprintf(line, "property list ushort double tags%sproperty char sign%s", v->newline, v->newline);
+                    text(&to, line);
+                }
+                if (v->extras && pass) {
+                    put_value(&to, v, "ushort", row % 3);
+                    for (c = 0; c < row % 3; c++) put_value(&to, v, "double", 1e300);
+                    put_value(&to, v, "char", -1);
+                }
+                for (c = 0; c < from->columns; c++) {
+                    const int k = v->reversed ? from->columns - 1 - c : c;
+                    const unsigned char *raw = from->data + ((size_t)row * (size_t)from->columns + (size_t)k) * 4;
+                    const uint32_t bits = word_at(raw);
+                    const char *type = from->column[k].integer ? integer : real;
+                    if (v->skip && !strcmp(from->column[k].name, v->skip)) continue;
+                    if (pass) {
+                        put_value(&to, v, type, from->column[k].integer ? (double)(int32_t)bits : (double)from_bits(bits));
+                    } else {
+                        sprintf(line, "property %s %s%s", type, from->column[k].name, v->newline);
+                        text(&to, line);
+                    }
+                }
+                if (pass && v->format == ASCII) text(&to, v->newline);
+            }
+        }
+        if (!pass) text(&to, "end_header"), text(&to, v->newline);
+    }
+    return to;
+}
+
+/* ---- the tests ---- */
+
+static const char path[] = "build/t_ply.ply";
+
+static bytes saved(const ssdgs_model *model) {
+    CHECK(ssdgs_model_save(model, path) == SSDGS_OK);
+    return slurp(path);
+}
+
+static void test_round_trip(void) {
+    static const int counts[3] = {0, 1, 777};
+    ssdgs_load_stats stats;
+    int i;
+    for (i = 0; i < 3; i++) {
+        ssdgs_model *model = make_model(counts[i]), *back = NULL, *again = NULL;
+        bytes file = saved(model);
+        CHECK(ssdgs_model_load(context, path, &back, &stats) == SSDGS_OK && same(model, back));
+        CHECK(!stats.plain && !stats.dropped && !stats.zero_rotations && !stats.clamped_opacities && !stats.clamped_scales);
+        CHECK(load(file.data, file.size, &again, NULL) == SSDGS_OK && same(model, again));
+        CHECK(file.size > 300 && !strncmp((char *)file.data, "ply\nformat binary_little_endian 1.0\nelement vertex ", 50));
+        ssdgs_model_destroy(model);
+        ssdgs_model_destroy(back);
+        ssdgs_model_destroy(again);
+        free(file.data);
+    }
+}
+
+static void test_variants(void) {
+    static const char *const newlines[3] = {"\n", "\r\n", "\r"};
+    ssdgs_model *model = make_model(20), *back;
+    bytes file = saved(model), other;
+    document d = parse(&file);
+    int k, c;
+    for (k = 0; k < 72; k++) {
+        variant v;
+        v.format = k % 3;
+        v.newline = newlines[k / 3 % 3];
+        v.wide = k / 9 % 2;
+        v.reversed = k / 18 % 2;
+        v.extras = k / 36 % 2;
+        v.skip = NULL;
+        other = emit(&d, &v);
+        back = NULL;
+        CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
+        ssdgs_model_destroy(back);
+        if (v.format == ASCII) { /* the end of the last line may be missing */
+            CHECK(load(other.data, other.size - strlen(v.newline) - 1, &back, NULL) == SSDGS_OK && same(model, back));
+            ssdgs_model_destroy(back);
+        }
+        free(other.data);
+    }
+    for (k = 0; k < d.tables; k++) { /* every property of every element is missed by its name, but for those that others use */
+        for (c = 0; c < d.table[k].columns; c++) {
+            variant v = {LITTLE, "\n", 0, 0, 0, NULL};
+            const char *name = v.skip = d.table[k].column[c].name;
+            other = emit(&d, &v);
+            if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") || !strcmp(name, "nz")) {
+                CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
+                ssdgs_model_destroy(back);
+            } else {
+                CHECK(refused(other.data, other.size) && strstr(ssdgs_error_message(context), name));
+            }
+            free(other.data);
+        }
+    }
+    for (k = 2; k < d.tables; k++) { /* without weights or bases */
+        variant v = {BIG, "\n", 0, 0, 0, NULL};
+        v.skip = d.table[k].name;
+        other = emit(&d, &v);
+        CHECK(refused(other.data, other.size) && strstr(ssdgs_error_message(context), v.skip));
+        free(other.data);
+    }
+    ssdgs_model_destroy(model);
+    free(file.data);
+}
+
+/* Files of others: the published implementation's, plain splats, points with colours. */
+static void test_foreign(void) {
+    ssdgs_model *model = make_model(5), *back = NULL, *fresh = NULL;
+    const ssdgs_settings published = ssdgs_settings_published();
+    bytes file = saved(model), other = {NULL, 0, 0};
+    document d = parse(&file);
+    variant v = {LITTLE, "\n", 0, 0, 0, NULL};
+    ssdgs_load_stats stats;
+    ssdgs_model_view view, neutral;
+    char line[64];
+    int i, j, channel;
+
+    d.tables = 1;
+    other = emit(&d, &v);
+    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && same_gaussians(model, back) && !stats.plain);
+    CHECK(ssdgs_model_create(context, &published, 0, &fresh) == SSDGS_OK && back && same_globals(fresh, back));
+    CHECK(back && !memcmp(ssdgs_model_settings(back), &published, sizeof published));
+    ssdgs_model_destroy(model);
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(fresh);
+    free(other.data);
+    free(file.data);
+
+    memset(&other, 0, sizeof other); /* 62 floats */
+    text(&other, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property float nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty float f_dc_1\n"
+                 "property float f_dc_2\n");
+    for (i = 0; i < 45; i++) sprintf(line, "property float f_rest_%d\n", i), text(&other, line);
+    text(&other, "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+                 "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n");
+    for (j = 0; j < 3; j++)
+        for (i = 0; i < 62; i++)
+            put_value(&other, &v, "float", i == 6 ? -3 : i < 9 ? i + 0.5 * j : i < 54 ? 1e30 : i == 54 ? 25 : 0.25 * i - 14);
+    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
+    if (back) {
+        view = ssdgs_model_get(back);
+        CHECK(stats.plain && stats.clamped_opacities == 3 && stats.dropped == 0 && stats.zero_rotations == 0 && view.count == 3);
+        CHECK(ssdgs_model_settings(back)->baked == 1 && ssdgs_model_settings(back)->transfer == SSDGS_TRANSFER_NONE);
+        CHECK(ssdgs_model_create(context, ssdgs_model_settings(back), 3, &fresh) == SSDGS_OK && same_globals(back, fresh));
+        CHECK(view.gaussians[view.stride + 2] == 2 && view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
+              view.gaussians[SSDGS_LOG_SCALE * view.stride + 1] == (ssdgs_real)-0.25 &&
+              view.gaussians[(SSDGS_ROTATION + 3) * view.stride] == (ssdgs_real)1.25);
+        CHECK(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) < 2e-6); /* below black */
+        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 - 0.28209479 * 7.5) < 1e-6);
+        if (fresh) neutral = ssdgs_model_get(fresh);
+        for (channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
+            CHECK(view.gaussians[(size_t)channel * view.stride] == neutral.gaussians[(size_t)channel * neutral.stride]);
+        file = saved(back); /* a baked model keeps its colours, f_dc shows them */
+        d = parse(&file);
+        CHECK(fabs((double)from_bits(word_at(d.table[0].data + 28)) - 7) < 1e-5);
+        free(file.data);
+    }
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(fresh);
+    free(other.data);
+
+    back = NULL;
+    memset(&other, 0, sizeof other);
+    text(&other, "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float opacity\nproperty float scale_0\n"
+                 "property float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\n"
+                 "property float rot_2\nproperty float rot_3\nend_header\n"
+                 "1 2 3 255 0 51 inf 0 0 0 1 0 0 0\n1 2 3 0 0 0 -Infinity 0 -INF 1e3 0 0 0 0\n"
+                 "nan 2 3 0 0 0 1 0 0 0 1 0 0 0\n1 2 3 0 0 0 NaN 0 0 0 1 0 0 0\n.5 -5.E-1 +1e999 0 0 0 1 0 0 0 1 0 0 0\n");
+    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
+    if (back) {
+        view = ssdgs_model_get(back);
+        CHECK(view.count == 2 && stats.dropped == 3 && stats.zero_rotations == 1);
+        CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 2);
+        CHECK(view.gaussians[SSDGS_OPACITY * view.stride] == 20 && view.gaussians[SSDGS_OPACITY * view.stride + 1] == -20);
+        CHECK(view.gaussians[SSDGS_ROTATION * view.stride + 1] == 1);
+        CHECK(view.gaussians[(SSDGS_LOG_SCALE + 1) * view.stride + 1] == -20);
+        CHECK(fabs(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) - 1) < 1e-6);
+        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 2) * view.stride])) - 0.2) < 1e-6);
+    }
+    ssdgs_model_destroy(back);
+    free(other.data);
+}
+
+static void test_mending(void) {
+    ssdgs_model *model = make_model(8), *back = NULL;
+    ssdgs_model_view view = ssdgs_model_get(model);
+    const size_t stride = view.stride;
+    ssdgs_load_stats stats;
+    bytes file;
+    int i;
+    for (i = 0; i < 4; i++) {
+        view.gaussians[(size_t)(SSDGS_ROTATION + i) * stride + 1] = 0;
+        view.gaussians[(size_t)(SSDGS_FRAME + i) * stride + 2] = 0;
+    }
+    view.gaussians[SSDGS_OPACITY * stride + 3] = from_bits(0x7f800000u);
+    view.gaussians[SSDGS_OPACITY * stride + 4] = -21;
+    view.gaussians[SSDGS_LOG_SCALE * stride + 4] = from_bits(0xff800000u);
+    view.gaussians[SSDGS_MATERIAL * stride + 0] = from_bits(0x7fc00000u);
+    view.gaussians[SSDGS_POSITION * stride + 7] = from_bits(0xff800000u);
+    file = saved(model);
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK);
+    if (back) {
+        const ssdgs_model_view now = ssdgs_model_get(back);
+        CHECK(now.count == 6 && stats.dropped == 2 && stats.zero_rotations == 2);
+        CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 1);
+        CHECK(now.gaussians[SSDGS_ROTATION * now.stride] == 1 && now.gaussians[SSDGS_FRAME * now.stride + 1] == 1);
+        CHECK(now.gaussians[SSDGS_OPACITY * now.stride + 2] == 20 && now.gaussians[SSDGS_OPACITY * now.stride + 3] == -20);
+        CHECK(now.gaussians[SSDGS_LOG_SCALE * now.stride + 3] == -20);
+        CHECK(now.gaussians[SSDGS_POSITION * now.stride + 5] == view.gaussians[SSDGS_POSITION * stride + 6]);
+    }
+    free(file.data);
+    ssdgs_model_destroy(back);
+    view.shadow[5] = from_bits(0x7fc00000u);
+    file = saved(model);
+    CHECK(refused(file.data, file.size));
+    free(file.data);
+    ssdgs_model_destroy(model);
+}
+
+static void test_numbers(void) {
+    static const struct { const char *text; int good; uint32_t bits; } cases[] = {
+        {"0", 1, 0}, {"-0", 1, 0x80000000u}, {"1", 1, 0x3f800000u}, {"+1.", 1, 0x3f800000u}, {".5", 1, 0x3f000000u},
+        {"16777217", 1, 0x4b800000u}, {"16777219", 1, 0x4b800002u}, {"3.4028235e38", 1, 0x7f7fffffu}, {"1e39", 1, 0x7f800000u},
+        {"-1E+999999999999", 1, 0xff800000u}, {"1e-999999999999", 1, 0}, {"0e5", 1, 0}, {"inf", 1, 0x7f800000u},
+        {"-Infinity", 1, 0xff800000u}, {"nan", 1, 0x7fc00000u}, {"100000000000000000000000000000e-29", 1, 0x3f800000u},
+        {"0.00000000000000000000000000000000000000001e41", 1, 0x3f800000u}, {"", 0, 0}, {"-", 0, 0}, {".", 0, 0}, {"e5", 0, 0},
+        {"1e", 0, 0}, {"1e+", 0, 0}, {"1.2.3", 0, 0}, {"0x10", 0, 0}, {"1,5", 0, 0}, {"infinit", 0, 0}, {"nanx", 0, 0},
+        {"--1", 0, 0}
+    };
+    size_t k;
+    int wrong = 0;
+    for (k = 0; k < sizeof cases / sizeof *cases; k++) {
+        ssdgs__ply_token token;
+        uint32_t bits = 0;
+        token.text = (const unsigned char *)cases[k].text;
+        token.length = strlen(cases[k].text);
+        if (ssdgs__ply_number(token, &bits) == cases[k].good && (!cases[k].good || bits == cases[k].bits)) continue;
+        printf("%s gives %08x\n", cases[k].text, (unsigned)bits);
+        wrong++;
+    }
+    for (k = 0; k < 100000; k++) { /* nine digits tell every float */
+        const uint32_t want = random_bits() ^ random_bits() << 16;
+        char digits[40];
+        ssdgs__ply_token token;
+        uint32_t bits = 0;
+        if ((want & 0x7f800000u) == 0x7f800000u || !(want & 0x7f800000u)) continue;
+        sprintf(digits, k % 2 ? "%.9g" : "%.17g", (double)from_bits(want));
+        token.text = (const unsigned char *)digits;
+        token.length = strlen(digits);
+        wrong += !ssdgs__ply_number(token, &bits) || bits != want;
+    }
+    CHECK(wrong == 0);
+}
+
+#define START "ply\nformat binary_little_endian 1.0\n"
+#define XYZ "property float x\nproperty float y\nproperty float z\n"
+
+static void test_hostile(void) {
+    static const char *const attacks[] = {
+        "", "p", "ply", "ply\n", "PLY\nformat ascii 1.0\nend_header\n", "plyx\nformat ascii 1.0\nend_header\n",
+        "ply\nend_header\n", "ply\nformat ascii 1.0\nelement vertex 0\n", START "end_header\n",
+        START "element vertex 0\nend_header\n", "ply\nformat ascii 2.0\nend_header\n", "ply\nformat binary 1.0\nend_header\n",
+        START "format ascii 1.0\nend_header\n", START "element vertex -1\n" XYZ "end_header\n",
+        START "element vertex 1e9\n" XYZ "end_header\n", START "element vertex 18446744073709551616\n" XYZ "end_header\n",
+        START "element vertex 9223372036854775808\n" XYZ "end_header\n",
+        START "element vertex 1537228672809129302\n" XYZ "end_header\n", START "element vertex 4000000000\n" XYZ "end_header\n",
+        START "element vertex\n" XYZ "end_header\n", START "element vertex 1 2\n" XYZ "end_header\n", START XYZ "end_header\n",
+        START "element vertex 0x10\n" XYZ "end_header\n",
+        START "element vertex 0\nproperty float x\nproperty float x\nend_header\n",
+        START "element vertex 0\nelement vertex 0\nend_header\n", START "element vertex 0\nproperty half x\nend_header\n",
+        START "element vertex 0\nproperty list float int x\nend_header\n",
+        START "element vertex 0\nproperty list uchar x\nend_header\n", START "\nelement vertex 0\nend_header\n",
+        START "vertex 0\nend_header\n", START "element vertex 0\nend_header now\n",
+        START "element face 1\nproperty list char int x\nend_header\n\377abcdefghijkl",
+        START "element face 1\nproperty list int int x\nend_header\n\377\377\377\377abcdefghijkl",
+        START "element face 1\nproperty list uint double x\nend_header\n\377\377\377\377abcdefghijkl",
+        START "element face 9\nproperty list uchar double x\nend_header\n\001abcdefgh",
+        "ply\nformat ascii 1.0\nelement vertex 1000000000\n" XYZ "end_header\n1 2 3\n",
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n-1 2 3\n",
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n99999999999999999999 2 3\n",
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n3 1 2\n",
+        START "element vertex 18446744073709551615\nend_header\n"
+    };
+    bytes b = {NULL, 0, 0};
+    char line[64];
+    size_t k;
+    int i;
+    for (k = 0; k < sizeof attacks / sizeof *attacks; k++) {
+        CHECK(refused_text(attacks[k]));
+        if (!refused_text(attacks[k])) printf("accepted: %s\n", attacks[k]);
+    }
+    for (i = 0; i < 4; i++) { /* too many properties, elements, bytes in a line, lines */
+        b.size = 0;
+        text(&b, START "element vertex 0\n");
+        for (k = 0; k < 1100 && i == 0; k++) sprintf(line, "property float p%d\n", (int)k), text(&b, line);
+        for (k = 0; k < 70 && i == 1; k++) sprintf(line, "element e%d 0\n", (int)k), text(&b, line);
+        if (i == 2) text(&b, "comment ");
+        for (k = 0; k < 5000 && i == 2; k++) text(&b, "x");
+        for (k = 0; k < 5000 && i == 3; k++) text(&b, "\ncomment and so on");
+        text(&b, "\nend_header\n");
+        CHECK(refused(b.data, b.size));
+    }
+    free(b.data);
+}
+
+/* Every truncation is refused; no damaged byte does harm. */
+static void test_damage(void) {
+    ssdgs_model *model = make_model(2), *back;
+    bytes file = saved(model), other;
+    document d = parse(&file);
+    variant v = {ASCII, "\r\n", 0, 1, 1, NULL};
+    const long live = memory.live;
+    int format, bad = 0;
+    size_t k;
+    for (k = 0; k < file.size; k++) bad += !refused(file.data, k);
+    CHECK(bad == 0);
+    for (format = ASCII; format <= BIG; format++) {
+        v.format = format;
+        other = emit(&d, &v);
+        for (k = 0; k < other.size; k++) {
+            const unsigned char good = other.data[k];
+            const ssdgs_result cut = load(other.data, k, &back, NULL);
+            ssdgs_model_destroy(back);
+            bad += format == ASCII ? k + 20 < other.size && cut == SSDGS_OK : cut == SSDGS_OK;
+            other.data[k] = (unsigned char)(k % 3 ? good ^ 1u << (random_bits() >> 29) : random_bits() >> 24);
+            if (load(other.data, other.size, &back, NULL) != SSDGS_OK) bad += back != NULL || !ssdgs_error_message(context)[0];
+            ssdgs_model_destroy(back);
+            other.data[k] = good;
+        }
+        CHECK(bad == 0 && memory.live == live);
+        free(other.data);
+    }
+    ssdgs_model_destroy(model);
+    free(file.data);
+}
+
+static int temporaries(void) {
+    int count = 0;
+#ifndef _WIN32
+    DIR *directory = opendir("build");
+    struct dirent *entry;
+    while (directory && (entry = readdir(directory)) != NULL)
+        count += strstr(entry->d_name, "t_ply") && strstr(entry->d_name, ".tmp.");
+    if (directory) closedir(directory);
+#endif
+    return count;
+}
+
+static void test_memory(void) {
+    ssdgs_model *model = make_model(10), *back;
+    bytes file = saved(model);
+    const long live = memory.live;
+    int what;
+    for (what = 0; what < 6; what++) { /* load from memory, from a file, save; one failure, failing from then on */
+        int n, done = 0;
+        for (n = 1; n < 100 && !done; n++) {
+            ssdgs_result result;
+            back = NULL;
+            memory.calls = 0;
+            memory.fail_at = n;
+            memory.for_ever = what % 2;
+            result = what / 2 == 0 ? load(file.data, file.size, &back, NULL)
+                   : what / 2 == 1 ? ssdgs_model_load(context, path, &back, NULL) : ssdgs_model_save(model, path);
+            memory.fail_at = 0;
+            done = memory.calls < n;
+            CHECK(done ? result == SSDGS_OK && (what / 2 == 2 || same(model, back)) : result == SSDGS_ERR_MEMORY && !back);
+            ssdgs_model_destroy(back);
+            CHECK(memory.live == live);
+        }
+        CHECK(done && n > 2);
+    }
+    CHECK(temporaries() == 0);
+    CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK && same(model, back)); /* the context still works */
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(model);
+    free(file.data);
+}
+
+static void test_disk(void) {
+    ssdgs_model *model = make_model(2000), *old = make_model(3), *back = NULL;
+    const long live = memory.live;
+    CHECK(ssdgs_model_save(old, path) == SSDGS_OK);
+    CHECK(ssdgs_model_save(model, "build/t_ply.none/t_ply.ply") == SSDGS_ERR_IO);
+    CHECK(strstr(ssdgs_error_message(context), "build/t_ply.none/t_ply.ply"));
+    CHECK(ssdgs_model_load(context, "build/t_ply.absent", &back, NULL) == SSDGS_ERR_IO && !back);
+    CHECK(ssdgs_model_load(context, "build", &back, NULL) != SSDGS_OK && !back);
+    CHECK(ssdgs_model_save(NULL, path) == SSDGS_ERR_ARGUMENT && ssdgs_model_save(model, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_load(context, NULL, &back, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_load(NULL, path, &back, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_load_memory(context, NULL, 0, &back, NULL) == SSDGS_ERR_ARGUMENT);
+#ifndef _WIN32
+    {
+        struct rlimit limit, tight;
+        mkdir("build/t_ply.folder", 0777);
+        CHECK(ssdgs_model_save(model, "build/t_ply.folder") == SSDGS_ERR_IO); /* the rename fails */
+        rmdir("build/t_ply.folder");
+        signal(SIGXFSZ, SIG_IGN); /* a disk that is full after 100,000 bytes */
+        getrlimit(RLIMIT_FSIZE, &limit);
+        tight = limit;
+        tight.rlim_cur = 100000;
+        setrlimit(RLIMIT_FSIZE, &tight);
+        CHECK(ssdgs_model_save(model, path) == SSDGS_ERR_IO);
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+#endif
+    CHECK(temporaries() == 0 && memory.live == live);
+    CHECK(ssdgs_model_load(context, path, &back, NULL) == SSDGS_OK && same(old, back));
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(old);
+    ssdgs_model_destroy(model);
+    remove(path);
+}
+
+int main(void) {
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 1;
+    desc.allocator.allocate = meter_allocate;
+    desc.allocator.release = meter_release;
+    desc.allocator.user = &memory;
+#ifndef _WIN32
+    mkdir("build", 0777);
+#endif
+    if (ssdgs_context_create(&desc, &context) != SSDGS_OK) return 1;
+    test_round_trip();
+    test_variants();
+    test_foreign();
+    test_mending();
+    test_numbers();
+    test_hostile();
+    test_damage();
+    test_memory();
+    test_disk();
+    ssdgs_context_destroy(context);
+    CHECK(memory.live == 0);
+    printf("t_ply: %d passed, %d failed\n", passed, failed);
+    return failed != 0;
+}

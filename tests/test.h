@@ -1,0 +1,145 @@
+/* The tests' tools: checks that count, and the reader of .gold files. Each program closes with "N passed, N failed". */
+#ifndef SSDGS_TEST_H
+#define SSDGS_TEST_H
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int test_passed, test_failed;
+
+static inline int test_check(int ok, const char *file, int line, const char *what)
+{
+    if (ok) test_passed++;
+    else test_failed++, printf("%s:%d: failed: %s\n", file, line, what);
+    return ok;
+}
+
+/* By the bits: -ffast-math folds isfinite to a constant. */
+static inline int test_finite(double value)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return ((bits >> 52) & 0x7ff) != 0x7ff;
+}
+
+/* How far got is outside of absolute + relative * |want|: 1 is just inside. */
+static inline double test_error(double got, double want, double absolute, double relative)
+{
+    return test_finite(got) ? fabs(got - want) / (absolute + relative * fabs(want) + 1e-300) : 1e300;
+}
+
+#define CHECK(condition) test_check(!!(condition), __FILE__, __LINE__, #condition)
+
+/* got, want: arrays of any number type. */
+#define CHECK_NEAR(got, want, count, absolute, relative, name)                                                         \
+    do {                                                                                                               \
+        size_t test_i, test_worst = 0, test_count = (size_t)(count);                                                   \
+        double test_e, test_max = 0;                                                                                   \
+        for (test_i = 0; test_i < test_count; test_i++) {                                                              \
+            test_e = test_error((double)(got)[test_i], (double)(want)[test_i], absolute, relative);                    \
+            if (test_e > test_max) test_max = test_e, test_worst = test_i;                                             \
+        }                                                                                                              \
+        if (!test_check(test_count > 0 && test_max <= 1, __FILE__, __LINE__, name) && test_count > 0)                  \
+            printf("    worst at %lu of %lu: got %.9g, want %.9g, %.3g times the tolerance\n",                         \
+                   (unsigned long)test_worst, (unsigned long)test_count, (double)(got)[test_worst],                    \
+                   (double)(want)[test_worst], test_max);                                                              \
+    } while (0)
+
+/* |got - want| <= relative |want| in the 2-norm. */
+#define CHECK_L2(got, want, count, relative, name)                                                                     \
+    do {                                                                                                               \
+        size_t test_i, test_count = (size_t)(count);                                                                   \
+        double test_d, test_sum = 0, test_norm = 0;                                                                    \
+        for (test_i = 0; test_i < test_count; test_i++) {                                                              \
+            test_d = (double)(got)[test_i] - (double)(want)[test_i];                                                   \
+            test_sum += test_finite(test_d) ? test_d * test_d : 1e300;                                                 \
+            test_norm += (double)(want)[test_i] * (double)(want)[test_i];                                              \
+        }                                                                                                              \
+        if (!test_check(test_count > 0 && test_sum <= (relative) * (relative) * test_norm, __FILE__, __LINE__, name))  \
+            printf("    relative error %.3g over %lu values, norm %.3g\n", sqrt(test_sum / (test_norm + 1e-300)),      \
+                   (unsigned long)test_count, sqrt(test_norm));                                                        \
+    } while (0)
+
+#define TEST_END()                                                                                                     \
+    do {                                                                                                               \
+        printf("%d passed, %d failed\n", test_passed, test_failed);                                                    \
+        return test_failed != 0;                                                                                       \
+    } while (0)
+
+/* ---- golden files ---- */
+
+#define GOLD_ARRAYS 256
+typedef struct gold_array {
+    char name[33];
+    uint32_t dims[4]; /* unused = 1 */
+    size_t count;
+    double *data;
+} gold_array;
+typedef struct gold_file {
+    char path[1024];
+    int count;
+    gold_array array[GOLD_ARRAYS];
+} gold_file;
+
+/* The array called name; none ends the program, which counts as failed for want of its closing line. */
+static inline gold_array *gold_find(gold_file *file, const char *name)
+{
+    int i;
+    for (i = 0; i < file->count; i++)
+        if (!strcmp(file->array[i].name, name)) return &file->array[i];
+    printf("%s: holds no array %s\n", file->path, name);
+    exit(1);
+    return NULL; /* for tcc */
+}
+
+static inline const double *gold(gold_file *file, const char *name, size_t *count)
+{
+    gold_array *array = gold_find(file, name);
+    if (count) *count = array->count;
+    return array->data;
+}
+
+static inline void gold_close(gold_file *file)
+{
+    while (file->count > 0) free(file->array[--file->count].data);
+}
+
+static inline uint32_t gold_u32(FILE *stream)
+{
+    unsigned char b[4] = {0, 0, 0, 0};
+    if (fread(b, 1, 4, stream) != 4) return 0;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+/* Reads name.gold of the folder $SSDGS_GOLDEN, else tests/golden. 0, and a failed check, when it cannot be read. */
+static inline int gold_open(gold_file *file, const char *name)
+{
+    const char *folder = getenv("SSDGS_GOLDEN");
+    char magic[8];
+    uint32_t i, k, count;
+    int ok;
+    FILE *stream;
+    file->count = 0;
+    snprintf(file->path, sizeof file->path, "%s/%s.gold", folder && *folder ? folder : "tests/golden", name);
+    stream = fopen(file->path, "rb");
+    ok = stream && fread(magic, 1, 8, stream) == 8 && !memcmp(magic, "SSDGOLD1", 8);
+    count = ok ? gold_u32(stream) : 0;
+    ok = ok && count <= GOLD_ARRAYS;
+    for (i = 0; ok && i < count; i++) {
+        gold_array *array = &file->array[i];
+        ok = fread(array->name, 1, 32, stream) == 32;
+        array->name[32] = 0;
+        gold_u32(stream);
+        for (k = 0, array->count = 1; k < 4; k++) array->count *= array->dims[k] = gold_u32(stream);
+        array->data = (double *)malloc(array->count * sizeof(double) + 1);
+        file->count++;
+        ok = ok && array->data && fread(array->data, sizeof(double), array->count, stream) == array->count;
+    }
+    if (stream) fclose(stream);
+    if (!test_check(ok, file->path, 0, "a golden file that can be read")) gold_close(file);
+    return ok;
+}
+
+#endif
