@@ -300,6 +300,8 @@ typedef struct ssdgs_train_options {
     uint64_t seed;             /* 1 */
     int schedule;              /* ssdgs_schedule */
     ssdgs_real background[3];  /* stored values */
+    int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
+                                  pass for a dark background; 0: on `background` */
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
     int initial_points;        /* random Gaussians when the model is empty */
     ssdgs_real bounds_min[3], bounds_max[3]; /* where they start */
@@ -374,6 +376,7 @@ typedef struct ssdgs_splat_view {
     int compensate;             /* opacity compensated for the blur */
     int blur;                   /* ssdgs_blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
+    ssdgs_real steepest;        /* centres beyond this slope x / z, y / z are not drawn */
     /* SSDGS_STAGE_PROJECT */
     ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
     ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn */
@@ -584,7 +587,7 @@ enum { /* rows of a block's geometry */
 /* ---- what the kernels are called with ---- */
 
 typedef struct ssdgs__projection {
-    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold;
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, steepest, log2_threshold;
     int width, height, orthographic, by_distance, compensate, blur;
 } ssdgs__projection;
 
@@ -1090,13 +1093,13 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
         zero.allocator.allocate = ssdgs__default_allocate;
         zero.allocator.release = ssdgs__default_release;
     }
-    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table(zero.isa))) return SSDGS_ERR_ISA;
+    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)zero.isa))) return SSDGS_ERR_ISA;
     context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
     context->logger = zero.logger;
     context->gpu = zero.gpu;
-    context->isa = zero.isa;
+    context->isa = (int)zero.isa;
     for (isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) context->isa = isa;
     context->k = ssdgs__table(context->isa);
@@ -1579,6 +1582,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         v->blur = settings->light_blur;
         v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
         v->cx = v->cy = (ssdgs_real)map / 2;
+        v->steepest = (ssdgs_real)1e30;
         if (faces == 6) {
             for (i = 0; i < 3; i++) {
                 direction[i] = i == face / 2 ? (face & 1 ? -1 : 1) : 0;
@@ -1586,6 +1590,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
             }
             f = 0.5 * map;
             v->near_plane = (ssdgs_real)(1e-4 * radius);
+            v->steepest = (ssdgs_real)1.5; /* a face ends at 1; far beside it the affine projection means nothing */
             v->by_distance = 1;
         } else {
             v->orthographic = distance > 1000 * radius;
@@ -1701,6 +1706,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->views[0].cy = camera->cy;
     frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
     frame->views[0].compensate = frame->options.antialias;
+    frame->views[0].steepest = (ssdgs_real)1e30;
     memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, frame->views + j);
     pixels = (size_t)camera->width * (size_t)camera->height;
@@ -1746,6 +1752,7 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.cx = v->cx;
     p.cy = v->cy;
     p.near_plane = v->near_plane;
+    p.steepest = v->steepest;
     p.log2_threshold = ssdgs__log2_threshold(frame);
     p.width = v->width;
     p.height = v->height;
@@ -2205,7 +2212,8 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
         p.b = activations;
         p.bias = weights + in * out;
         p.out = activations += in * SSDGS__BLOCK;
-        p.out_stride = p.b_stride = p.columns = SSDGS__BLOCK;
+        p.out_stride = p.b_stride = SSDGS__BLOCK;
+        p.columns = SSDGS__BLOCK;
         p.rows = sizes[layer + 1];
         p.depth = sizes[layer];
         p.relu = layer < layers - 1;
@@ -2247,7 +2255,8 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         k->dense(&p);
         k->row_sums(dweights + at + in * out, d, (int)out);
         p.out = spare; /* dx = W^T d */
-        p.out_stride = p.b_stride = p.columns = SSDGS__BLOCK;
+        p.out_stride = p.b_stride = SSDGS__BLOCK;
+        p.columns = SSDGS__BLOCK;
         p.a = weights + at;
         p.a_row = 1;
         p.a_k = in;
@@ -3926,6 +3935,7 @@ struct ssdgs_trainer {
     ssdgs_train_options options;
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
+    unsigned char *transparent; /* per photograph: any pixel lets the background through */
     int photo_count;
     uint32_t *order;          /* the photographs in this pass's order */
     size_t stride;            /* of the planes below: the model's capacity */
@@ -3947,6 +3957,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.version = SSDGS_VERSION;
     o.iterations = 60000;
     o.seed = 1;
+    o.random_background = 1;
     o.dssim = (ssdgs_real)0.2;
     o.initial_points = 10000;
     for (i = 0; i < 3; i++) {
@@ -4481,6 +4492,7 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
     context = trainer->context;
     ssdgs__release(context, trainer->photos);
     ssdgs__release(context, trainer->corrections);
+    ssdgs__release(context, trainer->transparent);
     ssdgs__release(context, trainer->order);
     ssdgs__release(context, trainer->mean);
     ssdgs__release(context, trainer->square);
@@ -4517,11 +4529,19 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->photos = (ssdgs_photo *)ssdgs__allocate(context, (size_t)photo_count * sizeof *photos);
     trainer->corrections = (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
     trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
+    trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
     trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
+    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
+    for (i = 0; i < photo_count; i++) {
+        const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
+        size_t at;
+        for (at = 0; at < pixels && !trainer->transparent[i]; at++)
+            trainer->transparent[i] = photos[i].format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photos[i].pixels)[4 * at + 3] < 255
+                                                                             : ((const uint16_t *)photos[i].pixels)[4 * at + 3] < 65535;
+    }
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -4604,6 +4624,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs_light light;
     ssdgs_result result;
     ssdgs__correction *correction;
+    ssdgs_real background[3];
     double t, gradient[9], until;
     int learns[SSDGS__GROUPS], terms, photo, j;
     if (stats) memset(stats, 0, sizeof *stats);
@@ -4613,8 +4634,11 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     terms = ssdgs__phase(o, t, learns) & trainer->model->settings.terms;
     photo = ssdgs__next_photo(trainer);
     correction = trainer->corrections + photo;
+    for (j = 0; j < 3; j++)
+        background[j] = o->random_background && trainer->transparent[photo]
+                            ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B), 3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, o->background, terms, o->dssim, &values);
+    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, o->dssim, &values);
     if (!result) {
         result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
         if (result == SSDGS_ERR_NONFINITE) trainer->skipped++;
@@ -5322,6 +5346,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         /* NaN fails every comparison, so nothing that is not finite is drawn */
         drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)), VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
+        for (f = 0; f < 2; f++) drawn = VAND(drawn, VLT(VABS(VMUL(p.t[f], p.inverse_z)), VSET(k->steepest)));
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
         VSTORE(lane, VSEL(drawn, d, VSET(-1)));
@@ -5612,7 +5637,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                         w = VMUL(alpha, t[v]);
                         sum[3] = VFMA(omega[v], w, sum[3]);
                         b[v] = VFMA(w, distance, b[v]);
-                        t[v] = VSUB(t[v], w);
+                        t[v] = VMAX(VSUB(t[v], w), VSET(1e-20)); /* no subnormals deep inside */
                     }
                 }
                 if (any) F(sum4)(sums + (size_t)instance[index] * 4, sum[0], sum[1], sum[2], sum[3]);
@@ -6333,12 +6358,14 @@ SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int widt
 }
 
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
-   Gradients below 1e-18 count as 0: their squares are not representable. */
+   Gradients below 1e-18 count as 0: their squares are not representable; nor do moments linger as slow subnormals. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
     V g = VLOAD(gradient), m, v;
     g = VSEL(VLT(VABS(g), VSET(1e-18)), VSET(0), g);
     m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
     v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
+    m = VSEL(VLT(VABS(m), VSET(1e-30)), VSET(0), m);
+    v = VSEL(VLT(v, VSET(1e-36)), VSET(0), v);
     VSTORE(mean, m);
     VSTORE(square, v);
     m = VMUL(VSET(rate), VMUL(m, VSET(correct_mean)));

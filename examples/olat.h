@@ -199,7 +199,8 @@ static int olat__bad(olat__inflater *z, const char *problem) {
 }
 
 /* Builds the canonical code. Incomplete sets are refused, but for the one-code and the empty distance code. */
-static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsigned char *lengths, int count, const char *problem) {
+static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsigned char *lengths, int count,
+                                const char *problem) {
     unsigned code[16] = {0}, offset[16] = {0}, slot;
     int i, left = 1, used = 0;
     memset(h, 0, sizeof *h);
@@ -691,7 +692,8 @@ OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pix
 }
 
 /* Filters a row into out: the filter byte, then the differences. Takes the filter whose differences are smallest. */
-static void olat__filter_row(const unsigned char *row, const unsigned char *above, size_t bytes, size_t back, unsigned char *out) {
+static void olat__filter_row(const unsigned char *row, const unsigned char *above, size_t bytes, size_t back,
+                             unsigned char *out) {
     uint64_t best = UINT64_MAX;
     int turn, chosen = 0;
     for (turn = 0; turn < 6; turn++) { /* five to measure, one to write */
@@ -715,7 +717,8 @@ static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t le
 }
 
 /* Writes (h,w,channels) bytes as PNG: 1 grey, 3 RGB, 4 RGBA. The file appears whole or not at all. */
-OLAT__API int olat_write_png(const char *path, int width, int height, int channels, const unsigned char *pixels, char error[512]) {
+OLAT__API int olat_write_png(const char *path, int width, int height, int channels, const unsigned char *pixels,
+                             char error[512]) {
     const size_t row = (size_t)width * (size_t)channels, raw_size = (size_t)height * (row + 1);
     unsigned char *raw, *file, *p;
     uint32_t *table;
@@ -876,7 +879,7 @@ static int olat__escape(const char *p, uint32_t *code) {
 static const char *olat__json_string(olat__json *j, const char **text, size_t *length) {
     char *start = ++j->at, *out = start;
     while (*j->at != '"') {
-        uint32_t code;
+        uint32_t code = 0;
         int n = *j->at == '\\' ? olat__escape(j->at, &code) : olat__utf8_length(j->at);
         if (j->at == j->end) return "the file ends inside a string";
         if ((unsigned char)*j->at < 32) return "a control character inside a string";

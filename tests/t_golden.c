@@ -187,6 +187,7 @@ static void test_light_pass(const char *name) {
     v->cx = camera.cx;
     v->cy = camera.cy;
     v->near_plane = (ssdgs_real)0.01;
+    v->steepest = (ssdgs_real)1e30;
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     n = (size_t)model->count;
     CHECK_NEAR(v->depth, gold(&file, "distance", NULL), n, value_bound(), 0, "light pass: distance");

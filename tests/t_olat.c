@@ -511,7 +511,8 @@ static void test_json(void) {
     static const char *const good[] = {
         "{}", " [ ] ", "0", "-0", "null", "true", "false", "\"\"", "[1,2,[3,{\"a\":[]}]]", "-1.5e+10", "1E-2", "1e-400",
         "123456789012345678901234567890", "[1]\r\n\t ", "{\"a\":1,\"b\":{\"a\":2},\"\":3}",
-        "\"\\u00e9\\ud83d\\ude00\\n\\/\"", "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"", "\"\\u0000\"", "\xEF\xBB\xBF{}", "\"\x7f\""};
+        "\"\\u00e9\\ud83d\\ude00\\n\\/\"", "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"",
+        "\"\\u0000\"", "\xEF\xBB\xBF{}", "\"\x7f\""};
     static const char *const bad[][2] = {
         {"", "ends early"}, {"[", "ends early"}, {"[1", "ends early"}, {"[1,", "ends early"}, {"{", "key was expected"},
         {"[1,]", "value was expected"}, {"[,1]", "value was expected"}, {"{\"a\":1,}", "key was expected"},

@@ -1,0 +1,608 @@
+/* Rendering and training as a whole: the same bits for any threads, hook or interruption; refusals; what components add up to. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+#define PHOTOS 6
+#define SIDE 40
+
+static unsigned char pixels[PHOTOS][SIDE * SIDE * 4];
+static ssdgs_photo photos[PHOTOS];
+
+static uint64_t hash_values(uint64_t hash, const ssdgs_real *values, size_t n) { return ssdgs__fold(hash, values, n * sizeof *values); }
+
+/* A lit ball on a transparent ground, seen from all around. */
+static void make_photos(void) {
+    int i, x, y, c;
+    for (i = 0; i < PHOTOS; i++) {
+        const double angle = 6.2831853 * i / PHOTOS;
+        ssdgs_real eye[3], light[3], target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+        eye[0] = (ssdgs_real)(2 * cos(angle));
+        eye[1] = (ssdgs_real)(2 * sin(angle));
+        eye[2] = (ssdgs_real)0.5;
+        light[0] = (ssdgs_real)(2 * cos(angle + 1));
+        light[1] = (ssdgs_real)(2 * sin(angle + 1));
+        light[2] = 1;
+        memset(&photos[i], 0, sizeof photos[i]);
+        photos[i].camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.63, SIDE, SIDE);
+        for (c = 0; c < 3; c++) {
+            photos[i].light.position[c] = light[c];
+            photos[i].light.intensity[c] = 100;
+        }
+        for (y = 0; y < SIDE; y++)
+            for (x = 0; x < SIDE; x++) {
+                const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3), dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3), r2 = dx * dx + dy * dy;
+                unsigned char *p = pixels[i] + 4 * (y * SIDE + x);
+                for (c = 0; c < 3; c++) p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c == 0 ? 1 : 0.7) + 30 * dx) : 0;
+                p[3] = r2 < 1 ? 255 : 0;
+            }
+        photos[i].pixels = pixels[i];
+    }
+}
+
+static ssdgs_train_options short_run(int iterations) {
+    ssdgs_train_options o = ssdgs_train_options_default();
+    o.iterations = iterations;
+    o.initial_points = 300;
+    o.max_gaussians = 500;
+    o.densify_from = 10;
+    o.densify_every = 10;
+    o.opacity_reset_every = 30;
+    o.densify_gradient = (ssdgs_real)1e-5;
+    o.refine_camera = o.refine_light = 1;
+    return o;
+}
+
+typedef struct run_result { uint64_t model, image; int count; double psnr; } run_result;
+
+/* Trains and renders with components; hashes every parameter and pixel. */
+static run_result train_and_render(ssdgs_context *context, const ssdgs_settings *settings, const ssdgs_train_options *options) {
+    static ssdgs_real color[SIDE * SIDE * 3], shadow[SIDE * SIDE], normal[SIDE * SIDE * 3];
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_train_stats stats;
+    ssdgs_image image;
+    run_result r;
+    int i;
+    memset(&r, 0, sizeof r);
+    CHECK(!ssdgs_model_create(context, settings, 0, &model));
+    if (!CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, options, &trainer))) exit(1);
+    for (i = 0; i < options->iterations; i++)
+        if (!CHECK(!ssdgs_trainer_step(trainer, &stats))) exit(1);
+    r.psnr = stats.psnr;
+    r.count = model->count;
+    r.model = UINT64_C(0xCBF29CE484222325);
+    for (i = 0; i < SSDGS_CHANNELS; i++) r.model = hash_values(r.model, model->gaussians + (size_t)i * model->capacity, (size_t)model->count);
+    r.model = hash_values(r.model, model->globals, model->global_count);
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    image.shadow = shadow;
+    image.normal = normal;
+    CHECK(!ssdgs_render(model, &photos[1].camera, &photos[2].light, 1, &image));
+    r.image = hash_values(hash_values(hash_values(1, color, SIDE * SIDE * 3), shadow, SIDE * SIDE), normal, SIDE * SIDE * 3);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    return r;
+}
+
+static ssdgs_result through_cpu(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
+    ((int *)user)[stage]++;
+    return ssdgs_stage_cpu(frame, stage);
+}
+#define HOOK(name, stage) static ssdgs_result hook_##name(void *user, ssdgs_frame *frame) { return through_cpu(user, frame, stage); }
+HOOK(project, SSDGS_STAGE_PROJECT)
+HOOK(sort, SSDGS_STAGE_SORT)
+HOOK(bin, SSDGS_STAGE_BIN)
+HOOK(walk, SSDGS_STAGE_WALK)
+HOOK(shade, SSDGS_STAGE_SHADE)
+HOOK(composite, SSDGS_STAGE_COMPOSITE)
+HOOK(composite_backward, SSDGS_STAGE_COMPOSITE_BACKWARD)
+HOOK(shade_backward, SSDGS_STAGE_SHADE_BACKWARD)
+HOOK(project_backward, SSDGS_STAGE_PROJECT_BACKWARD)
+
+static void backwards_run(void *user, int count, void (*task)(void *, int), void *data) {
+    (void)user;
+    while (count > 0) task(data, --count);
+}
+
+/* One thread, several, a host's own loop that runs backwards, and a hook for every stage: one result, per instruction set. */
+static void test_same_bits(void) {
+    const ssdgs_train_options options = short_run(60);
+    ssdgs_settings settings = ssdgs_settings_default();
+    int isa, variant, calls[SSDGS_STAGE_COUNT], i;
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        run_result first;
+        memset(&first, 0, sizeof first);
+        for (variant = 0; variant < 5; variant++) {
+            static const int threads[5] = {1, 2, 7, 1, 2};
+            ssdgs_context_desc desc;
+            ssdgs_context *context;
+            run_result r;
+            memset(&desc, 0, sizeof desc);
+            memset(calls, 0, sizeof calls);
+            desc.isa = (ssdgs_isa)isa;
+            desc.threads = threads[variant];
+            if (variant == 3) desc.parallel.run = backwards_run;
+            if (variant == 4) {
+                desc.gpu.user = calls;
+                desc.gpu.stage[SSDGS_STAGE_PROJECT] = hook_project;
+                desc.gpu.stage[SSDGS_STAGE_SORT] = hook_sort;
+                desc.gpu.stage[SSDGS_STAGE_BIN] = hook_bin;
+                desc.gpu.stage[SSDGS_STAGE_WALK] = hook_walk;
+                desc.gpu.stage[SSDGS_STAGE_SHADE] = hook_shade;
+                desc.gpu.stage[SSDGS_STAGE_COMPOSITE] = hook_composite;
+                desc.gpu.stage[SSDGS_STAGE_COMPOSITE_BACKWARD] = hook_composite_backward;
+                desc.gpu.stage[SSDGS_STAGE_SHADE_BACKWARD] = hook_shade_backward;
+                desc.gpu.stage[SSDGS_STAGE_PROJECT_BACKWARD] = hook_project_backward;
+            }
+            if (ssdgs_context_create(&desc, &context)) {
+                if (variant == 0) printf("skipped: %s\n", ssdgs_isa_string((ssdgs_isa)isa));
+                break;
+            }
+            r = train_and_render(context, &settings, &options);
+            if (variant == 0) {
+                first = r;
+                printf("%s: %d Gaussians, model %016llx, image %016llx\n", ssdgs_isa_string((ssdgs_isa)isa), r.count, (unsigned long long)r.model, (unsigned long long)r.image);
+                CHECK(r.count > 300 && r.count <= 500);
+            }
+            CHECK(r.model == first.model && r.image == first.image);
+            for (i = 0; i < SSDGS_STAGE_COUNT; i++) CHECK(calls[i] == (variant == 4 ? (i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61 : 60) : 0));
+            ssdgs_context_destroy(context);
+        }
+    }
+}
+
+/* Interrupted after k steps, saved, loaded into a new trainer: the same bits as without. */
+static void test_resume(void) {
+    const ssdgs_train_options options = short_run(60);
+    static const int stops[4] = {1, 7, 29, 31};
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    uint64_t whole = 0, hash;
+    int k, c, i;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    for (k = -1; k < 4; k++) {
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+        for (i = 0; i < 60; i++) {
+            if (k >= 0 && i == stops[k]) {
+                CHECK(!ssdgs_trainer_save(trainer, "build/t_train.ckpt"));
+                ssdgs_trainer_destroy(trainer);
+                ssdgs_model_destroy(model);
+                CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+                CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+                CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
+            }
+            if (!CHECK(!ssdgs_trainer_step(trainer, NULL))) exit(1);
+        }
+        hash = hash_values(UINT64_C(0xCBF29CE484222325), model->globals, model->global_count);
+        for (c = 0; c < SSDGS_CHANNELS; c++) hash = hash_values(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
+        hash = ssdgs__fold(hash, trainer->corrections, PHOTOS * sizeof *trainer->corrections);
+        if (k < 0) whole = hash;
+        CHECK(hash == whole);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    { /* each damaged checkpoint is refused, and the trainer goes on */
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_train_options other = options;
+        unsigned char *bytes = NULL;
+        size_t size = 0, at;
+        FILE *f;
+        CHECK(!ssdgs__read_file(context, "build/t_train.ckpt", &bytes, &size));
+        CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+        for (i = 0; i < 200; i++) {
+            const int cut = i & 1;
+            at = (size_t)((double)size * ssdgs__uniform(5, (uint64_t)i));
+            bytes[at] ^= 0x10;
+            f = fopen("build/t_train_bad.ckpt", "wb");
+            if (!CHECK(f != NULL)) exit(1);
+            CHECK(fwrite(bytes, 1, cut ? at : size, f) == (cut ? at : size));
+            fclose(f);
+            bytes[at] ^= 0x10;
+            CHECK(ssdgs_trainer_load(trainer, "build/t_train_bad.ckpt") == SSDGS_ERR_FORMAT);
+        }
+        CHECK(!ssdgs_trainer_step(trainer, NULL));
+        CHECK(ssdgs_trainer_load(trainer, "build/none.ckpt") == SSDGS_ERR_IO);
+        ssdgs_trainer_destroy(trainer);
+        other.seed = 2;
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &other, &trainer));
+        CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
+        CHECK(strstr(ssdgs_error_message(context), "options") != NULL);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+        ssdgs__release(context, bytes);
+        remove("build/t_train.ckpt");
+        remove("build/t_train_bad.ckpt");
+    }
+    ssdgs_context_destroy(context);
+}
+
+/* A step with a non-finite gradient changes nothing and names the parameter. */
+static void test_refused_step(void) {
+    const ssdgs_train_options options = short_run(2);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_train_stats stats;
+    ssdgs_real nan_value = (ssdgs_real)NAN, *before;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    CHECK(!ssdgs_trainer_step(trainer, &stats));
+    model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + 5] = nan_value;
+    before = (ssdgs_real *)malloc(model->capacity * SSDGS_CHANNELS * sizeof *before);
+    memcpy(before, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof *before);
+    CHECK(ssdgs_trainer_step(trainer, &stats) == SSDGS_ERR_NONFINITE);
+    CHECK(stats.skipped_steps == 1);
+    CHECK(strstr(ssdgs_error_message(context), "gradient of") != NULL);
+    CHECK(!memcmp(before, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof *before));
+    free(before);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* diffuse + specular + scattering + (1 - alpha) background = color; a second light adds; 2 I doubles. */
+static void test_components(void) {
+    static ssdgs_real color[SIDE * SIDE * 3], part[3][SIDE * SIDE * 3], alpha[SIDE * SIDE], again[SIDE * SIDE * 3], lone[2][SIDE * SIDE * 3], depth[SIDE * SIDE];
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_render_stats stats;
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_model_view v;
+    ssdgs_light lights[2];
+    ssdgs_image image;
+    double sum[SIDE * SIDE * 3];
+    int i, c, blank = 0;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, &settings, 200, &model));
+    v = ssdgs_model_get(model);
+    for (i = 0; i < 200; i++) {
+        for (c = 0; c < SSDGS_CHANNELS; c++) v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1);
+        for (c = 0; c < 3; c++) {
+            v.gaussians[(size_t)(SSDGS_POSITION + c) * v.stride + (size_t)i] *= (ssdgs_real)0.5;
+            v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] -= (ssdgs_real)2.5;
+        }
+    }
+    lights[0] = photos[1].light;
+    lights[1] = photos[3].light;
+    for (c = 0; c < 3; c++) options.background[c] = (ssdgs_real)(0.2 + 0.1 * c);
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    image.diffuse = part[0];
+    image.specular = part[1];
+    image.scattering = part[2];
+    image.alpha = alpha;
+    image.depth = depth;
+    CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, &stats));
+    CHECK(stats.gaussians == 200 && stats.shaded > 0 && stats.shaded <= stats.visible && stats.light_views >= 2 && stats.rejected == 0);
+    for (i = 0; i < SIDE * SIDE * 3; i++)
+        sum[i] = (double)(part[0][i] + part[1][i] + part[2][i]) + (1 - (double)alpha[i / 3]) * (double)options.background[i % 3];
+    CHECK_NEAR(sum, color, SIDE * SIDE * 3, 1e-4, 1e-6, "the components and the background make the image");
+    for (i = 0; i < SIDE * SIDE; i++) blank += alpha[i] > (ssdgs_real)0.99 && !(depth[i] > 1 && depth[i] < 3);
+    CHECK(blank == 0);
+    memset(&image, 0, sizeof image);
+    image.color = again;
+    CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
+    CHECK(!memcmp(again, color, sizeof color));
+    for (c = 0; c < 3; c++) options.background[c] = 0;
+    CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
+    for (c = 0; c < 2; c++) {
+        image.color = lone[c];
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights + c, 1, &options, &image, NULL));
+    }
+    for (i = 0; i < SIDE * SIDE * 3; i++) sum[i] = (double)lone[0][i] + (double)lone[1][i];
+    CHECK_NEAR(sum, again, SIDE * SIDE * 3, 1e-4, 1e-5, "two lights are the sum of each alone");
+    for (c = 0; c < 3; c++) lights[0].intensity[c] *= 2;
+    image.color = again;
+    CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 1, &options, &image, NULL));
+    for (i = 0; i < SIDE * SIDE * 3; i++) sum[i] = 2 * (double)lone[0][i];
+    CHECK_NEAR(sum, again, SIDE * SIDE * 3, 0, 1e-6, "twice the intensity is twice the image");
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* The light pass wherever the light is. */
+static void test_lights(void) {
+    static const double places[12][3] = {{3, 0, 0}, {-3, 0, 0}, {0, 3, 0}, {0, -3, 0}, {0, 0, 3}, {0, 0, -3}, {0, 0, 0}, {0.1, 0.1, 0.1}, {0.45, 0, 0}, {0.9, 0, 0}, {0, 0, 1e-8}, {0, 0, 1e6}};
+    static ssdgs_real color[SIDE * SIDE * 3], far_color[SIDE * SIDE * 3];
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_model_view v;
+    ssdgs_light light;
+    ssdgs_image image;
+    ssdgs_frame frame;
+    int i, c, p;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, &settings, 300, &model));
+    v = ssdgs_model_get(model);
+    for (i = 0; i < 300; i++) {
+        double r2 = 0;
+        for (c = 0; c < 3; c++) {
+            const double x = ssdgs__normal(9, (uint64_t)(3 * i + c));
+            v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)x;
+            r2 += x * x;
+            v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -4;
+        }
+        for (c = 0; c < 3; c++) v.gaussians[(size_t)c * v.stride + (size_t)i] *= (ssdgs_real)(0.4 / sqrt(r2)); /* a shell */
+        v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = 4;
+    }
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    for (p = 0; p < 12; p++) {
+        double mean = 0, least = 1, most = 0;
+        const double distance = sqrt(places[p][0] * places[p][0] + places[p][1] * places[p][1] + places[p][2] * places[p][2]);
+        int finite = 1;
+        memset(&light, 0, sizeof light);
+        for (c = 0; c < 3; c++) {
+            light.position[c] = (ssdgs_real)places[p][c];
+            light.intensity[c] = (ssdgs_real)(distance * distance + 0.01);
+        }
+        CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
+        for (i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
+        CHECK(finite);
+        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
+        CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
+        CHECK(frame.view_count == (distance < 1 ? 7 : 2));
+        for (i = 0; i < 300; i++) {
+            const double seen = (double)frame.visibility[i];
+            least = seen < least ? seen : least;
+            most = seen > most ? seen : most;
+            mean += seen / 300;
+        }
+        CHECK(least >= 0 && most <= 1.000001);
+        /* from the centre the shell is met from inside: most of it is lit; from outside about half is */
+        if (!CHECK(distance < 0.2 ? mean > 0.5 : distance > 1 ? mean > 0.3 && mean < 0.7 : 1)) printf("    light %d: mean visibility %g\n", p, mean);
+        if (p == 11) memcpy(far_color, color, sizeof color);
+    }
+    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    for (c = 0; c < 3; c++) {
+        light.position[c] = c == 2;
+        light.intensity[c] = 1;
+    }
+    CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
+    CHECK_NEAR(far_color, color, SIDE * SIDE * 3, 1e-5, 1e-4, "a light at a million extents is a directional one");
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Every argument that makes no sense is refused with its code and a message. */
+static void test_refusals(void) {
+    static ssdgs_real color[SIDE * SIDE * 3];
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_train_options options = ssdgs_train_options_default();
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_camera camera;
+    ssdgs_light light = photos[0].light;
+    ssdgs_render_options render = ssdgs_render_options_default();
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    memset(&desc, 0, sizeof desc);
+    image.color = color;
+    desc.threads = -1;
+    CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ARGUMENT && !context);
+    memset(&desc, 0, sizeof desc);
+    desc.allocator.allocate = ssdgs__default_allocate;
+    CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ARGUMENT);
+    memset(&desc, 0, sizeof desc);
+    desc.isa = (ssdgs_isa)99;
+    CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ISA);
+    CHECK(!ssdgs_context_create(NULL, &context));
+#define REFUSED(code, call) do { CHECK((call) == (code)); CHECK(*ssdgs_error_message(context)); context->message[0] = 0; } while (0)
+    settings.eta = 5;
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_model_create(context, &settings, 1, &model));
+    settings = ssdgs_settings_default();
+    settings.version = 0;
+    REFUSED(SSDGS_ERR_OPTIONS, ssdgs_model_create(context, &settings, 1, &model));
+    settings = ssdgs_settings_default();
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_model_create(context, &settings, -1, &model));
+    REFUSED(SSDGS_ERR_LIMIT, ssdgs_model_create(context, &settings, 0x7FFFFFFF, &model));
+    CHECK(!ssdgs_model_create(context, &settings, 3, &model));
+#define BAD_CAMERA(code, change) do { camera = photos[0].camera; change; REFUSED(code, ssdgs_render(model, &camera, &light, 1, &image)); } while (0)
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.width = 0);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.height = -5);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.width = 0x7FFFFFFF);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.fx = 0);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.fy = (ssdgs_real)NAN);
+    BAD_CAMERA(SSDGS_ERR_NONFINITE, camera.view[7] = (ssdgs_real)NAN);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.view[0] += 1);
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, (camera.view[0] = -camera.view[0], camera.view[1] = -camera.view[1], camera.view[2] = -camera.view[2]));
+    camera = photos[0].camera;
+    light.intensity[1] = -1;
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_render(model, &camera, &light, 1, &image));
+    light = photos[0].light;
+    light.position[1] = (ssdgs_real)NAN;
+    REFUSED(SSDGS_ERR_NONFINITE, ssdgs_render(model, &camera, &light, 1, &image));
+    light = photos[0].light;
+    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_render(model, &camera, &light, 1, &image));
+    render.version = 0;
+    REFUSED(SSDGS_ERR_OPTIONS, ssdgs_render_ex(model, &camera, NULL, 0, &render, &image, NULL));
+    render = ssdgs_render_options_default();
+    render.background[2] = (ssdgs_real)NAN;
+    REFUSED(SSDGS_ERR_NONFINITE, ssdgs_render_ex(model, &camera, NULL, 0, &render, &image, NULL));
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_trainer_create(model, NULL, 0, NULL, &trainer));
+    options.version = 7;
+    REFUSED(SSDGS_ERR_OPTIONS, ssdgs_trainer_create(model, photos, 1, &options, &trainer));
+    options = ssdgs_train_options_default();
+    options.bounds_min[1] = 9;
+    REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_trainer_create(model, photos, 1, &options, &trainer));
+    CHECK(!trainer);
+    CHECK(!ssdgs_render(model, &camera, NULL, 0, &image)); /* no light: black, no error */
+    ssdgs_model_destroy(model);
+    CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+    CHECK(!ssdgs_render(model, &camera, &photos[0].light, 1, &image)); /* no Gaussian: background */
+    CHECK(color[0] == 0);
+    ssdgs_model_destroy(model);
+    ssdgs_model_destroy(NULL);
+    ssdgs_trainer_destroy(NULL);
+    ssdgs_context_destroy(context);
+    ssdgs_context_destroy(NULL);
+}
+
+/* ---- every allocation fails once ---- */
+
+typedef struct counter { long live, calls, fail_at; } counter;
+
+static void *counting_allocate(void *user, size_t bytes) {
+    counter *c = (counter *)user;
+    void *p = ++c->calls == c->fail_at ? NULL : malloc(bytes);
+    if (p) c->live++;
+    return p;
+}
+
+static void counting_release(void *user, void *memory) {
+    ((counter *)user)->live--;
+    free(memory);
+}
+
+static ssdgs_result whole_life(counter *c) {
+    static ssdgs_real color[SIDE * SIDE * 3];
+    ssdgs_train_options options = short_run(12);
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_metrics metrics;
+    ssdgs_real background[3] = {0, 0, 0};
+    ssdgs_result result;
+    int i;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 2;
+    desc.allocator.allocate = counting_allocate;
+    desc.allocator.release = counting_release;
+    desc.allocator.user = c;
+    options.initial_points = 60;
+    options.max_gaussians = 200;
+    result = ssdgs_context_create(&desc, &context);
+    if (!result) result = ssdgs_model_create(context, NULL, 0, &model);
+    if (!result) result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
+    for (i = 0; i < 12 && !result; i++) result = ssdgs_trainer_step(trainer, NULL);
+    if (!result) result = ssdgs_evaluate(model, photos, background, color, &metrics);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+    return result;
+}
+
+static void test_allocation(void) {
+    counter c;
+    long calls, n, failed = 0;
+    memset(&c, 0, sizeof c);
+    CHECK(whole_life(&c) == SSDGS_OK && c.live == 0);
+    calls = c.calls;
+    for (n = 1; n <= calls; n++) {
+        memset(&c, 0, sizeof c);
+        c.fail_at = n;
+        failed += whole_life(&c) == SSDGS_ERR_MEMORY;
+        CHECK(c.live == 0);
+    }
+    CHECK(failed == calls);
+    printf("%ld allocations, each failed once\n", calls);
+}
+
+/* After the first frame of a size nothing is allocated. */
+static void test_steady(void) {
+    static ssdgs_real color[SIDE * SIDE * 3];
+    counter c;
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_image image;
+    long calls;
+    int i;
+    memset(&c, 0, sizeof c);
+    memset(&desc, 0, sizeof desc);
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    desc.allocator.allocate = counting_allocate;
+    desc.allocator.release = counting_release;
+    desc.allocator.user = &c;
+    CHECK(!ssdgs_context_create(&desc, &context));
+    CHECK(!ssdgs_model_create(context, NULL, 100, &model));
+    CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
+    calls = c.calls;
+    for (i = 0; i < 5; i++) CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
+    CHECK(c.calls == calls);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+    CHECK(c.live == 0);
+}
+
+/* A short run learns the ball; refinement of a disturbed photograph brings its error down. */
+static void test_learning(void) {
+    ssdgs_train_options options = short_run(400);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_metrics before, disturbed, refined;
+    ssdgs_real background[3] = {0, 0, 0};
+    ssdgs_photo photo = photos[2];
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+    options.opacity_reset_every = 0;
+    options.refine_camera = options.refine_light = 0;
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+    CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &before));
+    CHECK(before.psnr > 22 && before.ssim > 0.7 && before.flip < 0.2);
+    photo.camera.view[3] += (ssdgs_real)0.03;
+    photo.camera.view[7] -= (ssdgs_real)0.02;
+    CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &disturbed));
+    CHECK(!ssdgs_refine_photo(model, &photo, background, 150));
+    CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &refined));
+    CHECK(disturbed.psnr < before.psnr - 1 && refined.psnr > before.psnr - 0.5);
+    printf("trained %.1f dB, disturbed %.1f dB, refined %.1f dB\n", before.psnr, disturbed.psnr, refined.psnr);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* The schedules switch terms and freezes at the paper's iterations, scaled to the run. */
+static void test_schedule(void) {
+    ssdgs_train_options o = ssdgs_train_options_default();
+    int learns[SSDGS__GROUPS];
+    o.iterations = 6000;
+    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 499), learns) == SSDGS_DIFFUSE_TERM);
+    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 500), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && learns[SSDGS__G_MATERIAL]);
+    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 900), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM));
+    CHECK(!learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__G_MATERIAL] && learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET]);
+    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 1600), learns) == SSDGS_ALL_TERMS);
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
+    ssdgs__phase(&o, ssdgs__schedule_time(&o, 2000), learns);
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
+    o.schedule = SSDGS_SCHEDULE_JOINT;
+    CHECK(ssdgs__phase(&o, 0, learns) == SSDGS_ALL_TERMS);
+    o.schedule = SSDGS_SCHEDULE_SWAPPED;
+    CHECK(ssdgs__phase(&o, 9000, learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SPECULAR_TERM));
+    o.schedule = SSDGS_SCHEDULE_MERGED;
+    CHECK(ssdgs__phase(&o, 4999, learns) == SSDGS_DIFFUSE_TERM && ssdgs__phase(&o, 5000, learns) == SSDGS_ALL_TERMS);
+}
+
+int main(void) {
+    make_photos();
+    test_same_bits();
+    test_resume();
+    test_refused_step();
+    test_components();
+    test_lights();
+    test_refusals();
+    test_allocation();
+    test_steady();
+    test_learning();
+    test_schedule();
+    TEST_END();
+}
