@@ -444,7 +444,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     {
         ssdgs_real *activations = part + (shadow ? l.shadow_at : l.scattering_at), *head = activations + BLOCK * (ssdgs__activation_rows(sizes, layers) - (size_t)sizes[layers]);
         ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, activations);
-        ssdgs__network_forward(context->k, sizes, layers, weights, activations);
+        ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, activations);
         context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         memset(one, 0, sizeof one);

@@ -292,6 +292,15 @@ static void test_components(void) {
     image.color = again;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
     CHECK(!memcmp(again, color, sizeof color));
+    { /* bfloat16 networks: another image where the CPU has them, by no more than its three digits */
+        double most = 0;
+        options.bf16 = 1;
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
+        options.bf16 = 0;
+        for (i = 0; i < SIDE * SIDE * 3; i++) most = fabs((double)(again[i] - color[i])) > most ? fabs((double)(again[i] - color[i])) : most;
+        printf("bf16 networks: %s, largest difference %.2g of %.2g\n", context->bf16 ? "yes" : "no", most, (double)color[0]);
+        CHECK(context->bf16 ? most > 0 && most < 0.02 : most == 0);
+    }
     for (c = 0; c < 3; c++) options.background[c] = 0;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
     for (c = 0; c < 2; c++) {
