@@ -2,7 +2,7 @@
 CFLAGS ?= -O2
 CXX ?= c++
 BUILD = build
-ITERATIONS = 3000
+ITERATIONS = 5000
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) -Wstrict-prototypes -Wmissing-prototypes
@@ -13,12 +13,12 @@ EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
-	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme
+	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual
 DEMO = $(BUILD)/demo
 
 all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal
 
-demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=3000), relights it into build/demo
+demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
 	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
@@ -83,6 +83,11 @@ $(BUILD)/compile_cpp: tests/compile_cpp.cpp tests/compile_c.c $(HEADERS) | $(BUI
 	else printf '#!/bin/sh\necho "$(CXX) is missing: C++ not tested"\necho "0 passed, 0 failed"\n' >$@; chmod +x $@; fi
 $(BUILD)/readme: tests/readme.c README.md $(HEADERS) | $(BUILD)
 	sed -n '/^\/\* readme example \*\//,/^```/{/^```/d;p;}' README.md >$(BUILD)/readme_example.c
+	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
+
+$(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
+	for e in render train; do \
+	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
 .PHONY: all demo test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \

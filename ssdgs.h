@@ -1,4 +1,229 @@
-/* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end */
+/* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end
+
+Trains 3D Gaussians on photographs that each show an object under one known light, and renders them from new views under
+new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of "SSD-GS: Scattering
+and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026), whose equations the comments below number.
+It runs on the CPU and needs C99 or C++11, libc, libm and the system's threads.
+
+DO THIS
+  In one C or C++ file of the program:
+      #define SSDGS_IMPLEMENTATION
+      #include "ssdgs.h"
+  Everywhere else include it without the define. Link with -lm -lpthread (nothing on Windows). Keep the name ssdgs.h:
+  the implementation includes its own file again for every instruction set, as "ssdgs.h" beside itself. A renamed copy
+  needs SSDGS_SELF, for instance -DSSDGS_SELF='"relight.h"'. Pasted into another file it cannot work.
+
+  Rendering, of a model file or, without one, of a single grey Gaussian:
+
+--- render example ---
+    #define SSDGS_IMPLEMENTATION
+    #include "ssdgs.h"
+    int main(int argc, char **argv) {
+        static ssdgs_real color[64 * 64 * 3], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+        ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 64, 64);
+        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}};
+        ssdgs_image image = {0, color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_result result = ssdgs_context_create(NULL, &context);
+        if (!result && argc > 1) result = ssdgs_model_load(context, argv[1], &model, NULL);
+        if (!result && argc <= 1) result = ssdgs_model_create(context, NULL, 1, &model);
+        if (!result) result = ssdgs_render(model, &camera, &light, 1, &image);
+        if (result) printf("%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(context));
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+        return result != SSDGS_OK;
+    }
+--- end ---
+
+  color now holds linear RGB; ssdgs_to_bytes() makes bytes of it. Training, on photographs that the program has read:
+
+--- train example ---
+    #define SSDGS_IMPLEMENTATION
+    #include "ssdgs.h"
+    static int progress(void *user, const ssdgs_train_stats *stats) {
+        if (stats->iteration % 100 == 0) printf("%d: %.2f dB\n", stats->iteration, stats->psnr);
+        return user == NULL;
+    }
+    int train(const ssdgs_photo *photos, int count, int iterations, const char *path) {
+        ssdgs_train_options options = ssdgs_train_options_default();
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_result result = ssdgs_context_create(NULL, &context);
+        options.iterations = iterations;
+        if (!result) result = ssdgs_model_create(context, NULL, 0, &model);
+        if (!result) result = ssdgs_trainer_create(model, photos, count, &options, &trainer);
+        if (!result) result = ssdgs_trainer_run(trainer, progress, NULL);
+        if (!result) result = ssdgs_model_save(model, path);
+        if (result) printf("%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(context));
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+        return result != SSDGS_OK;
+    }
+--- end ---
+
+  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole.
+
+WHAT IT COMPUTES
+  Splatting (eq. 1): every Gaussian is projected (EWA, + 0.3 px^2) and blended front to back, one colour C each:
+      C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss),  E = light_scale intensity / distance^2
+  (eq. 3), with
+  f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
+  f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of the half
+         vector (eqs. 10 to 12)
+  S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow network (eq. 8)
+  f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a material code
+         (eq. 4)
+  A Gaussian's raw parameters, SSDGS_POSITION and on, are used as: scale = exp(log scale), opacity = sigmoid, c_d, c_s,
+  c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The 8 ASG bases and both networks
+  are shared by all Gaussians.
+  ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
+  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first; the shadow network
+  corrects the logit of eq. 7.
+  ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
+  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S; the light pass adds 0.3 px^2, where the
+  default keeps to a floor.
+  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
+  the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
+  them, longer ones do not.
+
+CONVENTIONS
+  camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a translation. The
+            centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy in px. No lens distortion.
+  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0 means 0.01 of
+            it. Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
+  light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB irradiance. Any
+            number of them in a rendering, one in a photograph. Intensities have the unit of the photographs':
+            ssdgs_trainer_create() gives an empty model the light_scale that makes E 1 on average at the centre of the
+            bounds; it stays in the model.
+  colour    transfer says how stored values, in photographs and image files, relate to the colours that are blended:
+            SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and alpha blends linear light;
+            SSDGS_TRANSFER_NONE: they are the same. ssdgs_render() never encodes: linear light out (or stored values),
+            not clamped; render options give `background` likewise. ssdgs_to_bytes() encodes. Training options,
+            ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value; ssdgs_evaluate() and
+            ssdgs_compare() deal in stored values.
+  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels. Photographs: RGBA, 8 or 16 bit, straight
+            alpha, tightly packed. Those with transparency are fitted on a new random background each step;
+            random_background = 0 puts them on options.background.
+  networks  per layer (out,in) weights, row-major, then (out) biases; ReLU between layers.
+
+OPTIONS, macros defined before the header; those with * the same way in every file that includes it
+  SSDGS_IMPLEMENTATION   not set      in one file: the code
+  SSDGS_STATIC *         not set      every function is static: a private copy, in a file that has the implementation
+  SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
+  SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
+  SSDGS_NO_TRAINER       not set      no code for ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo
+  SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
+  SSDGS_NO_SIMD          not set      the scalar kernels alone
+  SSDGS_NO_AVX2          not set      no AVX2 and no AVX-512 kernels
+  SSDGS_NO_AVX512        not set      no AVX-512 kernels
+  SSDGS_REAL64 *         not set      ssdgs_real is double, see DOUBLE
+  SSDGS_SELF             "ssdgs.h"    how the file includes itself, quotes included
+
+MEMORY
+  All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both or none),
+  called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed inside, so it need not do
+  either.
+  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has
+  been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on
+  screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer, the model its
+  trainer, the context both. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
+  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not
+  counted.
+
+THREADS
+  A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each thread may
+  have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller counted) and joins them
+  when destroyed. desc.parallel, if set, replaces them: it gets batches of independent tasks and returns when all are
+  done. The progress callback runs on the caller's thread between two steps; it may save or render. Hooks and the log
+  run there too.
+
+SIMD
+  The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit ARM), and for
+  scalar code (anything else, tcc included); a context picks the best that CPU and system have. desc.isa asks for one,
+  and fails with SSDGS_ERR_ISA where it is missing. No -m flags are needed; do switch optimisation on (-O2, /O2).
+  MinGW's gcc without optimisation gets SSE2 at most. ssdgs_render_options.bf16 lets rendering run the networks in
+  bfloat16 where the CPU has it (AVX-512 BF16; gcc 10 or clang 9 and on); training never does.
+
+GPU HOOK
+  desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and writes
+  ssdgs_frame, whose members say which stage fills them. What PROJECT, SORT and BIN write in ssdgs_splat_view, and the
+  instance_ arrays of WALK and COMPOSITE_BACKWARD, has no memory before them: a hook points the members at its own,
+  valid until the library's call returns; PROJECT also sets tiles_x and tiles_y. The rest is there. In training SHADE
+  and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs
+  the CPU's version. Components of an image are composited by the CPU from the tile lists, so they need BIN's results in
+  host memory. A result other than SSDGS_OK ends the frame.
+
+DETERMINISM
+  The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
+  sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that never stopped. This holds
+  on one instruction set and one build: FMA rounds once where SSE2 rounds twice. Checkpoints name their instruction set;
+  loading one on another goes on, and tells the log. The implementation turns the compiler's own fusing of products
+  and sums off.
+
+ERRORS
+  Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
+  ssdgs_error_message(context) says what it was about: the file, setting, parameter or byte. Codes that need no words, a
+  NULL argument for one, leave the message as it was; a failed ssdgs_context_create() has none. desc.logger hears every
+  message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
+  Nothing exits or prints.
+  Cameras, lights and backgrounds that are not finite are refused, Gaussians that are not finite are not drawn. A
+  training step with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
+  SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
+
+FILES
+  A model is one binary little-endian PLY of 32-bit values: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
+  splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
+  raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders,
+  skips what it does not know, and mends or drops broken Gaussians (ssdgs_load_stats). Limits: 8 GiB, 2^28 Gaussians.
+  A plain 3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it
+  cannot be trained. One with kd_ but no ssdgs_settings gets the published settings, and networks at their start unless
+  it has them. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
+  camera poses or light positions are refused. Both kinds of file are written under another name and renamed when
+  complete.
+
+DOUBLE
+  With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values and
+  gradients.
+
+ssdgs.h DOES NOT
+  - read dataset folders, JSON or PNG, or write PNG: examples/olat.h does
+  - find cameras or lights: both must be known; refine_camera, refine_light and ssdgs_refine_photo() correct small
+    errors
+  - light or train with environment maps, train on photographs with several lights, or trace light between objects
+  - contain GPU kernels, undistort lenses, compress models or open a window
+  - evaluate spherical harmonics beyond degree 0 of plain files, or compute LPIPS (PSNR, SSIM and FLIP it does)
+
+CONTENTS, search for the tag
+  >>config          what this compiler and CPU can do
+  >>memory          contexts, errors, aligned allocation
+  >>threads         a pool per context
+  >>cpu             which tables this machine can run
+  >>model           Gaussians, ASG bases, networks, settings
+  >>frame           memory of a frame, its views, the lights' cameras
+  >>project         records, order, instances, tile lists
+  >>shadow          visibility and depth cue from the lights, which Gaussians the camera sees
+  >>shade           geometry, networks and colour of the Gaussians seen
+  >>composite       blending over tiles and its backward
+  >>render          the stages in order
+  >>loss            loss with its gradient, transfer curve, PSNR, SSIM, FLIP
+  >>ply             model files, files at large
+  >>trainer         schedule, one photograph forward and backward, Adam
+  >>density         clone, split, prune
+  >>steps           the trainer's public functions, evaluation
+  >>checkpoint      a run's whole state
+  >>kernels         vector macros, one body for every instruction set
+  >>vmath           elementary functions
+  >>project_kernel  EWA projection
+  >>bin_kernel      exact ellipse spans
+  >>walk_kernels    transmittance walks of camera and lights
+  >>composite_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>dipole_kernel, >>colour_kernel, >>image_kernels
+
+VERSIONS
+  0.1.0  the first
+*/
 
 /* ==== the interface ==== */
 
@@ -135,7 +360,8 @@ enum { /* terms of eq. 3; a mask */
 #define SSDGS_MATERIAL_COUNT 6
 #define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
 
-/* Raw parameters of a Gaussian, one plane each, and their first plane. Activations: ../spec in the manual. */
+/* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale), sigmoid(opacity),
+   softplus(colours and ASG weights), quaternions w x y z normalised. */
 enum {
     SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
     SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
@@ -300,20 +526,20 @@ typedef struct ssdgs_train_options {
     int iterations;            /* 60000 */
     uint64_t seed;             /* 1 */
     int schedule;              /* ssdgs_schedule */
-    ssdgs_real background[3];  /* stored values */
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
-    ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
-    int initial_points;        /* random Gaussians when the model is empty */
-    ssdgs_real bounds_min[3], bounds_max[3]; /* where they start */
-    int max_gaussians;         /* cap of the density control */
+    int initial_points;        /* random Gaussians when the model is empty; 10000 */
+    int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 500, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
-    ssdgs_real densify_gradient; /* 2e-4, screen gradient in half images */
-    ssdgs_real densify_size;   /* 0.01: clone below, split above, of the scene extent */
+    int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
+    ssdgs_real background[3];  /* stored values */
+    ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
+    ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
+    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
+    ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
     ssdgs_real prune_opacity;  /* 0.005 */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
-    int refine_camera, refine_light; /* 1: fit each photograph's pose, light position */
     ssdgs_rate camera_rate, light_rate;
 } ssdgs_train_options;
 
@@ -464,9 +690,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 
 #ifndef SSDGS_SELF
 #define SSDGS_SELF "ssdgs.h" /* how this file includes itself: keep its name, or define this */
-#endif
-#ifndef SSDGS_ASSERT
-#define SSDGS_ASSERT(condition) ((void)0) /* own invariants only, never input */
 #endif
 
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
@@ -4037,7 +4260,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.densify_from = 500;
     o.densify_until = 50000;
     o.opacity_reset_every = 3000;
-    o.densify_gradient = (ssdgs_real)2e-4;
+    o.densify_gradient = (ssdgs_real)4e-4;
     o.densify_size = (ssdgs_real)0.01;
     o.prune_opacity = (ssdgs_real)0.005;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
@@ -4898,7 +5121,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->isa = (uint32_t)trainer->context->isa;
-    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options, sizeof trainer->options);
+    /* ints, then reals: no padding but at the end */
+    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options, offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
     head->inputs = ssdgs__fold(head->inputs, &s->terms, (size_t)((const char *)&s->light_bias - (const char *)&s->terms));
     for (i = 0; i < trainer->photo_count; i++) {
         head->inputs = ssdgs__fold(head->inputs, trainer->photos[i].camera.view, sizeof trainer->photos[i].camera.view);
@@ -5113,7 +5337,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VAND(m, n) ((__mmask16)((m) & (n)))
 #define VANY(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) _mm512_roundscale_ps(a, 0)
+#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvtps_epi32(a))
 #define VPOW2(n) _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_add_epi32(_mm512_cvtps_epi32(n), _mm512_set1_epi32(127)), 23))
 #define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 

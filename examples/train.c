@@ -251,6 +251,12 @@ static int train(job *j)
     has_test = file != NULL;
     if (file) fclose(file);
     free(test_json);
+    file = fopen(j->checkpoint, "ab"); /* better now than after hours of training */
+    if (!file) return sprintf(error, "%.480s: cannot be written", j->checkpoint), fail(error);
+    fseek(file, 0, SEEK_END);
+    i = ftell(file) == 0;
+    fclose(file);
+    if (i) remove(j->checkpoint);
 
     if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
     if (has_test && olat_load(j->dataset, "transforms_test.json", 0, &j->test_set, error)) return fail(error);
