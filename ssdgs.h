@@ -114,7 +114,7 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
   SSDGS_STATIC *         not set      every function is static: a private copy, in a file that has the implementation
   SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
   SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
-  SSDGS_NO_TRAINER       not set      no code for ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo
+  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo
   SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
   SSDGS_NO_SIMD          not set      the scalar kernels alone
   SSDGS_NO_AVX2          not set      no AVX2 and no AVX-512 kernels
@@ -484,7 +484,7 @@ typedef struct ssdgs_render_stats {
     int gaussians;      /* in the model */
     int visible;        /* inside the camera's frustum */
     int shaded;         /* contributing to a pixel */
-    int rejected;       /* dropped for a non-finite projection */
+    int rejected;       /* never drawn: position, rotation, scale or opacity is not finite */
     int light_views;    /* light maps rendered */
     size_t instances;   /* (tile, splat) pairs of the camera */
 } ssdgs_render_stats;
@@ -502,6 +502,13 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 /* Clamps, encodes by the model's transfer and rounds (count) values to bytes. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
 
+typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
+
+/* Compares (h,w,3) images of stored values, clamped to [0,1]. */
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                     int width, int height, ssdgs_metrics *metrics);
+
+#ifndef SSDGS_NO_TRAINER
 /* ---- training ---- */
 
 typedef enum ssdgs_pixels { SSDGS_PIXELS_RGBA8 = 0, SSDGS_PIXELS_RGBA16 } ssdgs_pixels; /* native-endian 16 bit */
@@ -556,8 +563,9 @@ typedef struct ssdgs_train_stats {
 /* Returns 0 to stop: ssdgs_trainer_run then returns SSDGS_ERR_CANCELLED, the state is whole. */
 typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
-/* Trains model (made with 0 Gaussians: starts from random points) on photos; both must outlive the trainer, the photo
-   structs are copied. options NULL = default. */
+/* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians starts from
+   random points and is given light_scale, centre and length_unit; one that has Gaussians keeps all it has.
+   options NULL = default. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
@@ -568,7 +576,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
 /* The training camera and light of photo index as refined so far. */
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light);
-/* Bytes a run will hold at most, before it starts. */
+/* About how many bytes a run will hold at max_gaussians, the photographs not counted. */
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height);
 
 #ifndef SSDGS_NO_STDIO
@@ -577,16 +585,12 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 #endif
 
-typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
-
-/* Compares (h,w,3) images of stored values, clamped to [0,1]. */
-SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
-                                     int width, int height, ssdgs_metrics *metrics);
 /* Renders a photograph's camera and light and compares. image (h,w,3, stored values) may be NULL. background: stored values. */
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
                                       ssdgs_real *image, ssdgs_metrics *metrics);
 /* Fits photo's camera and light position to its pixels by `iterations` steps of Adam, the model fixed. */
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations);
+#endif /* SSDGS_NO_TRAINER */
 
 /* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own ---- */
 
@@ -702,7 +706,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #pragma fp_contract(off)
 #endif
 
-#if defined(__GNUC__) && !defined(__TINYC__)
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define SSDGS__INLINE inline __attribute__((always_inline))
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
 #if __GNUC__ >= 8 || defined(__clang__)
@@ -1279,6 +1283,8 @@ static int ssdgs__has_bf16(int isa) {
 #if SSDGS__BF16
     unsigned a[4];
     if (isa != SSDGS_ISA_AVX512) return 0;
+    ssdgs__cpuid(7, 0, a);
+    if (a[0] < 1) return 0; /* no second part of this leaf */
     ssdgs__cpuid(7, 1, a);
     return (int)(a[0] >> 5 & 1);
 #else
@@ -1412,14 +1418,6 @@ static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
     return (double)(ssdgs__hash(key, counter) >> 11) * (1.0 / 9007199254740992.0);
 }
 
-/* Sum of twelve uniforms less six: normal enough to scatter split Gaussians, the same on every machine. */
-static double ssdgs__normal(uint64_t key, uint64_t counter) {
-    double sum = -6;
-    int i;
-    for (i = 0; i < 12; i++) sum += ssdgs__uniform(key, counter * 12 + (uint64_t)i);
-    return sum;
-}
-
 /* Layer sizes, inputs first; returns the number of linear layers. */
 static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
     const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
@@ -1522,22 +1520,6 @@ static void ssdgs__gaussian_reset(ssdgs_real *gaussians, size_t stride, size_t i
     for (i = 0; i < SSDGS_MATERIAL_COUNT; i++) gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
 }
 
-/* Room for `capacity` Gaussians; existing ones are kept. */
-static ssdgs_result ssdgs__planes_grow(ssdgs_context *context, ssdgs_real **planes, size_t *stride, size_t count, size_t capacity) {
-    ssdgs_real *grown;
-    size_t bytes, i;
-    capacity = (capacity + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
-    if (*planes && capacity <= *stride) return SSDGS_OK;
-    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof **planes, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
-    grown = (ssdgs_real *)ssdgs__allocate(context, bytes);
-    if (!grown) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < SSDGS_CHANNELS && count; i++) memcpy(grown + i * capacity, *planes + i * *stride, count * sizeof *grown);
-    ssdgs__release(context, *planes);
-    *planes = grown;
-    *stride = capacity;
-    return SSDGS_OK;
-}
-
 /* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow network's last layer is
    0. ASG lobes start spread over the hemisphere, from broad to sharp. */
 static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
@@ -1570,7 +1552,7 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     ssdgs_model *model;
     ssdgs_settings s;
     ssdgs_result result;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], bytes;
     int i;
     if (!out) return SSDGS_ERR_ARGUMENT;
     *out = NULL;
@@ -1587,10 +1569,12 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     ssdgs__global_groups(&s, first);
     model->global_count = first[SSDGS__GLOBAL_GROUPS];
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    result = model->globals ? ssdgs__planes_grow(context, &model->gaussians, &model->capacity, 0, count ? (size_t)count : 1) : SSDGS_ERR_MEMORY;
-    if (result) {
+    model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
+    if (model->globals && ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
+        model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
+    if (!model->gaussians) {
         ssdgs_model_destroy(model);
-        return result;
+        return SSDGS_ERR_MEMORY;
     }
     model->count = count;
     for (i = 0; i < count; i++) ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
@@ -1677,7 +1661,7 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
     double f[3], r[3], d[3], u[3], length, best = 2;
     int i, axis = 0;
     length = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
-    for (i = 0; i < 3; i++) f[i] = length > 0 ? forward[i] / length : (i == 2);
+    for (i = 0; i < 3; i++) f[i] = length > 0 && length < 1e300 ? forward[i] / length : (i == 2); /* no direction: any */
     for (i = 0; i < 3; i++) {
         u[i] = up ? up[i] : 0;
         if (fabs(f[i]) < best) {
@@ -1690,7 +1674,7 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
         r[1] = f[2] * u[0] - f[0] * u[2];
         r[2] = f[0] * u[1] - f[1] * u[0];
         length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-        if (length > 1e-6 * sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])) break;
+        if (length > 1e-6 * sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) && length < 1e300) break;
         u[0] = u[1] = u[2] = 0;
         u[axis] = 1;
     }
@@ -1734,7 +1718,7 @@ typedef struct ssdgs__bounds {
     int count;
 } ssdgs__bounds;
 
-typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; } ssdgs__bounds_job;
+typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; ssdgs_real faint; } ssdgs__bounds_job;
 
 static void ssdgs__bounds_task(void *data, int index) {
     const ssdgs__bounds_job *job = (const ssdgs__bounds_job *)data;
@@ -1752,7 +1736,7 @@ static void ssdgs__bounds_task(void *data, int index) {
         const ssdgs_real *p = g->gaussians + i;
         ssdgs_real largest = p[SSDGS_LOG_SCALE * g->stride], reach;
         double mean = 0;
-        int usable = p[SSDGS_OPACITY * g->stride] > (ssdgs_real)-5.6; /* fainter than 1/255 draws nothing */
+        int usable = p[SSDGS_OPACITY * g->stride] >= job->faint;
         for (j = 0; j < 3; j++) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + j) * g->stride];
             usable = usable && ssdgs__finite(s) && ssdgs__finite(p[(size_t)j * g->stride]);
@@ -1771,12 +1755,15 @@ static void ssdgs__bounds_task(void *data, int index) {
     }
 }
 
-static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g, ssdgs__bounds *total) {
+/* Of the Gaussians that alpha_threshold lets draw anything. */
+static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g, ssdgs_real alpha_threshold,
+                                        ssdgs__bounds *total) {
     const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
     ssdgs__bounds_job job;
     int i, j;
     SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
     job.g = g;
+    job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold) : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
     for (i = 0; i < chunks; i++) {
@@ -1875,6 +1862,23 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
     return SSDGS_OK;
 }
 
+static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
+    int i, j;
+    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d lights", light_count);
+    for (i = 0; i < light_count; i++) {
+        double norm2 = 0;
+        for (j = 0; j < 3; j++) {
+            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
+            if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its intensity is negative or not finite", i);
+            norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
+        }
+        if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector", i);
+    }
+    return SSDGS_OK;
+}
+
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
     ssdgs_render_options o;
     memset(&o, 0, sizeof o);
@@ -1903,18 +1907,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (frame->options.version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "render options: not made by ssdgs_render_options_default()");
     result = ssdgs__camera_check(context, camera);
     if (result) return result;
-    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d lights", light_count);
-    for (i = 0; i < light_count; i++) {
-        double norm2 = 0;
-        for (j = 0; j < 3; j++) {
-            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
-            if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its intensity is negative or not finite", i);
-            norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
-        }
-        if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector", i);
-    }
+    result = ssdgs__lights_check(context, lights, light_count);
+    if (result) return result;
     for (i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
     frame->context = context;
@@ -1933,7 +1927,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     needs_light = (frame->terms & SSDGS_SHADOW_TERM) || ((frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
-        result = ssdgs__scene_bounds(context, m, &frame->gaussians, &bounds);
+        result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &bounds);
         if (result) return result;
         for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, NULL);
     }
@@ -2371,7 +2365,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.outs = b * SSDGS_CHANNELS;
     l.pairs = l.outs + b * SSDGS__OUTS;
     l.lights = l.pairs + b * (size_t)((l.widest + 1) / 2);
-    l.size = l.lights + l.light_size * (size_t)frame->light_count;
+    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count : 1); /* only the backward asks again */
     l.drows = b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
     l.dvisibility = l.dcolor + b * 3;
@@ -2635,7 +2629,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_rea
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
-        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light, *shadow = NULL, *scattering = NULL;
+        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0), *shadow = NULL, *scattering = NULL;
         k->reflect(lighting, gauss, part + l->rows);
         for (s = 0; s < SSDGS__BLOCK; s++) {
             const size_t at = n * (size_t)light + ssdgs__block_lane(frame, block, s);
@@ -2713,8 +2707,12 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_result result;
     int i;
     frame->shaded_count = 0;
-    for (i = 0; i < frame->gaussians.count; i++)
+    for (i = 0; i < frame->gaussians.count; i++) {
+        ssdgs_real *const unseen[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal, frame->shadow};
+        int c;
         if (frame->seen[i]) frame->shaded[frame->shaded_count++] = (uint32_t)i;
+        else for (c = 0; c < (frame->components ? 6 : 1); c++) memset(unseen[c] + 4 * (size_t)i, 0, 4 * sizeof(ssdgs_real));
+    }
     result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real, job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
@@ -2740,7 +2738,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     }
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
-        const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light;
+        const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
         const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
         const ssdgs_real *scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16, *dinputs;
@@ -4217,7 +4215,7 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotat
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
 typedef struct ssdgs__correction {
     double value[9], mean[9], square[9];
-    int steps;
+    int steps[2]; /* Adam's clocks of the camera, of the light */
 } ssdgs__correction;
 
 struct ssdgs_trainer {
@@ -4232,11 +4230,11 @@ struct ssdgs_trainer {
     size_t stride;            /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
-    size_t statistics_room;
     ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly it was seen */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
     double extent;            /* 1.1 x the cameras' radius */
+    double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
 };
@@ -4557,51 +4555,63 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     return SSDGS_OK;
 }
 
-/* Adam on a photograph's corrections first .. last. */
-static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int first, int last, double rate) {
+/* Adam on a photograph's camera (part 0) or light (part 1). */
+static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate) {
+    const int steps = ++c->steps[part];
     int i;
-    for (i = first; i < last; i++) {
+    for (i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double g = gradient[i];
         c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
         c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
-        c->value[i] -= rate * c->mean[i] * (double)ssdgs__bias_correction(0.9, c->steps) /
-                       (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, c->steps)) + 1e-15);
+        c->value[i] -= rate * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
+                       (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
     }
 }
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
-/* Arrays that hold one value (or plane) per Gaussian and are permuted together. */
+/* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move: all or nothing. */
 static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
-    const size_t n = (size_t)model->count;
-    size_t stride;
-    ssdgs_result result;
-    if (count > model->capacity) count += count / 4;
-    result = ssdgs__planes_grow(context, &model->gaussians, &model->capacity, n, count);
-    stride = trainer->stride;
-    if (!result) result = ssdgs__planes_grow(context, &trainer->mean, &stride, trainer->mean ? n : 0, model->capacity);
-    if (!result) {
-        stride = trainer->stride;
-        result = ssdgs__planes_grow(context, &trainer->square, &stride, trainer->square ? n : 0, model->capacity);
+    ssdgs_real **const planes[3] = {&model->gaussians, &trainer->mean, &trainer->square};
+    ssdgs_real *grown[3], *statistics;
+    const size_t n = (size_t)model->count, old[3] = {model->capacity, trainer->stride, trainer->stride};
+    size_t capacity, bytes, i, c;
+    if (trainer->mean && count <= model->capacity) return SSDGS_OK;
+    capacity = count <= model->capacity ? model->capacity : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
+    statistics = (ssdgs_real *)ssdgs__allocate(context, 3 * capacity * sizeof(ssdgs_real));
+    for (i = 0; i < 3; i++) grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
+    if (!statistics || !grown[0] || !grown[1] || !grown[2]) {
+        for (i = 0; i < 3; i++) ssdgs__release(context, grown[i]);
+        ssdgs__release(context, statistics);
+        return SSDGS_ERR_MEMORY;
     }
-    if (!result && trainer->statistics_room < model->capacity) { /* only grown when empty: after density control */
-        ssdgs_real *statistics = (ssdgs_real *)ssdgs__allocate(context, 3 * model->capacity * sizeof(ssdgs_real));
-        if (!statistics) return SSDGS_ERR_MEMORY;
-        ssdgs__release(context, trainer->screen_gradient);
-        trainer->screen_gradient = statistics;
-        trainer->screen_count = statistics + model->capacity;
-        trainer->contribution = statistics + 2 * model->capacity;
-        trainer->statistics_room = model->capacity;
+    for (i = 0; i < 3; i++) {
+        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++) memcpy(grown[i] + c * capacity, *planes[i] + c * old[i], n * sizeof(ssdgs_real));
+        ssdgs__release(context, *planes[i]);
+        *planes[i] = grown[i];
     }
-    if (!result) trainer->stride = model->capacity;
-    return result;
+    ssdgs__release(context, trainer->screen_gradient);
+    trainer->screen_gradient = statistics;
+    trainer->screen_count = statistics + capacity;
+    trainer->contribution = statistics + 2 * capacity;
+    trainer->stride = model->capacity = capacity;
+    return SSDGS_OK;
 }
 
 static void ssdgs__copy_gaussian(ssdgs_real *planes, size_t stride, size_t to, size_t from) {
     int c;
     for (c = 0; c < SSDGS_CHANNELS; c++) planes[(size_t)c * stride + to] = planes[(size_t)c * stride + from];
+}
+
+/* Sum of twelve uniforms less six: normal enough to scatter split Gaussians, the same on every machine. */
+static double ssdgs__normal(uint64_t key, uint64_t counter) {
+    double sum = -6;
+    int i;
+    for (i = 0; i < 12; i++) sum += ssdgs__uniform(key, counter * 12 + (uint64_t)i);
+    return sum;
 }
 
 typedef struct ssdgs__ranked { ssdgs_real value; uint32_t index; } ssdgs__ranked;
@@ -4612,12 +4622,13 @@ static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest firs
     return x->index < y->index ? -1 : x->index > y->index;
 }
 
-static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer, int grow) {
+static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count;
-    const double split_size = (double)o->densify_size * trainer->extent, largest_size = 0.1 * trainer->extent;
+    const double split_size = (double)o->densify_size * trainer->extent;
+    const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
     ssdgs__ranked *candidates;
     unsigned char *drop;
@@ -4637,7 +4648,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer, int grow) {
         }
         drop[i] = p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size);
         dropped += drop[i];
-        if (drop[i] || !grow || !(trainer->screen_count[i] > 0)) continue;
+        if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
         if (trainer->screen_gradient[i] / trainer->screen_count[i] < o->densify_gradient) continue;
         candidates[wanted].value = trainer->screen_gradient[i] / trainer->screen_count[i];
         candidates[wanted++].index = (uint32_t)i;
@@ -4648,16 +4659,22 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer, int grow) {
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
     room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
-    if (wanted > room) { /* over the cap the least contributing make room, a twentieth at a time */
+    if (wanted > room || n - dropped > (size_t)o->max_gaussians) {
+        /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth at a time */
         ssdgs__ranked *least = candidates + n;
-        size_t spare = wanted - room < n / 20 ? wanted - room : n / 20, m = 0;
+        const size_t over = n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
+        const size_t more = wanted > room ? wanted - room : 0;
+        size_t spare = over + (more < n / 20 ? more : n / 20), m = 0;
         for (i = 0; i < n; i++)
             if (!drop[i]) {
                 least[m].value = -trainer->contribution[i];
                 least[m++].index = (uint32_t)i;
             }
         qsort(least, m, sizeof *least, ssdgs__ranked_compare);
-        for (i = 0; i < spare && i + 1 < m; i++, room++, dropped++) drop[least[i].index] = 1;
+        for (i = 0; i < spare && i + 1 < m; i++, dropped++) {
+            drop[least[i].index] = 1;
+            room += i >= over;
+        }
     }
     wanted = wanted < room ? wanted : room;
     result = ssdgs__trainer_grow(trainer, n + wanted);
@@ -4705,7 +4722,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer, int grow) {
         kept++;
     }
     model->count = (int)kept;
-    memset(trainer->screen_gradient, 0, 3 * trainer->statistics_room * sizeof(ssdgs_real));
+    memset(trainer->screen_gradient, 0, 3 * trainer->stride * sizeof(ssdgs_real));
     ssdgs__release(context, candidates);
     return SSDGS_OK;
 }
@@ -4735,7 +4752,8 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 /* ==== >>steps  the trainer's public functions ==== */
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
-    const ssdgs_rate *rates = &o->position;
+    const ssdgs_rate rates[12] = {o->position, o->opacity, o->scale, o->rotation, o->color, o->asg, o->frame, o->material, o->shadow, o->scattering,
+                                  o->camera_rate, o->light_rate};
     int i;
     if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "train options: not made by ssdgs_train_options_default()");
     if (o->iterations < 1 || o->iterations > 100000000) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: %d iterations", o->iterations);
@@ -4744,8 +4762,9 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
     if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity or densify_size is out of range");
-    for (i = 0; i < 10; i++)
-        if (!(rates[i].start >= 0) || !(rates[i].end >= 0) || !ssdgs__finite(rates[i].start))
+    if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_gradient is negative");
+    for (i = 0; i < 12; i++)
+        if (!(rates[i].start >= 0) || !(rates[i].end >= 0) || !ssdgs__finite(rates[i].start) || !ssdgs__finite(rates[i].end))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: a learning rate is negative or not finite");
     for (i = 0; i < 3; i++)
         if (!ssdgs__finite(o->bounds_min[i]) || !ssdgs__finite(o->bounds_max[i]) || !(o->bounds_min[i] < o->bounds_max[i]) || !ssdgs__finite(o->background[i]))
@@ -4765,12 +4784,13 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     result = ssdgs__trainer_grow(trainer, (size_t)n);
     if (result) return result;
     for (c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
+    trainer->start_size = 1.1576 * 0.62035 * pow(volume / n, 1.0 / 3);
     for (i = 0; i < n; i++) {
         ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
         for (c = 0; c < 3; c++) {
             const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)), size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
             model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)((double)o->bounds_min[c] + u * size);
-            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(1.1576 * 0.62035 * pow(volume / n, 1.0 / 3));
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(trainer->start_size);
         }
     }
     model->count = n;
@@ -4814,6 +4834,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d photographs", photo_count);
     for (i = 0; i < photo_count; i++) {
         result = ssdgs__camera_check(context, &photos[i].camera);
+        if (!result) result = ssdgs__lights_check(context, &photos[i].light, 1);
         if (result) return result;
         if (!photos[i].pixels) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "photograph %d has no pixels", i);
     }
@@ -4938,18 +4959,17 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (!result) {
         ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-        correction->steps++;
         if (o->refine_camera && t >= 5e3)
-            ssdgs__correction_step(correction, gradient, 0, 6, ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
+            ssdgs__correction_step(correction, gradient, 0, ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
         if (o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT)
-            ssdgs__correction_step(correction, gradient, 6, 9, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
+            ssdgs__correction_step(correction, gradient, 1, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
     }
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
         ssdgs_result grown = SSDGS_OK;
         ssdgs__gather_statistics(trainer, &frame);
-        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) grown = ssdgs__densify(trainer, 1);
+        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) grown = ssdgs__densify(trainer);
         if (grown) return grown;
         if (o->opacity_reset_every && trainer->iteration % o->opacity_reset_every == 0 &&
             ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until) ssdgs__reset_opacity(trainer);
@@ -4988,6 +5008,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
     int sizes[SSDGS_MAX_LAYERS + 1], layers;
     size_t per_gaussian, first[SSDGS__GLOBAL_GROUPS + 1], activations = SSDGS_CHANNELS + SSDGS__ROWS + SSDGS__OUTS + 2;
+    if (!settings || !options || width < 1 || height < 1) return 0;
     layers = ssdgs__network_sizes(settings, 0, sizes);
     activations += ssdgs__activation_rows(sizes, layers);
     layers = ssdgs__network_sizes(settings, 1, sizes);
@@ -5056,8 +5077,8 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
         for (j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "refinement: a gradient is not finite");
-        correction.steps++;
-        ssdgs__correction_step(&correction, gradient, 0, light.kind == SSDGS_LIGHT_POINT ? 9 : 6, rate);
+        ssdgs__correction_step(&correction, gradient, 0, rate);
+        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
     photo->camera = camera;
@@ -5078,7 +5099,7 @@ static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* F
 typedef struct ssdgs__checkpoint_head {
     char magic[8];
     uint32_t byte_order, version, real_size, isa;
-    uint64_t inputs;     /* hash of options, settings' shape and photographs' cameras: what must be the same */
+    uint64_t inputs;     /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
     ssdgs_settings settings;
@@ -5125,8 +5146,14 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options, offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
     head->inputs = ssdgs__fold(head->inputs, &s->terms, (size_t)((const char *)&s->light_bias - (const char *)&s->terms));
     for (i = 0; i < trainer->photo_count; i++) {
-        head->inputs = ssdgs__fold(head->inputs, trainer->photos[i].camera.view, sizeof trainer->photos[i].camera.view);
-        head->inputs = ssdgs__fold(head->inputs, trainer->photos[i].light.position, sizeof trainer->photos[i].light.position);
+        const ssdgs_photo *photo = trainer->photos + i;
+        const ssdgs_real optics[4] = {photo->camera.fx, photo->camera.fy, photo->camera.cx, photo->camera.cy};
+        const int kind[3] = {photo->camera.width, photo->camera.height, (int)photo->light.kind};
+        head->inputs = ssdgs__fold(head->inputs, photo->camera.view, sizeof photo->camera.view);
+        head->inputs = ssdgs__fold(head->inputs, optics, sizeof optics);
+        head->inputs = ssdgs__fold(head->inputs, kind, sizeof kind);
+        head->inputs = ssdgs__fold(head->inputs, photo->light.position, sizeof photo->light.position);
+        head->inputs = ssdgs__fold(head->inputs, photo->light.intensity, sizeof photo->light.intensity);
     }
     head->global_count = trainer->model->global_count;
     head->photo_count = trainer->photo_count;
@@ -5188,13 +5215,23 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     if (size < sizeof head + 8 || memcmp(head.magic, own.magic, 8)) reason = "it is not a checkpoint";
     else if (head.byte_order != own.byte_order || head.real_size != own.real_size || head.version != own.version) reason = "it was written by another version or machine";
     else if (head.global_count != own.global_count || head.photo_count != own.photo_count || head.inputs != own.inputs) reason = "it belongs to other options, settings or photographs";
-    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS || head.iteration < 0) reason = "its counts are out of range";
+    else if (memcmp(&head.settings.terms, &own.settings.terms, offsetof(ssdgs_settings, light_bias) - offsetof(ssdgs_settings, terms)))
+        reason = "it belongs to other settings";
+    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS || (size_t)head.count > size / (3 * sizeof(ssdgs_real) * (SSDGS_CHANNELS + 1)) ||
+             head.iteration < 0 || head.skipped < 0) reason = "its counts are out of range";
+    for (i = 0; i < SSDGS__GROUPS && !reason; i++)
+        if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
         expected = sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
                    3 * sizeof(ssdgs_real) * ((size_t)head.count * (SSDGS_CHANNELS + 1) + (size_t)head.global_count);
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";
+        for (i = 0; i < head.photo_count && !reason; i++) {
+            uint32_t photo;
+            memcpy(&photo, bytes + size - 8 - (size_t)head.photo_count * (sizeof photo + sizeof(ssdgs__correction)) + (size_t)i * sizeof photo, sizeof photo);
+            if (photo >= (uint32_t)head.photo_count) reason = "its order of photographs is broken";
+        }
     }
     if (reason) {
         ssdgs__release(context, bytes);
@@ -5219,7 +5256,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #endif /* SSDGS_NO_STDIO */
 #endif /* SSDGS_NO_TRAINER */
 
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__TINYC__)
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC pop_options
 #endif
 #endif /* SSDGS_IMPLEMENTATION */
@@ -5537,10 +5576,14 @@ SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(
 
 /* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
-    V norm2 = VFMA(raw[0], raw[0], VDOT3(raw[1], raw[2], raw[3], raw[1], raw[2], raw[3]));
-    V inverse = VDIV(VSET(1), VSQRT(VMAX(norm2, VSET(1e-30)))), two = VSET(2), one = VSET(1);
+    V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
+    V inverse = VDIV(VSET(1), VMAX(largest, VSET(1e-30))), two = VSET(2), one = VSET(1), norm2;
     int i;
-    for (i = 0; i < 4; i++) q[i] = VMUL(raw[i], inverse);
+    for (i = 0; i < 4; i++) q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
+    norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
+    norm2 = VDIV(one, VSQRT(norm2));
+    for (i = 0; i < 4; i++) q[i] = VMUL(q[i], norm2);
+    inverse = VMUL(inverse, norm2);
     r[0] = VFNMA(two, VFMA(q[2], q[2], VMUL(q[3], q[3])), one);
     r[1] = VMUL(two, VFNMA(q[0], q[3], VMUL(q[1], q[2])));
     r[2] = VMUL(two, VFMA(q[0], q[2], VMUL(q[1], q[3])));
@@ -5572,18 +5615,19 @@ SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V 
 
 /* What both directions need of a projection, per lane. */
 typedef struct F(projection) {
-    V t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], a, b, c, det0, h, det, opacity;
+    V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], a, b, c, det0, h, det, opacity;
 } F(projection);
 
-SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, const R *g, size_t stride) {
-    V x[3], raw[4], cross[3];
+/* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
+SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, const R *g, size_t stride, VM off) {
+    V raw[4], cross[3];
     int i, j;
-    for (i = 0; i < 3; i++) x[i] = VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride);
-    for (i = 0; i < 4; i++) raw[i] = VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride);
+    for (i = 0; i < 3; i++) p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
+    for (i = 0; i < 4; i++) raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
     for (i = 0; i < 3; i++) {
-        V log_scale = VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride);
+        V log_scale = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
         p->s[i] = VEXP(VMAX(VSET(-20), VMIN(VSET(20), log_scale)));
-        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]), x[0], x[1], x[2]),
+        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]), p->x[0], p->x[1], p->x[2]),
                        VSET(k->view[4 * i + 3]));
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
@@ -5612,7 +5656,8 @@ SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, co
         p->h = VMAX(VSET(0), VSUB(VSET(0.2), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
     }
     p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
-    p->opacity = F(sigmoid)(VMAX(VSET(-20), VMIN(VSET(20), VLOAD(g + (size_t)SSDGS_OPACITY * stride))));
+    p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));
+    p->opacity = F(sigmoid)(VMAX(VSET(-20), VMIN(VSET(20), p->opacity)));
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
@@ -5625,7 +5670,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         VM drawn;
         R lane[SSDGS__VW];
         int f, l;
-        F(project_lanes)(&p, k, gaussians + i, stride);
+        F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
         inverse_det = VDIV(VSET(1), p.det);
         opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, inverse_det))) : p.opacity;
         log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
@@ -5669,15 +5714,19 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
     for (i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
         R lane[6][SSDGS__VW], any = 0;
-        V g[6], inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3], x[3];
+        V g[6], total, inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3];
         for (l = 0; l < SSDGS__VW; l++)
             for (j = 0; j < 6; j++) {
                 lane[j][l] = splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
                 any = lane[j][l] != 0 ? 1 : any;
             }
         if (any == 0) continue;
-        for (j = 0; j < 6; j++) g[j] = VLOAD(lane[j]);
-        F(project_lanes)(&p, k, gaussians + i, stride);
+        total = VSET(0);
+        for (j = 0; j < 6; j++) {
+            g[j] = VLOAD(lane[j]);
+            total = VADD(total, VABS(g[j]));
+        }
+        F(project_lanes)(&p, k, gaussians + i, stride, VGE(VSET(0), total)); /* NaN stays in, to be refused */
         inverse_det = VDIV(VSET(1), p.det);
         ka = VMUL(VADD(p.c, p.h), inverse_det);
         kb = VNEG(VMUL(p.b, inverse_det));
@@ -5734,12 +5783,11 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                 view_sum[8 + j] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j]);
             }
         }
-        for (j = 0; j < 3; j++) x[j] = VLOAD(gaussians + (size_t)(SSDGS_POSITION + j) * stride + i);
         for (j = 0; j < 3; j++) {
             R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
             V dx = VDOT3(dt[0], dt[1], dt[2], VSET(k->view[j]), VSET(k->view[4 + j]), VSET(k->view[8 + j]));
             VSTORE(d, VADD(VLOAD(d), dx));
-            for (l = 0; l < 3; l++) view_sum[4 * j + l] = VFMA(dt[j], x[l], view_sum[4 * j + l]);
+            for (l = 0; l < 3; l++) view_sum[4 * j + l] = VFMA(dt[j], p.x[l], view_sum[4 * j + l]);
             view_sum[4 * j + 3] = VADD(view_sum[4 * j + 3], dt[j]);
         }
     }
@@ -6175,7 +6223,7 @@ SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims
         for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
             V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale)), sine, cosine;
             VSTORE(out + d * SSDGS__BLOCK + s, x);
-            F(sincos)(x, &sine, &cosine);
+            F(sincos)(VMAX(VSET(-1e5), VMIN(VSET(1e5), x)), &sine, &cosine); /* finite however far out */
             for (l = 0; l < levels; l++) {
                 const V twice = VADD(sine, sine);
                 VSTORE(out + (dims * (1 + l) + d) * SSDGS__BLOCK + s, sine);

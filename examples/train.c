@@ -268,7 +268,7 @@ static int train(job *j)
     }
     result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
-    fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s; at most %.0f MiB beside the photographs\n", j->dataset,
+    fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s; about %.0f MiB at most beside the photographs\n", j->dataset,
             j->train_set.count, width, height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)),
             (double)ssdgs_train_memory(&j->settings, &j->options, width, height) / 1048576);
     if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||

@@ -206,6 +206,27 @@ static void test_resume(void) {
             bytes[at] ^= 0x10;
             CHECK(ssdgs_trainer_load(trainer, "build/t_train_bad.ckpt") == SSDGS_ERR_FORMAT);
         }
+        for (i = 0; i < 4; i++) { /* wrong inside, with the right checksum */
+            ssdgs__checkpoint_head head;
+            unsigned char *copy = (unsigned char *)malloc(size);
+            const uint32_t photo = PHOTOS;
+            uint64_t sum;
+            memcpy(copy, bytes, size);
+            memcpy(&head, copy, sizeof head);
+            if (i == 0) head.settings.scattering_width = 1024;
+            if (i == 1) head.steps[3] = -2;
+            if (i == 2) head.count = 0x0FFFFFFF;
+            memcpy(copy, &head, sizeof head);
+            if (i == 3) memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo, sizeof photo);
+            sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
+            memcpy(copy + size - 8, &sum, 8);
+            f = fopen("build/t_train_bad.ckpt", "wb");
+            if (!CHECK(f != NULL)) exit(1);
+            CHECK(fwrite(copy, 1, size, f) == size);
+            fclose(f);
+            free(copy);
+            CHECK(ssdgs_trainer_load(trainer, "build/t_train_bad.ckpt") == SSDGS_ERR_FORMAT);
+        }
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         CHECK(ssdgs_trainer_load(trainer, "build/none.ckpt") == SSDGS_ERR_IO);
         ssdgs_trainer_destroy(trainer);
@@ -601,6 +622,93 @@ static void test_schedule(void) {
     CHECK(ssdgs__phase(&o, 4999, learns) == SSDGS_DIFFUSE_TERM && ssdgs__phase(&o, 5000, learns) == SSDGS_ALL_TERMS);
 }
 
+/* What is not drawn, or was in another frame, does not reach what is. */
+static void test_isolation(void) {
+    static ssdgs_real color[SIDE * SIDE * 3], again[SIDE * SIDE * 3];
+    static const int broken[4] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY};
+    const ssdgs_train_options options = short_run(8);
+    ssdgs_render_options render = ssdgs_render_options_default();
+    ssdgs_image image;
+    int isa, i, k;
+    memset(&image, 0, sizeof image);
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs_context_desc desc;
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_light bright = photos[4].light;
+        int finite = 1;
+        memset(&desc, 0, sizeof desc);
+        desc.isa = (ssdgs_isa)isa;
+        if (ssdgs_context_create(&desc, &context)) continue;
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+        for (i = 0; i < 4; i++) model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + i)] = (ssdgs_real)NAN;
+        for (i = 0; i < 5; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+        image.color = color;
+        render.stop = (ssdgs_real)0.3; /* so that some entries of a tile are not seen */
+        for (i = 0; i < model->count; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] += 6;
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
+        for (k = 0; k < 3; k++) bright.intensity[k] = sizeof(ssdgs_real) == 4 ? (ssdgs_real)3e38 : (ssdgs_real)1e300;
+        CHECK(!ssdgs_render_ex(model, &photos[3].camera, &bright, 1, &render, &image, NULL));
+        image.color = again;
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
+        image.color = color;
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
+        for (i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(again[i]);
+        CHECK(finite && !memcmp(again, color, sizeof color));
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+    { /* a camera that looks at infinity is made, and refused or not, but returns */
+        ssdgs_real eye[3] = {0, 0, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+        ssdgs_camera camera;
+        target[0] = (ssdgs_real)INFINITY;
+        camera = ssdgs_camera_look_at(eye, target, up, 1, 8, 8);
+        CHECK(ssdgs__finite(camera.view[0]));
+    }
+}
+
+/* The cap holds for a model that starts above it; a start of few points survives; a light or camera fitted late starts small. */
+static void test_density(void) {
+    ssdgs_train_options options = short_run(100);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs__correction correction;
+    double gradient[9], before;
+    int i, c;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, NULL, 400, &model));
+    for (i = 0; i < 400; i++)
+        for (c = 0; c < 3; c++) {
+            model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)(0.6 * ssdgs__uniform(4, (uint64_t)(3 * i + c)) - 0.3);
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
+        }
+    options.max_gaussians = 150;
+    options.opacity_reset_every = 0;
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+    CHECK(model->count <= 150 && model->count > 50);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    options.initial_points = 60;
+    CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+    CHECK(model->count > 30);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+    memset(&correction, 0, sizeof correction);
+    for (i = 0; i < 9; i++) gradient[i] = 1;
+    for (i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3);
+    before = correction.value[6];
+    ssdgs__correction_step(&correction, gradient, 1, 1e-3);
+    CHECK(before == 0 && fabs(correction.value[6] + 1e-3) < 1e-6 && fabs(correction.value[0] + 0.05) < 1e-4);
+}
+
 int main(void) {
     make_photos();
     test_same_bits();
@@ -611,6 +719,8 @@ int main(void) {
     test_refusals();
     test_allocation();
     test_steady();
+    test_isolation();
+    test_density();
     test_learning();
     test_schedule();
     TEST_END();
