@@ -181,7 +181,7 @@ FILES
   A plain 3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it
   cannot be trained. One with kd_ but no ssdgs_settings gets the published settings, and networks at their start unless
   it has them. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
-  camera poses or light positions are refused. Both kinds of file are written under another name and renamed when
+  cameras or lights are refused. Both kinds of file are written under another name and renamed when
   complete.
 
 DOUBLE
