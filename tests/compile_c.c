@@ -15,7 +15,8 @@ static const any_function functions[] = {
     ADDRESS(ssdgs_to_bytes), ADDRESS(ssdgs_train_options_default), ADDRESS(ssdgs_trainer_create),
     ADDRESS(ssdgs_trainer_destroy), ADDRESS(ssdgs_trainer_step), ADDRESS(ssdgs_trainer_run),
     ADDRESS(ssdgs_trainer_refined), ADDRESS(ssdgs_train_memory), ADDRESS(ssdgs_trainer_save),
-    ADDRESS(ssdgs_trainer_load), ADDRESS(ssdgs_compare), ADDRESS(ssdgs_evaluate), ADDRESS(ssdgs_refine_photo)
+    ADDRESS(ssdgs_trainer_load), ADDRESS(ssdgs_compare), ADDRESS(ssdgs_evaluate), ADDRESS(ssdgs_refine_photo),
+    ADDRESS(ssdgs_stage_cpu)
 };
 
 int main(void)

@@ -690,6 +690,6 @@ int main(void) {
     test_disk();
     ssdgs_context_destroy(context);
     CHECK(memory.live == 0);
-    printf("t_ply: %d passed, %d failed\n", passed, failed);
+    printf("%d passed, %d failed\n", passed, failed);
     return failed != 0;
 }
