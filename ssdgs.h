@@ -347,10 +347,13 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
 
 /* ---- the model ---- */
 
-typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY } ssdgs_dipole;
+typedef enum ssdgs_dipole {
+    SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY
+} ssdgs_dipole;
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR } ssdgs_asg; /* eq. 12, or the released angular form */
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
-typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur; /* +0.3 px^2, or a floor of 0.2 px^2 with opacity compensation */
+/* +0.3 px^2, or a floor of 0.2 px^2 with opacity compensation */
+typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 
 enum { /* terms of eq. 3; a mask */
     SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8, SSDGS_ALL_TERMS = 15
@@ -432,7 +435,8 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
 #endif
 /* The same from bytes in memory (not kept). */
-SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out, ssdgs_load_stats *stats);
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out,
+                                               ssdgs_load_stats *stats);
 
 /* ---- rendering ---- */
 
@@ -848,7 +852,8 @@ typedef struct ssdgs__lighting {
 
 typedef struct ssdgs__kernels {
     void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *, ssdgs_real *);
-    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *, ssdgs_real *, size_t, ssdgs_real *);
+    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *,
+                             ssdgs_real *, size_t, ssdgs_real *);
     void (*row_spans)(const ssdgs_real *, ssdgs_real, int, int, int, int16_t *, int16_t *);
     void (*walk_camera)(const ssdgs__tile *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
@@ -862,14 +867,20 @@ typedef struct ssdgs__kernels {
     void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
     void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *);
-    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, ssdgs_real *, ssdgs_real *, size_t);
-    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
-    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, ssdgs_real *,
+                           ssdgs_real *, size_t);
+    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                   const ssdgs_real *, ssdgs_real *);
+    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                            const ssdgs_real *,
+                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
+                                ssdgs_real *);
     void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
     void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
-    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
-    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
+                     ssdgs_real *);
+    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, const ssdgs_real *,
+                              const ssdgs_real *,
                               const ssdgs_real *, ssdgs_real, ssdgs_real, ssdgs_real *);
     void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real);
 } ssdgs__kernels;
@@ -880,8 +891,10 @@ static const ssdgs_real ssdgs__lane_y[16] = {0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 
 static const ssdgs_real ssdgs__count[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {
-    (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083, (ssdgs_real)0.10936068950970002,
-    (ssdgs_real)0.2130055377112537, (ssdgs_real)0.26601172486179436, (ssdgs_real)0.2130055377112537, (ssdgs_real)0.10936068950970002,
+    (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
+        (ssdgs_real)0.10936068950970002,
+    (ssdgs_real)0.2130055377112537, (ssdgs_real)0.26601172486179436, (ssdgs_real)0.2130055377112537,
+        (ssdgs_real)0.10936068950970002,
     (ssdgs_real)0.03600077212843083, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
 
 static SSDGS__INLINE int ssdgs__lowest_bit(unsigned mask) {
@@ -896,7 +909,8 @@ static SSDGS__INLINE int ssdgs__lowest_bit(unsigned mask) {
 
 /* A walk's first transmittance: pixels outside the image can blend nothing. */
 static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *tile, int micro, int lane) {
-    return tile->x + 4 * (micro & 3) + (lane & 3) < tile->width && tile->y + 4 * (micro >> 2) + (lane >> 2) < tile->height ? (ssdgs_real)1
+    return tile->x + 4 * (micro & 3) + (lane & 3) < tile->width && tile->y + 4 * (micro >> 2) + (lane >> 2) < tile->height
+        ? (ssdgs_real)1
                                                                                                                         : (ssdgs_real)-1;
 }
 
@@ -1088,7 +1102,8 @@ typedef struct ssdgs__buffer {
 
 static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
     size_t bytes;
-    if (!ssdgs__product_fits(count, size, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes", count, size);
+    if (!ssdgs__product_fits(count, size, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes",
+            count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
     ssdgs__release(context, buffer->memory);
     buffer->bytes = 0;
@@ -1117,7 +1132,9 @@ static int ssdgs__condition_create(ssdgs__condition *c) { InitializeConditionVar
 static void ssdgs__condition_destroy(ssdgs__condition *c) { (void)c; }
 static void ssdgs__wait(ssdgs__condition *c, ssdgs__mutex *m) { SleepConditionVariableCS(c, m, INFINITE); }
 static void ssdgs__wake(ssdgs__condition *c) { WakeAllConditionVariable(c); }
-static int ssdgs__thread_create(ssdgs__thread *t, LPTHREAD_START_ROUTINE f, void *data) { return (*t = CreateThread(NULL, 0, f, data, 0, NULL)) != NULL; }
+static int ssdgs__thread_create(ssdgs__thread *t, LPTHREAD_START_ROUTINE f, void *data) {
+    return (*t = CreateThread(NULL, 0, f, data, 0, NULL)) != NULL;
+}
 static void ssdgs__thread_join(ssdgs__thread t) { WaitForSingleObject(t, INFINITE); CloseHandle(t); }
 static int ssdgs__cpu_count(void) { SYSTEM_INFO info; GetSystemInfo(&info); return (int)info.dwNumberOfProcessors; }
 #else
@@ -1133,7 +1150,9 @@ static int ssdgs__condition_create(ssdgs__condition *c) { return pthread_cond_in
 static void ssdgs__condition_destroy(ssdgs__condition *c) { pthread_cond_destroy(c); }
 static void ssdgs__wait(ssdgs__condition *c, ssdgs__mutex *m) { pthread_cond_wait(c, m); }
 static void ssdgs__wake(ssdgs__condition *c) { pthread_cond_broadcast(c); }
-static int ssdgs__thread_create(ssdgs__thread *t, void *(*f)(void *), void *data) { return pthread_create(t, NULL, f, data) == 0; }
+static int ssdgs__thread_create(ssdgs__thread *t, void *(*f)(void *), void *data) {
+    return pthread_create(t, NULL, f, data) == 0;
+}
 static void ssdgs__thread_join(ssdgs__thread t) { pthread_join(t, NULL); }
 static int ssdgs__cpu_count(void) {
 #ifdef _SC_NPROCESSORS_ONLN
@@ -1342,7 +1361,8 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
         zero.allocator.allocate = ssdgs__default_allocate;
         zero.allocator.release = ssdgs__default_release;
     }
-    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)zero.isa))) return SSDGS_ERR_ISA;
+    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO &&
+            !ssdgs__table((int)zero.isa))) return SSDGS_ERR_ISA;
     context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
@@ -1402,7 +1422,8 @@ struct ssdgs_model {
     ssdgs_real *globals;  /* the groups of ssdgs__global_groups, in order */
 };
 
-enum { SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET, SSDGS__GLOBAL_GROUPS };
+enum { SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET,
+    SSDGS__GLOBAL_GROUPS };
 
 /* A counter-based generator: the value depends on the key and the counter alone, never on the order of use. */
 static uint64_t ssdgs__hash(uint64_t key, uint64_t counter) {
@@ -1476,10 +1497,12 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
 }
 
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
-    if (s->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
+    if (s->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+            "settings: not made by ssdgs_settings_default()");
 #define SSDGS__RANGE(field, low, high)                                                                                    \
     if (!(s->field >= (low) && s->field <= (high)) || !ssdgs__finite((ssdgs_real)s->field))                               \
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s = %g is not within %g .. %g", #field, (double)s->field, (double)(low), (double)(high))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s = %g is not within %g .. %g", #field, (double)s->field, \
+                           (double)(low), (double)(high))
     SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
     SSDGS__RANGE(baked, 0, 1);
     SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
@@ -1756,14 +1779,16 @@ static void ssdgs__bounds_task(void *data, int index) {
 }
 
 /* Of the Gaussians that alpha_threshold lets draw anything. */
-static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g, ssdgs_real alpha_threshold,
+static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g,
+                                        ssdgs_real alpha_threshold,
                                         ssdgs__bounds *total) {
     const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
     ssdgs__bounds_job job;
     int i, j;
     SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
     job.g = g;
-    job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold) : -21; /* below the logit, by little */
+    job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold)
+        : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
     for (i = 0; i < chunks; i++) {
@@ -1782,7 +1807,8 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
 
 /* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very far, six faces of
    a cube from close by or inside. Returns how many; with views NULL only that. */
-static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, int index, ssdgs_splat_view *views) {
+static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, int index,
+                              ssdgs_splat_view *views) {
     double centre[3], position[3], to_scene[3], radius2 = 0, radius, distance2 = 0, distance, size;
     int i, faces, face, map;
     for (i = 0; i < 3; i++) {
@@ -1844,16 +1870,19 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
     int i, j;
     if (c->width < 1 || c->height < 1 || c->width > 1 << 15 || c->height > 1 << 15)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
-    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy))
+    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) ||
+        !ssdgs__finite(c->cy))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: focal lengths must be positive, the centre finite");
-    if (!(c->near_plane >= 0) || !ssdgs__finite(c->near_plane)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: near_plane is negative");
+    if (!(c->near_plane >= 0) || !ssdgs__finite(c->near_plane)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            "camera: near_plane is negative");
     for (i = 0; i < 12; i++)
         if (!ssdgs__finite(c->view[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
     for (i = 0; i < 3; i++)
         for (j = 0; j <= i; j++) {
             const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
             const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-            if (fabs(dot - (i == j)) > 1e-3) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: the rows of view are not orthonormal");
+            if (fabs(dot - (i == j)) > 1e-3) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                    "camera: the rows of view are not orthonormal");
         }
     determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
                            c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
@@ -1868,7 +1897,8 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
     for (i = 0; i < light_count; i++) {
         double norm2 = 0;
         for (j = 0; j < 3; j++) {
-            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
+            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
+                    "light %d: its position is not finite", i);
             if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
                 return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its intensity is negative or not finite", i);
             norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
@@ -1890,7 +1920,8 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
 }
 
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
-static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
+                                       const ssdgs_light *lights,
                                        int light_count, const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
@@ -1904,13 +1935,15 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     m = context->frame;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
-    if (frame->options.version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "render options: not made by ssdgs_render_options_default()");
+    if (frame->options.version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+            "render options: not made by ssdgs_render_options_default()");
     result = ssdgs__camera_check(context, camera);
     if (result) return result;
     result = ssdgs__lights_check(context, lights, light_count);
     if (result) return result;
     for (i = 0; i < 3; i++)
-        if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
+        if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
+                "the background is not finite");
     frame->context = context;
     frame->model = model;
     frame->memory = m;
@@ -1923,13 +1956,15 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->components = components;
     frame->training = training;
     for (i = 0; i < 3; i++)
-        frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] * camera->view[11]);
+        frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] *
+                          camera->view[11]);
     needs_light = (frame->terms & SSDGS_SHADOW_TERM) || ((frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
         result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &bounds);
         if (result) return result;
-        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, NULL);
+        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i, i,
+                NULL);
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
@@ -1946,7 +1981,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->views[0].compensate = frame->options.antialias;
     frame->views[0].steepest = (ssdgs_real)1e30;
     memcpy(frame->views[0].view, camera->view, sizeof camera->view);
-    for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i, i, frame->views + j);
+    for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i,
+            i, frame->views + j);
     pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -2008,7 +2044,8 @@ static void ssdgs__project_task(void *data, int index) {
     const int chunks = ssdgs__chunks(frame), chunk = index % chunks;
     ssdgs_splat_view *v = frame->views + index / chunks;
     const ssdgs__projection p = ssdgs__projection_of(frame, v);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n
+        ? begin + SSDGS__CHUNK : n;
     frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record, v->depth);
 }
 
@@ -2033,7 +2070,8 @@ static void ssdgs__sort_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     ssdgs_splat_view *v = frame->views + index;
     const int n = frame->gaussians.count;
-    uint64_t *from = (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory, *to = from + n, *swap;
+    uint64_t *from = (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory, *to = from + n,
+        *swap;
     uint32_t *histogram = (uint32_t *)(to + n);
     int i, pass, visible = 0;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
@@ -2080,7 +2118,8 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
 
 /* Tiles the record's bounding box touches: first and last column and row. */
 static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, int box[4]) {
-    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1}, high[2] = {record[0] + record[6] + 1, record[1] + record[7] + 1};
+    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1}, high[2] = {record[0] + record[6] + 1,
+        record[1] + record[7] + 1};
     const int tiles[2] = {v->tiles_x, v->tiles_y};
     int a;
     for (a = 0; a < 2; a++) {
@@ -2113,7 +2152,8 @@ static void ssdgs__bin_range(const ssdgs_splat_view *v, int chunk, int *begin, i
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
     const ssdgs_splat_view *v = frame->views + view;
-    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory + (size_t)chunk * (size_t)(v->tiles_x * v->tiles_y);
+    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory + (size_t)chunk *
+        (size_t)(v->tiles_x * v->tiles_y);
 }
 
 /* Instances of a chunk of ranks, from the exact spans of their ellipses; counts them per tile. */
@@ -2208,7 +2248,8 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
         uint32_t *histogram;
-        if (v->instance_room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d", v->width, v->height);
+        if (v->instance_room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT,
+                "too many splats for an image of %d x %d", v->width, v->height);
         SSDGS__RESERVE(m->owner, v->instance_owner, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->tile, v->instance_tile, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->mask, v->instance_mask, uint16_t, v->instance_room + 1);
@@ -2283,7 +2324,8 @@ static void ssdgs__gather_camera_task(void *data, int index) {
     ssdgs__bin_range(v, index, &begin, &end);
     for (rank = begin; rank < end; rank++) {
         unsigned char seen = 0;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) seen |= v->instance_seen[instance];
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] +
+             v->instance_count[rank]; instance++) seen |= v->instance_seen[instance];
         job->frame->seen[v->order[rank]] = seen;
     }
 }
@@ -2313,7 +2355,8 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     memset(frame->seen, 0, n);
     ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
     for (light = 0, i = 1; light < frame->light_count; light++) {
-        ssdgs_real *visibility = frame->visibility + n * (size_t)light, *cue = frame->depth_cue + n * (size_t)light, *flux = frame->flux + n * (size_t)light;
+        ssdgs_real *visibility = frame->visibility + n * (size_t)light, *cue = frame->depth_cue + n * (size_t)light,
+            *flux = frame->flux + n * (size_t)light;
         memset(job.sums, 0, n * 4 * sizeof(ssdgs_real));
         for (; i < frame->view_count && frame->views[i].light == light; i++) {
             job.view = frame->views + i;
@@ -2429,10 +2472,12 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
         for (i = 0; i < 2; i++) {
             const ssdgs_real s = ssdgs__sigmoid_scalar(sharpness[i]);
             /* angular: 1 / (10 s), d = -(1 - s) / (10 s) */
-            out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
+            out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s
+                : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
         }
         if (frame->settings.asg == SSDGS_ASG_ANGULAR) {
-            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)), s = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]);
+            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)),
+                s = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]);
             frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] = d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
         }
     }
@@ -2461,7 +2506,8 @@ static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_r
 
 /* Activations: inputs, then every layer's outputs, (size, BLOCK) each. The last layer has no ReLU. With packed weights the
    products run in bf16; pairs is their working memory. */
-static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights, const uint32_t *packed,
+static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
+                                   const uint32_t *packed,
                                    uint32_t *pairs, ssdgs_real *activations) {
     ssdgs__product p;
     int layer;
@@ -2489,7 +2535,8 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
 
 /* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. */
 static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                           const ssdgs_real *activations, ssdgs_real *d, ssdgs_real *spare, ssdgs_real *transposed, ssdgs_real *dweights) {
+                                           const ssdgs_real *activations, ssdgs_real *d, ssdgs_real *spare,
+                                               ssdgs_real *transposed, ssdgs_real *dweights) {
     const ssdgs_real *layer_in = activations;
     size_t at = 0, i, s;
     int layer;
@@ -2585,8 +2632,10 @@ static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_la
 }
 
 /* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the depth cue is held fixed. */
-static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *activations,
-                                          const ssdgs_real *dinputs, ssdgs_real *dgauss, ssdgs_real *drows, ssdgs_real *dvisibility) {
+static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
+                                          const ssdgs_real *activations,
+                                          const ssdgs_real *dinputs, ssdgs_real *dgauss, ssdgs_real *drows,
+                                              ssdgs_real *dvisibility) {
     ssdgs__input in[6];
     const int n = ssdgs__inputs(frame, l, shadow, in);
     int i, s;
@@ -2594,7 +2643,8 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
         const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
         ssdgs_real *to = in[i].of_gaussian ? dgauss + in[i].from : in[i].from == l->visibility ? dvisibility : drows + in[i].from;
         if (in[i].from == l->cue) continue;
-        if (in[i].levels >= 0) frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims, in[i].levels);
+        if (in[i].levels >= 0) frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
+                in[i].levels);
         else for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
     }
 }
@@ -2624,12 +2674,14 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_rea
     int light, s, i, c;
     for (s = 0; s < SSDGS__BLOCK; s++) {
         const size_t g = ssdgs__block_lane(frame, block, s);
-        for (i = 0; i < SSDGS_CHANNELS; i++) gauss[i * SSDGS__BLOCK + s] = frame->gaussians.gaussians[(size_t)i * frame->gaussians.stride + g];
+        for (i = 0; i < SSDGS_CHANNELS; i++) gauss[i * SSDGS__BLOCK + s] =
+            frame->gaussians.gaussians[(size_t)i * frame->gaussians.stride + g];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
-        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0), *shadow = NULL, *scattering = NULL;
+        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0), *shadow = NULL,
+            *scattering = NULL;
         k->reflect(lighting, gauss, part + l->rows);
         for (s = 0; s < SSDGS__BLOCK; s++) {
             const size_t at = n * (size_t)light + ssdgs__block_lane(frame, block, s);
@@ -2638,12 +2690,14 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_rea
         }
         if (l->shadow_layers) {
             ssdgs__encode_inputs(frame, l, 1, gauss, part, part + l->shadow_at);
-            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], (uint32_t *)(memory + l->pairs), part + l->shadow_at);
+            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1],
+                                   (uint32_t *)(memory + l->pairs), part + l->shadow_at);
             shadow = part + l->scattering_at - SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, part + l->scattering_at);
-            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0], (uint32_t *)(memory + l->pairs),
+            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0],
+                                   (uint32_t *)(memory + l->pairs),
                                    part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
@@ -2653,8 +2707,10 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_rea
         const size_t g = ssdgs__block_lane(frame, block, s);
         const ssdgs_real *o = outs + s;
         for (c = 0; c < 3; c++)
-            frame->color[4 * g + (size_t)c] = frame->settings.baked ? ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s])
-                                                                   : o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
+            frame->color[4 * g + (size_t)c] = frame->settings.baked
+                ? ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s])
+                                                                   : o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] +
+                                                                       o[(6 + c) * SSDGS__BLOCK];
         if (!frame->components) continue;
         {
             ssdgs_real raw[4], q[4], r[9];
@@ -2695,7 +2751,8 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     for (light = 0; light < frame->light_count; light++) job->lightings[light] = ssdgs__lighting_of(frame, light);
     if (frame->options.bf16 && context->bf16 && !frame->training) {
         SSDGS__RESERVE(frame->memory->packed, job->packed[0], uint32_t, frame->model->global_count);
-        job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers, frame->gaussians.scattering, job->packed[0]);
+        job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers, frame->gaussians.scattering,
+                                             job->packed[0]);
         ssdgs__pack_weights(job->layout.shadow, job->layout.shadow_layers, frame->gaussians.shadow, job->packed[1]);
     }
     return SSDGS_OK;
@@ -2708,14 +2765,16 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     int i;
     frame->shaded_count = 0;
     for (i = 0; i < frame->gaussians.count; i++) {
-        ssdgs_real *const unseen[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal, frame->shadow};
+        ssdgs_real *const unseen[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal,
+            frame->shadow};
         int c;
         if (frame->seen[i]) frame->shaded[frame->shaded_count++] = (uint32_t)i;
         else for (c = 0; c < (frame->components ? 6 : 1); c++) memset(unseen[c] + 4 * (size_t)i, 0, 4 * sizeof(ssdgs_real));
     }
     result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
-    SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real, job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
+    SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real,
+                   job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
     return SSDGS_OK;
 }
@@ -2725,7 +2784,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
-    ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *dgauss = scratch, *drows = scratch + l->drows, *dcolor = scratch + l->dcolor;
+    ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *dgauss = scratch, *drows = scratch + l->drows,
+        *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
@@ -2734,7 +2794,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
     for (s = 0; s < SSDGS__BLOCK; s++) {
         const int live = block * SSDGS__BLOCK + s < frame->shaded_count;
-        for (c = 0; c < 3; c++) dcolor[c * SSDGS__BLOCK + s] = live ? frame->color_gradient[4 * ssdgs__block_lane(frame, block, s) + (size_t)c] : 0;
+        for (c = 0; c < 3; c++) dcolor[c * SSDGS__BLOCK + s] = live
+            ? frame->color_gradient[4 * ssdgs__block_lane(frame, block, s) + (size_t)c] : 0;
     }
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
@@ -2747,13 +2808,15 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor, dgauss, drows,
                            scratch + l->transposed - SSDGS__BLOCK, dnet, dvisibility);
         if (l->scattering_layers) {
-            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, part + l->scattering_at, dnet, dnet2,
+            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering,
+                                              part + l->scattering_at, dnet, dnet2,
                                               scratch + l->transposed, slot_gradient + first[SSDGS__SCATTERING_NET]);
             ssdgs__encode_inputs_backward(frame, l, 0, part + l->scattering_at, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
-            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at, dnet, dnet2,
+            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at, dnet,
+                                              dnet2,
                                               scratch + l->transposed, slot_gradient + first[SSDGS__SHADOW_NET]);
             ssdgs__encode_inputs_backward(frame, l, 1, part + l->shadow_at, dinputs, dgauss, drows, dvisibility);
         }
@@ -2761,7 +2824,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     }
     for (c = 0; c < SSDGS_CHANNELS; c++)
         for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++)
-            frame->gradient[(size_t)c * frame->gaussians.stride + ssdgs__block_lane(frame, block, s)] = dgauss[c * SSDGS__BLOCK + s];
+            frame->gradient[(size_t)c * frame->gaussians.stride + ssdgs__block_lane(frame, block,
+                    s)] = dgauss[c * SSDGS__BLOCK + s];
 }
 
 static void ssdgs__shade_backward_task(void *data, int slot) {
@@ -2770,14 +2834,16 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
     int block;
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
     memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
-    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++) ssdgs__shade_backward_block(job, block, slot);
+    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++) ssdgs__shade_backward_block(job,
+            block, slot);
 }
 
 #define SSDGS__REDUCE 4096 /* shared parameters summed by one task */
 
 static void ssdgs__reduce_task(void *data, int index) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
-    const size_t begin = (size_t)index * SSDGS__REDUCE, n = job->frame->model->global_count, end = begin + SSDGS__REDUCE < n ? begin + SSDGS__REDUCE : n;
+    const size_t begin = (size_t)index * SSDGS__REDUCE, n = job->frame->model->global_count, end = begin + SSDGS__REDUCE < n
+        ? begin + SSDGS__REDUCE : n;
     ssdgs_real *out = job->frame->global_gradient;
     size_t i;
     int slot;
@@ -2809,7 +2875,8 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     for (slot = 0; slot < SSDGS__SLOTS; slot++)
         for (light = 0; light < frame->light_count; light++)
             for (i = 0; i < SSDGS__LANE_SUMS; i++) {
-                const ssdgs_real *row = job.lane_slots + ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) * 16;
+                const ssdgs_real *row = job.lane_slots + ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) *
+                    16;
                 ssdgs_real sum = 0;
                 for (lane = 0; lane < 16; lane++) sum += row[lane];
                 sums[i] += sum;
@@ -2827,7 +2894,8 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
 
 /* ==== >>composite  eq. 1 and its backward over tiles ==== */
 
-typedef struct ssdgs__composite_job { const ssdgs_frame *frame; const ssdgs_real *color; ssdgs_real *pixels, *transmittance; } ssdgs__composite_job;
+typedef struct ssdgs__composite_job { const ssdgs_frame *frame; const ssdgs_real *color; ssdgs_real *pixels,
+    *transmittance; } ssdgs__composite_job;
 
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
@@ -2875,7 +2943,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
                 const int inside = x < v->width && y < v->height;
                 const ssdgs_real d = inside ? frame->pixel_gradient[plane * (size_t)c + at] : 0;
                 p[16 * c] = d;
-                if (inside) total += d * (frame->pixels[plane * (size_t)c + at] + frame->transmittance[at] * frame->options.background[c]);
+                if (inside) total += d *
+                    (frame->pixels[plane * (size_t)c + at] + frame->transmittance[at] * frame->options.background[c]);
             }
             p[48] = total;
         }
@@ -2926,9 +2995,12 @@ static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
 static void ssdgs__project_backward_task(void *data, int chunk) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs__projection p = ssdgs__projection_of(frame, frame->views);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
-    frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, frame->splat_gradient, frame->gradient,
-                                        frame->gaussians.stride, (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n
+        ? begin + SSDGS__CHUNK : n;
+    frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end,
+                                        frame->splat_gradient, frame->gradient,
+                                        frame->gaussians.stride,
+                                            (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
 }
 
 static ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
@@ -2964,14 +3036,16 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
     int stage;
     for (stage = first; stage <= last; stage++) {
-        const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame) : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+        const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
+            : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
         if (result) return result;
     }
     return SSDGS_OK;
 }
 
 /* Planes to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. */
-static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride, const ssdgs_real *background, ssdgs_real *out) {
+static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride,
+                              const ssdgs_real *background, ssdgs_real *out) {
     const int w = frame->camera.width, h = frame->camera.height;
     const size_t plane = (size_t)w * (size_t)h;
     size_t at = 0;
@@ -2995,17 +3069,20 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
     if (!model || !camera || !image) return SSDGS_ERR_ARGUMENT;
     context = model->context;
     result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
-                                image->diffuse || image->specular || image->scattering || image->normal || image->shadow || image->depth, 0);
+                                image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
+                                    image->depth, 0);
     if (result) return result;
     stride = image->stride ? image->stride : camera->width;
-    if (stride < camera->width) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride, camera->width);
+    if (stride < camera->width) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
+                                                   camera->width);
     result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     pixels = (size_t)camera->width * (size_t)camera->height;
     if (image->color) ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
     if (image->alpha)
         for (y = 0, i = 0; y < camera->height; y++)
-            for (x = 0; x < camera->width; x++, i++) image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
+            for (x = 0; x < camera->width; x++, i++) image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 -
+                frame.transmittance[i];
     SSDGS__RESERVE(frame.memory->image, planes, ssdgs_real, pixels * 3);
     for (c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
@@ -3035,7 +3112,8 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count, const ssdgs_image *image) {
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                    const ssdgs_image *image) {
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
 }
 
@@ -3091,7 +3169,8 @@ static void ssdgs__loss_pad_task(void *data, int index) {
     int y, x, p;
     for (y = begin; y < end; y++)
         for (p = 0; p < 5; p++) {
-            const ssdgs_real *from = (p ? job->target : job->image) + (size_t)channel * (size_t)w * (size_t)job->height + (size_t)(y > 0 ? y : 0) * (size_t)w;
+            const ssdgs_real *from = (p ? job->target : job->image) + (size_t)channel * (size_t)w * (size_t)job->height +
+                (size_t)(y > 0 ? y : 0) * (size_t)w;
             const ssdgs_real outside = p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
             const int inside = y >= 0 && y < job->height && p < 2;
             ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
@@ -3110,7 +3189,8 @@ static void ssdgs__loss_task(void *data, int index) {
     for (y = begin; y < end; y++) {
         const size_t at = ssdgs__padded_at(job, channel, y);
         ssdgs_real sums[3];
-        job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, job->scratch + (size_t)index * 5 * job->stride,
+        job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride,
+                         job->scratch + (size_t)index * 5 * job->stride,
                          job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, sums);
         for (i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
     }
@@ -3126,7 +3206,8 @@ static void ssdgs__loss_backward_task(void *data, int index) {
         const size_t at = ssdgs__padded_at(job, channel, y);
         job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch, job->padded[2] + at,
                                   job->padded[3] + at, job->padded[4] + at, job->by_l1, job->by_ssim, row);
-        memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row, (size_t)job->width * sizeof *row);
+        memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row,
+               (size_t)job->width * sizeof *row);
     }
 }
 
@@ -4202,15 +4283,19 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
 
 /* Parameters that learn together; the first ten are planes of every Gaussian. */
 enum {
-    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR, SSDGS__G_SCATTERING,
+    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR,
+        SSDGS__G_SCATTERING,
     SSDGS__G_FRAME, SSDGS__G_ASG_WEIGHT, SSDGS__G_MATERIAL, SSDGS__PLANE_GROUPS,
     SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
 };
 
-static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY, SSDGS_DIFFUSE,
+static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY,
+    SSDGS_DIFFUSE,
     SSDGS_SPECULAR, SSDGS_SCATTERING, SSDGS_FRAME, SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
-static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotation", "log scale", "opacity", "diffuse colour", "specular colour",
-    "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma", "scattering network", "shadow network"};
+static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotation", "log scale", "opacity", "diffuse colour",
+    "specular colour",
+    "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma",
+        "scattering network", "shadow network"};
 
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
 typedef struct ssdgs__correction {
@@ -4307,7 +4392,8 @@ static int ssdgs__phase(const ssdgs_train_options *o, double t, int learns[SSDGS
 
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
     const double x = t < from ? 0 : t > from + over ? 1 : (t - from) / over;
-    return rate.start > 0 && rate.end > 0 ? exp(log((double)rate.start) * (1 - x) + log((double)rate.end) * x) : (double)rate.start;
+    return rate.start > 0 && rate.end > 0 ? exp(log((double)rate.start) * (1 - x) + log((double)rate.end) * x)
+        : (double)rate.start;
 }
 
 static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double t) {
@@ -4336,7 +4422,8 @@ static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real backg
     ssdgs_real linear_background[3];
     size_t i;
     int c;
-    for (c = 0; c < 3; c++) linear_background[c] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c]) : background[c];
+    for (c = 0; c < 3; c++) linear_background[c] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c])
+        : background[c];
     for (i = 0; i < pixels; i++) {
         ssdgs_real v[4];
         for (c = 0; c < 4; c++)
@@ -4345,7 +4432,8 @@ static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real backg
         for (c = 0; c < 3; c++) {
             ssdgs_real x = v[c];
             if (v[3] <= 0) x = background[c];
-            else if (v[3] < 1 && transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(v[3] * ssdgs_srgb_decode(x) + (1 - v[3]) * linear_background[c]);
+            else if (v[3] < 1 && transfer == SSDGS_TRANSFER_SRGB) x =
+                ssdgs_srgb_encode(v[3] * ssdgs_srgb_decode(x) + (1 - v[3]) * linear_background[c]);
             else if (v[3] < 1) x = v[3] * x + (1 - v[3]) * background[c];
             planes[pixels * (size_t)c + i] = x;
         }
@@ -4411,7 +4499,8 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
 }
 
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
-static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_camera *camera,
+static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
+                                          const ssdgs_camera *camera,
                                           const ssdgs_light *light, const ssdgs_real background[3], int terms, ssdgs_real dssim,
                                           ssdgs__loss_values *values) {
     ssdgs_context *context = model->context;
@@ -4433,9 +4522,11 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     ssdgs__photo_planes(photo, background, model->settings.transfer, target);
     for (c = 0; c < 3; c++)
         for (i = 0; i < pixels; i++)
-            image[pixels * (size_t)c + i] = frame->pixels[pixels * (size_t)c + i] + frame->transmittance[i] * options.background[c];
+            image[pixels * (size_t)c + i] = frame->pixels[pixels * (size_t)c + i] + frame->transmittance[i] *
+                options.background[c];
     if (srgb) context->k->srgb_encode(image, slope, image, pixels * 3);
-    result = ssdgs__loss(context, &frame->memory->loss, image, target, camera->width, camera->height, dssim, frame->pixel_gradient, values);
+    result = ssdgs__loss(context, &frame->memory->loss, image, target, camera->width, camera->height, dssim,
+                         frame->pixel_gradient, values);
     if (result) return result;
     if (srgb)
         for (i = 0; i < pixels * 3; i++) frame->pixel_gradient[i] *= slope[i];
@@ -4479,7 +4570,8 @@ static void ssdgs__adam_task(void *data, int index) {
     while (r + 1 < job->range + job->ranges && r[1].first_chunk <= (size_t)index) r++;
     begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
     n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
-    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate, r->correct_mean, r->correct_square);
+    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate, r->correct_mean,
+                 r->correct_square);
 }
 
 static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - beta^steps), the power by squaring */
@@ -4490,7 +4582,8 @@ static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - b
     return (ssdgs_real)(1 / (1 - power));
 }
 
-static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, ssdgs_real *parameter, const ssdgs_real *gradient,
+static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, ssdgs_real *parameter,
+                            const ssdgs_real *gradient,
                             ssdgs_real *mean, ssdgs_real *square, size_t n) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     r->parameter = parameter;
@@ -4520,7 +4613,8 @@ static int ssdgs__group_used(int group, int terms) {
     }
 }
 
-static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double t, int terms, const int learns[SSDGS__GROUPS]) {
+static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double t, int terms,
+                                     const int learns[SSDGS__GROUPS]) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     ssdgs__adam_job job;
@@ -4535,12 +4629,14 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
         if (!learns[group] || !ssdgs__group_used(group, terms)) continue;
         if (shared >= 0) {
             const size_t at = first[shared], n = first[shared + 1] - at;
-            if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at, trainer->global_mean + at,
+            if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
+                                   trainer->global_mean + at,
                                    trainer->global_square + at, n);
         } else {
             for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
-                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at, trainer->mean + at, trainer->square + at,
+                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at, trainer->mean + at,
+                                trainer->square + at,
                                 (size_t)model->count);
             }
         }
@@ -4548,7 +4644,8 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     ssdgs__parallel(context, job.ranges, ssdgs__finite_task, &job);
     for (i = 0; i < job.ranges; i++)
         if (job.range[i].bad)
-            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of %s, element %z, is not finite", trainer->iteration,
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
+                               "iteration %d refused: the gradient of %s, element %z, is not finite", trainer->iteration,
                                ssdgs__group_names[job.range[i].group], job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
     for (group = 0; group < SSDGS__GROUPS; group++) trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms);
@@ -4580,7 +4677,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     size_t capacity, bytes, i, c;
     if (trainer->mean && count <= model->capacity) return SSDGS_OK;
     capacity = count <= model->capacity ? model->capacity : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
-    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
+    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT,
+            "%z Gaussians", capacity);
     statistics = (ssdgs_real *)ssdgs__allocate(context, 3 * capacity * sizeof(ssdgs_real));
     for (i = 0; i < 3; i++) grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
     if (!statistics || !grown[0] || !grown[1] || !grown[2]) {
@@ -4589,7 +4687,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
         return SSDGS_ERR_MEMORY;
     }
     for (i = 0; i < 3; i++) {
-        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++) memcpy(grown[i] + c * capacity, *planes[i] + c * old[i], n * sizeof(ssdgs_real));
+        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++) memcpy(grown[i] + c * capacity, *planes[i] + c * old[i],
+                n * sizeof(ssdgs_real));
         ssdgs__release(context, *planes[i]);
         *planes[i] = grown[i];
     }
@@ -4692,7 +4791,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         if (drop[from]) continue;
         added++;
         ssdgs__copy_gaussian(p, trainer->stride, to, from);
-        for (c = 0; c < 3; c++) size = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] > size ? (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] : size;
+        for (c = 0; c < 3; c++) size = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] > size
+            ? (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] : size;
         if (size <= log(split_size)) continue; /* small: the copy is the clone */
         for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * trainer->stride + from];
         ssdgs__rotation_scalar(raw, q, r);
@@ -4705,13 +4805,16 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
                 scale[at] -= (ssdgs_real)0.47000362924573558; /* ln 1.6 */
             }
             for (c = 0; c < 3; c++)
-                for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * trainer->stride + at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
+                for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * trainer->stride +
+                                          at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
             if (half == 0)
-                for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + from] = trainer->square[(size_t)c * trainer->stride + from] = 0;
+                for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + from] =
+                    trainer->square[(size_t)c * trainer->stride + from] = 0;
         }
     }
     for (i = n; i < n + added; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] = trainer->square[(size_t)c * trainer->stride + i] = 0;
+        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] =
+            trainer->square[(size_t)c * trainer->stride + i] = 0;
     for (i = 0; i < n + added; i++) {
         if (i < n && drop[i]) continue;
         if (kept != i) {
@@ -4733,7 +4836,8 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
     int i;
     for (i = 0; i < trainer->model->count; i++) {
         opacity[i] = opacity[i] < most ? opacity[i] : most;
-        trainer->mean[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = trainer->square[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = 0;
+        trainer->mean[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] =
+            trainer->square[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = 0;
     }
 }
 
@@ -4752,22 +4856,28 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 /* ==== >>steps  the trainer's public functions ==== */
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
-    const ssdgs_rate rates[12] = {o->position, o->opacity, o->scale, o->rotation, o->color, o->asg, o->frame, o->material, o->shadow, o->scattering,
+    const ssdgs_rate rates[12] = {o->position, o->opacity, o->scale, o->rotation, o->color, o->asg, o->frame, o->material,
+        o->shadow, o->scattering,
                                   o->camera_rate, o->light_rate};
     int i;
-    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "train options: not made by ssdgs_train_options_default()");
-    if (o->iterations < 1 || o->iterations > 100000000) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: %d iterations", o->iterations);
-    if (o->max_gaussians < 1 || o->max_gaussians > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: max_gaussians = %d", o->max_gaussians);
+    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+            "train options: not made by ssdgs_train_options_default()");
+    if (o->iterations < 1 || o->iterations > 100000000) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            "train options: %d iterations", o->iterations);
+    if (o->max_gaussians < 1 || o->max_gaussians > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            "train options: max_gaussians = %d", o->max_gaussians);
     if (o->densify_every < 1 || o->opacity_reset_every < 0 || o->schedule < 0 || o->schedule > SSDGS_SCHEDULE_MERGED)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
     if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity or densify_size is out of range");
-    if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_gradient is negative");
+    if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            "train options: densify_gradient is negative");
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0) || !(rates[i].end >= 0) || !ssdgs__finite(rates[i].start) || !ssdgs__finite(rates[i].end))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: a learning rate is negative or not finite");
     for (i = 0; i < 3; i++)
-        if (!ssdgs__finite(o->bounds_min[i]) || !ssdgs__finite(o->bounds_max[i]) || !(o->bounds_min[i] < o->bounds_max[i]) || !ssdgs__finite(o->background[i]))
+        if (!ssdgs__finite(o->bounds_min[i]) || !ssdgs__finite(o->bounds_max[i]) || !(o->bounds_min[i] < o->bounds_max[i]) ||
+            !ssdgs__finite(o->background[i]))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds or background");
     return SSDGS_OK;
 }
@@ -4788,8 +4898,10 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     for (i = 0; i < n; i++) {
         ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
         for (c = 0; c < 3; c++) {
-            const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)), size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
-            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)((double)o->bounds_min[c] + u * size);
+            const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)),
+                size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
+                (ssdgs_real)((double)o->bounds_min[c] + u * size);
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(trainer->start_size);
         }
     }
@@ -4830,7 +4942,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     const int fresh = model->count == 0;
     int i, j;
     if (result) return result;
-    if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a baked model cannot be trained: it has no reflectance");
+    if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                                  "a baked model cannot be trained: it has no reflectance");
     if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d photographs", photo_count);
     for (i = 0; i < photo_count; i++) {
         result = ssdgs__camera_check(context, &photos[i].camera);
@@ -4844,15 +4957,18 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
     trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
+    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->global_mean ||
+        !trainer->global_square) return SSDGS_ERR_MEMORY;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
     for (i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
         size_t at;
         for (at = 0; at < pixels && !trainer->transparent[i]; at++)
-            trainer->transparent[i] = photos[i].format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photos[i].pixels)[4 * at + 3] < 255
-                                                                             : ((const uint16_t *)photos[i].pixels)[4 * at + 3] < 65535;
+            trainer->transparent[i] = photos[i].format == SSDGS_PIXELS_RGBA8
+                ? ((const uint8_t *)photos[i].pixels)[4 * at + 3] < 255
+                                                                             : ((const uint16_t *)photos[i].pixels)[4 * at +
+                                                                                                                    3] < 65535;
     }
     for (i = 0; i < photo_count; i++) {
         double centre[3];
@@ -4871,7 +4987,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     }
     trainer->extent = 1.1 * (radius > longest ? radius : longest); /* one camera has no radius */
     if (fresh) {
-        if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.length_unit = (ssdgs_real)(0.5 * longest);
+        if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.length_unit =
+            (ssdgs_real)(0.5 * longest);
         for (i = 0; i < photo_count; i++) { /* I / d^2 at the object averages 1 */
             double d2 = 0, intensity = 0;
             for (j = 0; j < 3; j++) {
@@ -4881,7 +4998,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
                 intensity += (double)photos[i].light.intensity[j] / 3;
                 if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.centre[j] = (ssdgs_real)centre;
             }
-            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > 1e-12 ? d2 : 1e-12) / photo_count;
+            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > 1e-12 ? d2
+                                       : 1e-12) / photo_count;
         }
         model->settings.light_scale = (ssdgs_real)(irradiance > 0 ? 1 / irradiance : 1);
         ssdgs__globals_reset(model, o->seed);
@@ -4920,7 +5038,8 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
         for (i = 0; i < n; i++) trainer->order[i] = (uint32_t)i;
     if (at == 0)
         for (i = n - 1; i > 0; i--) {
-            const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373), pass * (uint64_t)n + (uint64_t)i) * (i + 1));
+            const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373),
+                                               pass * (uint64_t)n + (uint64_t)i) * (i + 1));
             const uint32_t swap = trainer->order[i];
             trainer->order[i] = trainer->order[j];
             trainer->order[j] = swap;
@@ -4948,9 +5067,11 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     correction = trainer->corrections + photo;
     for (j = 0; j < 3; j++)
         background[j] = o->random_background && trainer->transparent[photo]
-                            ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B), 3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
+                            ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
+                                                         3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, o->dssim, &values);
+    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, o->dssim,
+                                   &values);
     if (!result) {
         result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
         if (result == SSDGS_ERR_NONFINITE) trainer->skipped++;
@@ -4994,7 +5115,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
         if (result && result != SSDGS_ERR_NONFINITE) return result;
         bad = result ? bad + 1 : 0;
         if (bad == 10) return result;
-        if (progress && !progress(user, &stats)) return ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d", trainer->iteration);
+        if (progress && !progress(user, &stats)) return ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED,
+                "cancelled at iteration %d", trainer->iteration);
     }
     return SSDGS_OK;
 }
@@ -5041,7 +5163,8 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     planes = rendered + 6 * pixels;
     memset(&out, 0, sizeof out);
     out.color = rendered;
-    for (c = 0; c < 3; c++) options.background[c] = model->settings.transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c]) : background[c];
+    for (c = 0; c < 3; c++) options.background[c] = model->settings.transfer == SSDGS_TRANSFER_SRGB
+        ? ssdgs_srgb_decode(background[c]) : background[c];
     result = ssdgs_render_ex(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
         ssdgs__photo_planes(photo, background, model->settings.transfer, planes);
@@ -5058,7 +5181,8 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3],
+                                          int iterations) {
     ssdgs__correction correction;
     ssdgs__loss_values values;
     ssdgs_camera camera;
@@ -5071,12 +5195,14 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     for (i = 0; i < iterations; i++) {
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
-        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, (ssdgs_real)0.2, &values);
+        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, (ssdgs_real)0.2,
+                                       &values);
         if (result) return result;
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
         for (j = 0; j < 9; j++)
-            if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "refinement: a gradient is not finite");
+            if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
+                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate);
         if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate);
     }
@@ -5143,7 +5269,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->isa = (uint32_t)trainer->context->isa;
     /* ints, then reals: no padding but at the end */
-    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options, offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
+    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
+                               offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
     head->inputs = ssdgs__fold(head->inputs, &s->terms, (size_t)((const char *)&s->light_bias - (const char *)&s->terms));
     for (i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
@@ -5213,11 +5340,15 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     ssdgs__checkpoint_describe(trainer, &own);
     if (size >= sizeof head + 8) memcpy(&head, bytes, sizeof head);
     if (size < sizeof head + 8 || memcmp(head.magic, own.magic, 8)) reason = "it is not a checkpoint";
-    else if (head.byte_order != own.byte_order || head.real_size != own.real_size || head.version != own.version) reason = "it was written by another version or machine";
-    else if (head.global_count != own.global_count || head.photo_count != own.photo_count || head.inputs != own.inputs) reason = "it belongs to other options, settings or photographs";
-    else if (memcmp(&head.settings.terms, &own.settings.terms, offsetof(ssdgs_settings, light_bias) - offsetof(ssdgs_settings, terms)))
+    else if (head.byte_order != own.byte_order || head.real_size != own.real_size ||
+             head.version != own.version) reason = "it was written by another version or machine";
+    else if (head.global_count != own.global_count || head.photo_count != own.photo_count ||
+             head.inputs != own.inputs) reason = "it belongs to other options, settings or photographs";
+    else if (memcmp(&head.settings.terms, &own.settings.terms,
+                    offsetof(ssdgs_settings, light_bias) - offsetof(ssdgs_settings, terms)))
         reason = "it belongs to other settings";
-    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS || (size_t)head.count > size / (3 * sizeof(ssdgs_real) * (SSDGS_CHANNELS + 1)) ||
+    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
+             (size_t)head.count > size / (3 * sizeof(ssdgs_real) * (SSDGS_CHANNELS + 1)) ||
              head.iteration < 0 || head.skipped < 0) reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
@@ -5229,7 +5360,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";
         for (i = 0; i < head.photo_count && !reason; i++) {
             uint32_t photo;
-            memcpy(&photo, bytes + size - 8 - (size_t)head.photo_count * (sizeof photo + sizeof(ssdgs__correction)) + (size_t)i * sizeof photo, sizeof photo);
+            memcpy(&photo, bytes + size - 8 - (size_t)head.photo_count * (sizeof photo + sizeof(ssdgs__correction)) + (size_t)i *
+                   sizeof photo, sizeof photo);
             if (photo >= (uint32_t)head.photo_count) reason = "its order of photographs is broken";
         }
     }
@@ -5241,7 +5373,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     if (!result) result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
         if (head.isa != own.isa && context->logger.write)
-            context->logger.write(context->logger.user, SSDGS_OK, "the checkpoint was written with another instruction set: the run goes on, not bit for bit");
+            context->logger.write(context->logger.user, SSDGS_OK,
+                                  "the checkpoint was written with another instruction set: the run goes on, not bit for bit");
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
@@ -5747,7 +5880,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             V dm0 = VFMA(VMUL(VSET(2), da), p.m[0][j], VMUL(db, p.m[1][j]));
             V dm1 = VFMA(VMUL(VSET(2), dc), p.m[1][j], VMUL(db, p.m[0][j]));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
-            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i), ds = VFMA(dm0, p.m[0][j], VMUL(dm1, p.m[1][j]));
+            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
+                ds = VFMA(dm0, p.m[0][j], VMUL(dm1, p.m[1][j]));
             VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(20)), ds, VSET(0))));
             dm0 = VMUL(dm0, p.s[j]);
             dm1 = VMUL(dm1, p.s[j]);
@@ -6188,7 +6322,8 @@ SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weigh
     for (k = 0; k < p->depth; k += 2)
         for (v = 0; v < SSDGS__BLOCK; v += 16) {
             const __m512i low = _mm512_loadu_si512(p->b + k * SSDGS__BLOCK + v);
-            const __m512i high = k + 1 < p->depth ? _mm512_loadu_si512(p->b + (k + 1) * SSDGS__BLOCK + v) : _mm512_setzero_si512();
+            const __m512i high = k + 1 < p->depth ? _mm512_loadu_si512(p->b + (k + 1) * SSDGS__BLOCK + v)
+                : _mm512_setzero_si512();
             _mm512_storeu_si512(pairs + k / 2 * SSDGS__BLOCK + v, F(bf16_pairs)(low, high));
         }
     for (row = 0; row + 4 <= p->rows; row += 4) F(dense_bf16_tile)(p, weights, pairs, 4, row);
@@ -6241,7 +6376,8 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
         for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
             V sum = VLOAD(dout + d * SSDGS__BLOCK + s), power = VSET(1);
             for (l = 0; l < levels; l++) {
-                const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s, cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
+                const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s,
+                    cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
                 V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine), VMUL(VLOAD(dout + sine), VLOAD(out + cosine)));
                 sum = VFMA(power, turn, sum);
                 power = VADD(power, power);
@@ -6254,7 +6390,8 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 
 /* One lane set of the geometry; both directions of the pass run through it. */
 typedef struct F(geometry) {
-    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3], woh, fresnel;
+    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3], woh,
+        fresnel;
     VM half;
 } F(geometry);
 
@@ -6353,7 +6490,8 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
         if (k->specular)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
-                V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL) : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
+                V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL)
+                    : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
                 d = VFMA(weight, lobe, d);
             }
         VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s, VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
@@ -6378,7 +6516,8 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         dlobe = VMUL(df, g.fresnel);
         if (k->specular)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw), de[3], db[12], lobe, push;
+                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw), de[3], db[12], lobe,
+                    push;
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
                 lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, de, db) : F(asg)(0, k->basis + 12 * j, g.local, de, db);
                 d = VFMA(weight, lobe, d);
@@ -6444,7 +6583,8 @@ SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
         if (d) {
             const V slope = VNEG(VFMA(u, VSET(1.0 / 3), u3)), shared = VMUL(p, VFMA(slope, x, sum));
             const V ds = VDIV(shared, s), da = VFMA(ds, VFMA(VSET(21), off2, VSET(-1)), VMUL(VMUL(p, sum), VDIV(one, a)));
-            const V dq = VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)), VMUL(bottom, bottom)));
+            const V dq = VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)),
+                                       VMUL(bottom, bottom)));
             const V dw = VMUL(dq, VDIV(VSET(0.5), q)), dst = VMUL(shared, inverse_st);
             d[0] = VFNMA(dw, VMUL(VMUL(sa, inverse_st), inverse_st), dst);
             d[1] = VFMA(dw, VMUL(albedo, inverse_st), dst);
@@ -6457,7 +6597,8 @@ SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
         const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)), factor = form == SSDGS_DIPOLE_JENSEN ? zv : VMUL(zr, zv);
         const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))), q = printed ? dr : dv;
         const V ir = VDIV(one, dr), iv = VDIV(one, dv);
-        const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir))), ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
+        const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir))),
+            ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
         const V br = VFMA(s, dr, one), bv = VFMA(s, q, one), scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
         const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
         if (d) {
@@ -6493,7 +6634,8 @@ SSDGS__FI V F(dipole_any)(int form, V ss, V sa, V r, R virtual_depth, V *d) {
 }
 
 /* n values, a multiple of the lanes: f, and with derivatives (3, n) those too. For tests and tools. */
-SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f, R *derivatives, size_t n) {
+SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f, R *derivatives,
+                                 size_t n) {
     size_t i;
     for (i = 0; i < n; i += SSDGS__VW) {
         V d[3];
@@ -6519,17 +6661,20 @@ SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, const R *visibility, cons
 
 /* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
 SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
-    const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1, separation = k->per_channel_optics ? 6 : 2;
+    const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1,
+        separation = k->per_channel_optics ? 6 : 2;
     unit[0] = F(sigmoid)(VLOAD(network + first * SSDGS__BLOCK + s));
     unit[1] = F(sigmoid)(VLOAD(network + absorb * SSDGS__BLOCK + s));
     unit[2] = F(sigmoid)(VLOAD(network + separation * SSDGS__BLOCK + s));
 }
 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
-SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow, const R *optics, R *out) {
+SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
+                         const R *optics, R *out) {
     int s, c;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), factor = F(shadow_factor)(k, visibility, shadow, s);
+        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
+            factor = F(shadow_factor)(k, visibility, shadow, s);
         V profile = VSET(0), unit[3];
         R *o = out + s;
         for (c = 0; c < 3; c++) {
@@ -6564,12 +6709,15 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                                   const R *optics, const R *dcolor, R *dgauss, R *drows, R *dshadow, R *doptics, R *dvisibility) {
     int s, c, i;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), factor = F(shadow_factor)(k, visibility, shadow, s);
+        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
+            factor = F(shadow_factor)(k, visibility, shadow, s);
         const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s), gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
-        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), profile = VSET(0), unit[3], d[3], dunit[3];
+        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), profile = VSET(0), unit[3], d[3],
+            dunit[3];
         for (i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
         for (c = 0; c < 3; c++) {
-            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c])), lit = VMUL(VMUL(g, irradiance), factor);
+            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
+                lit = VMUL(VMUL(g, irradiance), factor);
             V surface = VSET(0); /* what S multiplies, per irradiance */
             if (k->diffuse) { /* (c_d / pi) f_d S */
                 const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
@@ -6604,7 +6752,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 for (i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
                 if (k->per_channel_optics)
                     for (i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
-                        VSTORE(doptics + (3 * i + c) * SSDGS__BLOCK + s, VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
+                        VSTORE(doptics + (3 * i + c) * SSDGS__BLOCK + s,
+                               VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
                         dunit[i] = VSET(0);
                     }
             }
@@ -6614,7 +6763,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             if (!k->per_channel_optics)
                 for (i = 0; i < 2; i++)
                     VSTORE(doptics + i * SSDGS__BLOCK + s, VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
-            VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s, VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
+            VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
+                   VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
         }
         if (k->shadow && !shadow) VSTORE(dvisibility + s, dfactor);
         if (k->shadow && shadow) {
@@ -6784,7 +6934,8 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(row_spans), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(dense), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward), F(dipole_profile),
+    F(dense), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
+        F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(adam)
 };
 
