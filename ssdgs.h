@@ -923,7 +923,7 @@ static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties
 }
 
 static SSDGS__INLINE float ssdgs__pow2(float n) {
-    const uint32_t bits = (uint32_t)((int)n + 127) << 23;
+    const uint32_t bits = (uint32_t)((n > -127 ? (int)n : -127) + 127) << 23; /* NaN too */
     float x;
     memcpy(&x, &bits, 4);
     return x;
