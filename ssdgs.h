@@ -5072,11 +5072,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
     result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, o->dssim,
                                    &values);
-    if (!result) {
-        result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
-        if (result == SSDGS_ERR_NONFINITE) trainer->skipped++;
-        if (result && result != SSDGS_ERR_NONFINITE) return result;
-    } else return result;
+    if (result) return result;
+    result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
+    trainer->skipped += result != SSDGS_OK;
     if (!result) {
         ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];

@@ -207,11 +207,50 @@ static void test_rotation(void) {
     }
 }
 
+/* Shared gradients over many blocks: the whole is the sum of the even Gaussians' and the odd ones', which fill other blocks. */
+static void test_shared_sums(void) {
+    enum { MANY = 64 * 40 + 5 };
+    static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    ssdgs_frame frame;
+    ssdgs_light light;
+    double *sum, difference = 0, norm = 0;
+    size_t i;
+    int part, c;
+    memset(&light, 0, sizeof light);
+    settings.scattering_width = 16;
+    settings.light_map_size = 64;
+    for (c = 0; c < 3; c++) light.position[c] = light.intensity[c] = 1 + c;
+    if (!CHECK(!ssdgs_model_create(context, &settings, MANY, &model))) exit(1);
+    sum = (double *)calloc(model->global_count, sizeof *sum);
+    for (i = 0; i < MANY; i++)
+        for (c = 0; c < SSDGS_CHANNELS; c++) model->gaussians[(size_t)c * model->capacity + i] = (c < 3 ? 0.4 : 1) * (2 * draw(i * 40 + (size_t)c) - 1);
+    for (part = 0; part < 3; part++) {
+        if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1)) exit(1);
+        if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
+        for (i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
+        if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
+        for (i = 0; i < 4 * MANY; i++) frame.color_gradient[i] = draw(i) - 0.5;
+        if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
+        for (i = 0; i < model->global_count; i++) sum[i] += (part == 2 ? -1 : 1) * frame.global_gradient[i];
+    }
+    for (i = 0; i < model->global_count; i++) {
+        difference += sum[i] * sum[i];
+        norm += frame.global_gradient[i] * frame.global_gradient[i];
+    }
+    CHECK(norm > 0 && difference < 1e-20 * norm);
+    free(sum);
+    ssdgs_model_destroy(model);
+}
+
 int main(void) {
     scene base, s;
     int i;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
+    test_shared_sums();
     memset(&base, 0, sizeof base);
     base.name = "default";
     base.settings = ssdgs_settings_default();
