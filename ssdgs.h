@@ -309,7 +309,7 @@ typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0,        /* Gaussians -> records and depths of every view */
     SSDGS_STAGE_SORT,               /* -> order, nearest first */
     SSDGS_STAGE_BIN,                /* -> instances and tile lists */
-    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
+    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue (lights) */
     SSDGS_STAGE_SHADE,              /* -> color and the components asked for */
     SSDGS_STAGE_COMPOSITE,          /* -> image, transmittance */
     SSDGS_STAGE_COMPOSITE_BACKWARD, /* image_gradient -> splat_gradient, color_gradient */
@@ -480,9 +480,17 @@ typedef struct ssdgs_render_options {
     ssdgs_real background[3];     /* linear; transfer none: stored values */
     ssdgs_real stop;              /* a pixel is done when its transmittance falls below; 0 = never */
     ssdgs_real alpha_threshold;   /* splats fainter than this at a pixel are not drawn */
+    ssdgs_real max_error;         /* Gaussians are left unshaded where, in every pixel, the blend weights of all that are
+                                     sum to no more than this; 0 = every Gaussian seen is shaded */
+    ssdgs_real light_detail;      /* resolution of the lights' maps, relative to the model's choice */
 } ssdgs_render_options;
 
+/* What a game wants: shortcuts that cannot be seen (less than 0.02 dB against photographs). */
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
+/* The method as it is written, every shortcut off: for comparisons and tests. Training uses it. */
+SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
+/* Less than 0.1 dB against photographs. */
+SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
 
 typedef struct ssdgs_render_stats {
     int gaussians;      /* in the model */
@@ -621,7 +629,7 @@ typedef struct ssdgs_splat_view {
     /* SSDGS_STAGE_BIN: an instance is one Gaussian in one tile; a Gaussian's instances are neighbours, tiles ascending */
     size_t instance_room;       /* indices in use, with gaps */
     size_t instances;           /* instances without the gaps */
-    uint32_t *first_instance;   /* (visible + 1) per rank in order */
+    uint32_t *first_instance;   /* (visible) per rank in order */
     uint32_t *instance_count;   /* (visible) */
     uint32_t *instance_owner;   /* (instance_room) Gaussian */
     uint32_t *instance_tile;    /* (instance_room) */
@@ -629,9 +637,12 @@ typedef struct ssdgs_splat_view {
     uint32_t *tile_start;       /* (tiles + 1) */
     uint32_t *tile_list;        /* (instances) per tile, nearest first */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
-    unsigned char *instance_seen; /* (instance_room), camera */
+    uint16_t *instance_seen;    /* (instance_room), camera: which micro-tiles blend it */
+    unsigned char *instance_needed; /* (instance_room), camera: it must be shaded; NULL = where it is seen */
     ssdgs_real *instance_sums;  /* (instance_room, SSDGS_SPLAT_SUMS) */
 } ssdgs_splat_view;
+
+enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 };
 
 typedef struct ssdgs_frame {
     ssdgs_context *context;
@@ -649,10 +660,11 @@ typedef struct ssdgs_frame {
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
-    unsigned char *seen;        /* (n) a pixel blends it */
+    unsigned char *seen;        /* (n) SSDGS_SEEN: shade it; SSDGS_GLIMPSED: blended, within max_error in every pixel; 0 */
     ssdgs_real *visibility;     /* (lights, n) eq. 7 */
     ssdgs_real *depth_cue;      /* (lights, n) world units */
-    ssdgs_real *flux;           /* (lights, n) sr per unit intensity intercepted */
+    ssdgs_real *flux;           /* (lights, n) sr per unit intensity intercepted; NULL, so not computed, unless the caller of the
+                                   stages points it at memory */
     /* SSDGS_STAGE_SHADE */
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
@@ -803,15 +815,16 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 
 #define SSDGS__BLOCK 64      /* Gaussians shaded together */
-#define SSDGS__BATCH 64      /* tile entries walked together; an entry code is index | SAMPLE | APPLY in a byte */
-#define SSDGS__SAMPLE 64
-#define SSDGS__APPLY 128
+#define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
+#define SSDGS__SAMPLE 1
+#define SSDGS__APPLY 2
 #define SSDGS__SUMS SSDGS_SPLAT_SUMS
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__TV 4          /* vectors in a dense tile */
 #define SSDGS__ALPHA_MAX 0.999
+#define SSDGS__SHARE ((ssdgs_real)0.25) /* of max_error, the most that one splat may take */
 #define SSDGS__F0 0.04       /* Schlick */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
@@ -834,7 +847,8 @@ typedef struct ssdgs__tile {
     const uint16_t *mask;
     uint32_t count;
     int x, y, width, height;
-    ssdgs_real log2_threshold, stop, bias, depth_origin, cx, cy, inverse_focal;
+    ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
+    int cue, flux; /* whether the light pass finds them */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -854,8 +868,8 @@ typedef struct ssdgs__kernels {
     void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *, ssdgs_real *);
     void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *,
                              ssdgs_real *, size_t, ssdgs_real *);
-    void (*row_spans)(const ssdgs_real *, ssdgs_real, int, int, int, int16_t *, int16_t *);
-    void (*walk_camera)(const ssdgs__tile *, unsigned char *);
+    int (*bin)(const ssdgs_real *, ssdgs_real, const int *, int, uint32_t *, uint16_t *);
+    void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
     void (*composite_backward)(const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
@@ -889,6 +903,12 @@ typedef struct ssdgs__kernels {
 static const ssdgs_real ssdgs__lane_x[16] = {0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5};
 static const ssdgs_real ssdgs__lane_y[16] = {0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5, 2.5, 2.5, 2.5, 2.5, 3.5, 3.5, 3.5, 3.5};
 static const ssdgs_real ssdgs__count[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+/* Pixel centres at the low corner of the micro-tiles of a tile. */
+static const ssdgs_real ssdgs__micro_x[16] = {0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5};
+static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5, 4.5, 4.5, 4.5, 8.5, 8.5, 8.5, 8.5, 12.5, 12.5, 12.5, 12.5};
+#if SSDGS__NEON
+static const uint32_t ssdgs__lane_bits[4] = {1, 2, 4, 8};
+#endif
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {
     (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
@@ -897,12 +917,13 @@ static const ssdgs_real ssdgs__window[11] = {
         (ssdgs_real)0.10936068950970002,
     (ssdgs_real)0.03600077212843083, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
 
-static SSDGS__INLINE int ssdgs__lowest_bit(unsigned mask) {
+static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
 #if defined(__GNUC__) && !defined(__TINYC__)
-    return __builtin_ctz(mask);
+    return __builtin_ctzll(mask);
 #else
-    int bit = 0;
-    while (!(mask >> bit & 1u)) bit++;
+    int bit = 0, half;
+    for (half = 32; half; half /= 2)
+        if (!(mask >> bit & (((uint64_t)1 << half) - 1))) bit += half;
     return bit;
 #endif
 }
@@ -1635,11 +1656,12 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, first, count, owner, tile, mask, start, list, seen, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, first, count, owner, tile, mask, start, list, seen, needed, sums, histogram;
+    uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
 typedef struct ssdgs__frame_memory {
-    ssdgs__buffer views, view_memory, seen, visibility, cue, flux, light_sums, shaded, color, component[5], pixels, transmittance;
+    ssdgs__buffer views, view_memory, seen, visibility, cue, light_sums, shaded, color, component[5], pixels, transmittance;
     ssdgs__buffer lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target;
@@ -1652,7 +1674,7 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
     if (!m) return;
     for (v = 0; v < m->view_room; v++) {
         ssdgs__buffer *b = (ssdgs__buffer *)((ssdgs__view_memory *)m->view_memory.memory + v);
-        for (i = 0; i < sizeof(ssdgs__view_memory) / sizeof *b; i++) ssdgs__release(context, b[i].memory);
+        for (i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++) ssdgs__release(context, b[i].memory);
     }
     for (i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
         ssdgs__release(context, ((ssdgs__buffer *)m + i)->memory);
@@ -1909,13 +1931,24 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
+SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void) {
     ssdgs_render_options o;
     memset(&o, 0, sizeof o);
     o.version = SSDGS_VERSION;
     o.terms = SSDGS_ALL_TERMS;
     o.stop = (ssdgs_real)1e-4;
     o.alpha_threshold = (ssdgs_real)(1.0 / 255);
+    o.light_detail = 1;
+    return o;
+}
+
+SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
+    ssdgs_render_options o = ssdgs_render_options_exact();
+    return o;
+}
+
+SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
+    ssdgs_render_options o = ssdgs_render_options_default();
     return o;
 }
 
@@ -1987,7 +2020,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
     if (components) {
@@ -2129,25 +2161,25 @@ static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record,
     }
 }
 
-static void ssdgs__bin_room_task(void *data, int index) {
-    const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    ssdgs_splat_view *v = frame->views + index;
-    uint64_t room = 0;
-    int rank, box[4];
-    for (rank = 0; rank < v->visible; rank++) {
-        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, box);
-        v->first_instance[rank] = (uint32_t)room;
-        room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
-        if (room > UINT32_MAX / 2) break; /* refused by the caller */
-    }
-    v->first_instance[v->visible] = (uint32_t)room;
-    v->instance_room = (size_t)room;
-}
-
 static void ssdgs__bin_range(const ssdgs_splat_view *v, int chunk, int *begin, int *end) {
     const int size = (v->visible + SSDGS__BIN_CHUNKS - 1) / SSDGS__BIN_CHUNKS;
     *begin = chunk * size < v->visible ? chunk * size : v->visible;
     *end = *begin + size < v->visible ? *begin + size : v->visible;
+}
+
+/* How many instances a chunk of ranks can have at most. */
+static void ssdgs__bin_room_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs_splat_view *v = frame->views + view;
+    uint64_t room = 0;
+    int begin, end, rank, box[4];
+    ssdgs__bin_range(v, chunk, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, box);
+        room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
+    }
+    ((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->chunk_room[chunk] = room;
 }
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
@@ -2156,48 +2188,28 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
         (size_t)(v->tiles_x * v->tiles_y);
 }
 
-/* Instances of a chunk of ranks, from the exact spans of their ellipses; counts them per tile. */
+/* Instances of a chunk of ranks, from its first place on; counts them per tile. */
 static void ssdgs__bin_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     ssdgs_splat_view *v = frame->views + view;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
+    uint32_t at = (uint32_t)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->chunk_room[chunk];
     const ssdgs_real threshold = ssdgs__log2_threshold(frame);
-    int begin, end, rank, box[4], ty, tx, r, block;
-    int16_t first[64], last[64];
+    int begin, end, rank, box[4], count, i;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
         const uint32_t gaussian = v->order[rank];
         const ssdgs_real *record = v->record + (size_t)gaussian * 8;
-        uint32_t at = v->first_instance[rank];
         ssdgs__tile_box(v, record, box);
-        for (block = box[1]; block <= box[3]; block += 16) {
-            const int rows = (box[3] - block + 1 < 16 ? box[3] - block + 1 : 16) * 4;
-            frame->context->k->row_spans(record, threshold, 4 * block, rows, 4 * v->tiles_x, first, last);
-            for (ty = 0; ty < rows / 4; ty++) {
-                int low = 4 * v->tiles_x, high = -1;
-                for (r = 4 * ty; r < 4 * ty + 4; r++) {
-                    if (first[r] > last[r]) continue;
-                    low = first[r] < low ? first[r] : low;
-                    high = last[r] > high ? last[r] : high;
-                }
-                for (tx = low / 4 > box[0] ? low / 4 : box[0]; 4 * tx <= high && tx <= box[2]; tx++) {
-                    unsigned mask = 0;
-                    for (r = 0; r < 4; r++) {
-                        const int from = first[4 * ty + r] - 4 * tx, to = last[4 * ty + r] - 4 * tx;
-                        if (from > to || from > 3 || to < 0) continue;
-                        mask |= ((2u << (to > 3 ? 3 : to)) - (1u << (from < 0 ? 0 : from))) << (4 * r);
-                    }
-                    if (!mask) continue;
-                    v->instance_owner[at] = gaussian;
-                    v->instance_tile[at] = (uint32_t)((block + ty) * v->tiles_x + tx);
-                    v->instance_mask[at] = (uint16_t)mask;
-                    histogram[v->instance_tile[at++]]++;
-                }
-            }
+        count = frame->context->k->bin(record, threshold, box, v->tiles_x, v->instance_tile + at, v->instance_mask + at);
+        v->first_instance[rank] = at;
+        v->instance_count[rank] = (uint32_t)count;
+        for (i = 0; i < count; i++, at++) {
+            v->instance_owner[at] = gaussian;
+            histogram[v->instance_tile[at]]++;
         }
-        v->instance_count[rank] = at - v->first_instance[rank];
     }
 }
 
@@ -2235,21 +2247,24 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
 
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    int i;
-    for (i = 0; i < frame->view_count; i++) {
-        ssdgs_splat_view *v = frame->views + i;
-        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
-        SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
-        SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
-    }
-    ssdgs__parallel(context, frame->view_count, ssdgs__bin_room_task, frame);
+    int i, chunk;
+    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_room_task, frame);
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
         uint32_t *histogram;
-        if (v->instance_room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT,
-                "too many splats for an image of %d x %d", v->width, v->height);
+        uint64_t room = 0, chunk_room;
+        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first place */
+            chunk_room = m->chunk_room[chunk];
+            m->chunk_room[chunk] = room;
+            room += chunk_room;
+        }
+        if (room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d",
+                                                      v->width, v->height);
+        v->instance_room = (size_t)room;
+        SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
+        SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
         SSDGS__RESERVE(m->owner, v->instance_owner, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->tile, v->instance_tile, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->mask, v->instance_mask, uint16_t, v->instance_room + 1);
@@ -2267,13 +2282,14 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
 /* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ====
    Tiles of all views in one loop: the camera's walk and the light pass run side by side. */
 
-static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index) {
+/* With walked, of its entries those that the walk saw blended. */
+static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index, int walked) {
     ssdgs__tile t;
     t.record = v->record;
     t.depth = v->depth;
     t.list = v->tile_list + v->tile_start[index];
     t.owner = v->instance_owner;
-    t.mask = v->instance_mask;
+    t.mask = walked ? v->instance_seen : v->instance_mask;
     t.count = v->tile_start[index + 1] - v->tile_start[index];
     t.x = 16 * (index % v->tiles_x);
     t.y = 16 * (index / v->tiles_x);
@@ -2281,11 +2297,14 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.height = v->height;
     t.log2_threshold = ssdgs__log2_threshold(frame);
     t.stop = frame->options.stop;
+    t.max_error = frame->options.max_error;
     t.bias = frame->settings.light_bias;
     t.depth_origin = v->visible ? v->depth[v->order[0]] : 0;
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / v->fx;
+    t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
+    t.flux = frame->flux != NULL;
     return t;
 }
 
@@ -2294,13 +2313,18 @@ static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_splat_view *v = frame->views;
     ssdgs__tile tile;
     for (; index >= v->tiles_x * v->tiles_y; v++) index -= v->tiles_x * v->tiles_y;
-    tile = ssdgs__tile_of(frame, v, index);
+    tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
-    if (v->light < 0) frame->context->k->walk_camera(&tile, v->instance_seen);
+    if (v->light < 0) frame->context->k->walk_camera(&tile, v->instance_seen, v->instance_needed);
     else frame->context->k->walk_light(&tile, v->instance_sums);
 }
 
-typedef struct ssdgs__gather_job { const ssdgs_frame *frame; const ssdgs_splat_view *view; ssdgs_real *sums; } ssdgs__gather_job;
+typedef struct ssdgs__gather_job {
+    const ssdgs_frame *frame;
+    const ssdgs_splat_view *view;
+    ssdgs_real *sums;
+    int light;
+} ssdgs__gather_job;
 
 /* Per Gaussian, the sums over its instances, in their order. */
 static void ssdgs__gather_light_task(void *data, int index) {
@@ -2316,6 +2340,20 @@ static void ssdgs__gather_light_task(void *data, int index) {
     }
 }
 
+/* The ratios of a chunk of Gaussians under a light. */
+static void ssdgs__visibility_task(void *data, int chunk) {
+    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
+    const size_t n = (size_t)job->frame->gaussians.count, begin = (size_t)chunk * SSDGS__CHUNK;
+    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n, first = n * (size_t)job->light;
+    size_t g;
+    for (g = begin; g < end; g++) {
+        const ssdgs_real *sum = job->sums + 4 * g;
+        job->frame->visibility[first + g] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
+        job->frame->depth_cue[first + g] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
+        if (job->frame->flux) job->frame->flux[first + g] = sum[3];
+    }
+}
+
 static void ssdgs__gather_camera_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
     const ssdgs_splat_view *v = job->view;
@@ -2323,10 +2361,12 @@ static void ssdgs__gather_camera_task(void *data, int index) {
     uint32_t instance;
     ssdgs__bin_range(v, index, &begin, &end);
     for (rank = begin; rank < end; rank++) {
-        unsigned char seen = 0;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] +
-             v->instance_count[rank]; instance++) seen |= v->instance_seen[instance];
-        job->frame->seen[v->order[rank]] = seen;
+        unsigned blended = 0, needed = 0;
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
+            blended |= v->instance_seen[instance];
+            needed |= v->instance_needed ? v->instance_needed[instance] : v->instance_seen[instance];
+        }
+        job->frame->seen[v->order[rank]] = (unsigned char)(needed ? SSDGS_SEEN : blended ? SSDGS_GLIMPSED : 0);
     }
 }
 
@@ -2334,19 +2374,16 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->gaussians.count;
     ssdgs__gather_job job;
-    size_t g;
-    int i, light, tiles = 0;
+    int i, tiles = 0;
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
-            SSDGS__RESERVE(m->seen, v->instance_seen, unsigned char, v->instance_room + 1);
-            memset(v->instance_seen, 0, v->instance_room);
-        } else {
-            SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * 4 + 4);
-            memset(v->instance_sums, 0, v->instance_room * 4 * sizeof(ssdgs_real));
-        }
+            SSDGS__RESERVE(m->seen, v->instance_seen, uint16_t, v->instance_room + 1);
+            v->instance_needed = NULL;
+            if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->instance_needed, unsigned char, v->instance_room + 1);
+        } else SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * 4 + 4);
     }
     SSDGS__RESERVE(frame->memory->light_sums, job.sums, ssdgs_real, n * 4 + 4);
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
@@ -2354,20 +2391,13 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     job.view = frame->views;
     memset(frame->seen, 0, n);
     ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
-    for (light = 0, i = 1; light < frame->light_count; light++) {
-        ssdgs_real *visibility = frame->visibility + n * (size_t)light, *cue = frame->depth_cue + n * (size_t)light,
-            *flux = frame->flux + n * (size_t)light;
+    for (job.light = 0, i = 1; job.light < frame->light_count; job.light++) {
         memset(job.sums, 0, n * 4 * sizeof(ssdgs_real));
-        for (; i < frame->view_count && frame->views[i].light == light; i++) {
+        for (; i < frame->view_count && frame->views[i].light == job.light; i++) {
             job.view = frame->views + i;
             ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
         }
-        for (g = 0; g < n; g++) {
-            const ssdgs_real *sum = job.sums + 4 * g;
-            visibility[g] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
-            cue[g] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
-            flux[g] = sum[3];
-        }
+        ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__visibility_task, &job);
     }
     return SSDGS_OK;
 }
@@ -2765,11 +2795,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     int i;
     frame->shaded_count = 0;
     for (i = 0; i < frame->gaussians.count; i++) {
-        ssdgs_real *const unseen[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal,
-            frame->shadow};
-        int c;
-        if (frame->seen[i]) frame->shaded[frame->shaded_count++] = (uint32_t)i;
-        else for (c = 0; c < (frame->components ? 6 : 1); c++) memset(unseen[c] + 4 * (size_t)i, 0, 4 * sizeof(ssdgs_real));
+        if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
     }
     result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
@@ -2900,7 +2926,7 @@ typedef struct ssdgs__composite_job { const ssdgs_frame *frame; const ssdgs_real
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_splat_view *v = job->frame->views;
-    const ssdgs__tile tile = ssdgs__tile_of(job->frame, v, index);
+    const ssdgs__tile tile = ssdgs__tile_of(job->frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
     ssdgs_real pixels[16 * 64];
     int micro, lane, c;
@@ -2929,7 +2955,7 @@ static ssdgs_result ssdgs__composite_planes(const ssdgs_frame *frame, const ssdg
 static void ssdgs__composite_backward_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
-    const ssdgs__tile tile = ssdgs__tile_of(frame, v, index);
+    const ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
     ssdgs_real pixels[16 * 64];
     int micro, lane, c;
@@ -2964,7 +2990,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         ssdgs_real sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
         memset(sum, 0, sizeof sum);
         for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
-            for (i = 0; i < SSDGS__SUMS; i++) sum[i] += v->instance_sums[(size_t)instance * SSDGS__SUMS + (size_t)i];
+            for (i = 0; v->instance_seen[instance] && i < SSDGS__SUMS; i++) sum[i] += v->instance_sums[(size_t)instance * SSDGS__SUMS + (size_t)i];
         /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
         d[0] = a * sum[1] + b * sum[2];
         d[1] = b * sum[1] + c * sum[2];
@@ -2983,7 +3009,6 @@ static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
     const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
     SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * SSDGS__SUMS + SSDGS__SUMS);
-    memset(v->instance_sums, 0, v->instance_room * SSDGS__SUMS * sizeof(ssdgs_real));
     memset(frame->splat_gradient, 0, n * SSDGS__SPLAT * sizeof(ssdgs_real));
     memset(frame->color_gradient, 0, n * 4 * sizeof(ssdgs_real));
     memset(frame->view_gradient, 0, sizeof frame->view_gradient);
@@ -5421,7 +5446,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VLT(a, b) ((a) < (b))
 #define VGE(a, b) ((a) >= (b))
 #define VAND(m, n) ((m) & (n))
-#define VANY(m) (m)
+#define VBITS(m) (m)
 #define VSEL(m, a, b) ((m) ? (a) : (b))
 #define VROUND(a) ssdgs__round(a)
 #define VPOW2(n) ssdgs__pow2(n)
@@ -5449,7 +5474,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VLT(a, b) _mm_cmplt_ps(a, b)
 #define VGE(a, b) _mm_cmpge_ps(a, b)
 #define VAND(m, n) _mm_and_ps(m, n)
-#define VANY(m) _mm_movemask_ps(m)
+#define VBITS(m) _mm_movemask_ps(m)
 #define VSEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
 #define VROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
 #define VPOW2(n) _mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(_mm_cvtps_epi32(n), _mm_set1_epi32(127)), 23))
@@ -5477,7 +5502,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VLT(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
 #define VGE(a, b) _mm256_cmp_ps(a, b, _CMP_GE_OQ)
 #define VAND(m, n) _mm256_and_ps(m, n)
-#define VANY(m) _mm256_movemask_ps(m)
+#define VBITS(m) _mm256_movemask_ps(m)
 #define VSEL(m, a, b) _mm256_blendv_ps(b, a, m)
 #define VROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
 #define VPOW2(n) _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(n), _mm256_set1_epi32(127)), 23))
@@ -5505,7 +5530,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VLT(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
 #define VGE(a, b) _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ)
 #define VAND(m, n) ((__mmask16)((m) & (n)))
-#define VANY(m) ((int)(m))
+#define VBITS(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
 #define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvtps_epi32(a))
 #define VPOW2(n) _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_add_epi32(_mm512_cvtps_epi32(n), _mm512_set1_epi32(127)), 23))
@@ -5533,7 +5558,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VLT(a, b) vcltq_f32(a, b)
 #define VGE(a, b) vcgeq_f32(a, b)
 #define VAND(m, n) vandq_u32(m, n)
-#define VANY(m) (vmaxvq_u32(m) != 0)
+#define VBITS(m) ((int)vaddvq_u32(vandq_u32(m, vld1q_u32(ssdgs__lane_bits))))
 #define VSEL(m, a, b) vbslq_f32(m, a, b)
 #define VROUND(a) vrndnq_f32(a)
 #define VPOW2(n) vreinterpretq_f32_s32(vshlq_n_s32(vaddq_s32(vcvtnq_s32_f32(n), vdupq_n_s32(127)), 23))
@@ -5819,7 +5844,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
         VSTORE(lane, VSEL(drawn, d, VSET(-1)));
         for (l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
-        if (!VANY(drawn)) continue;
+        if (!VBITS(drawn)) continue;
         field[0] = x;
         field[1] = y;
         field[2] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det));
@@ -5926,36 +5951,34 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
     for (j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
 }
 
-/* ==== >>bin_kernel  exact ellipse spans ==== */
+/* ==== >>bin_kernel  which 4x4 micro-tiles an ellipse touches ==== */
 
-/* For each 4-pixel row of micro-tiles row0 .. row0 + rows, the columns of micro-tiles whose pixel centres can lie inside the
-   ellipse alpha >= threshold of the record; first > last where there are none. */
-SSDGS__FN void F(row_spans)(const R *record, R log2_threshold, int row0, int rows, int columns, int16_t *first, int16_t *last) {
-    const R a = -record[2], b = -record[3], c = -record[4], reach = record[5] - log2_threshold, right = -b * record[6] / (2 * c);
-    const R margin = (R)0.01;
-    int i, l;
-    for (i = 0; i < rows; i += SSDGS__VW) {
-        R lane[SSDGS__VW], low[SSDGS__VW], high[SSDGS__VW];
-        V d0, d1, at, disc, dx;
-        for (l = 0; l < SSDGS__VW; l++) lane[l] = (R)(4 * (row0 + i + l));
-        d0 = VADD(VLOAD(lane), VSET((R)0.5 - record[1] - margin));
-        d1 = VADD(d0, VSET(3 + 2 * margin));
-        d0 = VMAX(VMIN(d0, VSET(record[7])), VSET(-record[7]));
-        d1 = VMAX(VMIN(d1, VSET(record[7])), VSET(-record[7]));
-        at = VMAX(d0, VMIN(d1, VSET(right)));
-        disc = VFNMA(VMUL(VSET(4 * a), at), VMUL(VSET(c), at), VFMA(VMUL(VSET(b), at), VMUL(VSET(b), at), VSET(4 * a * reach)));
-        dx = VMUL(VFNMA(VSET(b), at, VSQRT(VMAX(disc, VSET(0)))), VSET(1 / (2 * a)));
-        VSTORE(high, VMUL(VADD(dx, VSET(record[0] - (R)0.5 + margin)), VSET(0.25)));
-        at = VMAX(d0, VMIN(d1, VSET(-right)));
-        disc = VFNMA(VMUL(VSET(4 * a), at), VMUL(VSET(c), at), VFMA(VMUL(VSET(b), at), VMUL(VSET(b), at), VSET(4 * a * reach)));
-        dx = VMUL(VFMA(VSET(b), at, VSQRT(VMAX(disc, VSET(0)))), VSET(-1 / (2 * a)));
-        VSTORE(low, VMUL(VADD(dx, VSET(record[0] - (R)3.5 - margin)), VSET(0.25)));
-        for (l = 0; l < SSDGS__VW && i + l < rows; l++) {
-            const R from = low[l] > 0 ? low[l] : 0, to = high[l] < (R)columns ? high[l] : (R)(columns - 1);
-            first[i + l] = (int16_t)(from < (R)columns ? (int)from + (from > (R)(int)from) : columns);
-            last[i + l] = (int16_t)(to >= 0 ? (int)to : -1);
+/* The tiles of a record's box with pixels where alpha may reach the threshold, row by row: their numbers and their micro-tiles
+   (lanes here). Over the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
+   the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. Returns how many. */
+SSDGS__FN int F(bin)(const R *record, R log2_threshold, const int *box, int tiles_x, uint32_t *tile, uint16_t *mask) {
+    const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
+    const V a = VSET(record[2] * margin), b = VSET(record[3]), c = VSET(record[4] * margin), zero = VSET(0), side = VSET(3);
+    const V best_x = VSET(-record[3] / (2 * record[2])), best_y = VSET(-record[3] / (2 * record[4]));
+    const V least = VSET(log2_threshold - record[5] - (R)1e-3);
+    int count = 0, tx, ty, v;
+    for (ty = box[1]; ty <= box[3]; ty++)
+        for (tx = box[0]; tx <= box[2]; tx++) {
+            unsigned touched = 0;
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
+                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
+                V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
+                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
+                V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
+                V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
+                touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
+            }
+            tile[count] = (uint32_t)(ty * tiles_x + tx);
+            mask[count] = (uint16_t)touched;
+            count += touched != 0;
         }
-    }
+    return count;
 }
 
 /* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ====
@@ -5964,31 +5987,52 @@ SSDGS__FN void F(row_spans)(const R *record, R log2_threshold, int row0, int row
 
 typedef struct F(batch) {
     R record[SSDGS__BATCH][8];
-    unsigned char entry[16][SSDGS__BATCH];
-    int count[16];
+    uint32_t instance[SSDGS__BATCH], gaussian[SSDGS__BATCH];
+    uint16_t mask[SSDGS__BATCH];
+    uint64_t entries[16]; /* per micro-tile, which of the batch touch it */
 } F(batch);
 
-SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const R *record, unsigned mask, int code) {
-    int i;
-    for (i = 0; i < 8; i++) batch->record[index][i] = record[i];
-    for (; mask; mask &= mask - 1) {
-        const int micro = ssdgs__lowest_bit(mask);
-        batch->entry[micro][batch->count[micro]++] = (unsigned char)(index | code);
+/* Turns the masks of count entries, micro-tiles per entry, into entries per micro-tile. */
+SSDGS__FI void F(batch_transpose)(F(batch) *batch, int count) {
+    int i, micro;
+    for (micro = 0; micro < 16; micro++) batch->entries[micro] = 0;
+#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+    for (i = count; i & 15; i++) batch->mask[i] = 0;
+    for (i = 0; i < count; i += 16) {
+        const __m128i low = _mm_set1_epi16(255);
+        const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)(batch->mask + i));
+        const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)(batch->mask + i + 8));
+        __m128i half[2];
+        half[0] = _mm_packus_epi16(_mm_and_si128(a, low), _mm_and_si128(b, low));
+        half[1] = _mm_packus_epi16(_mm_srli_epi16(a, 8), _mm_srli_epi16(b, 8));
+        SSDGS__UNROLL for (micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
+            batch->entries[micro] |= (uint64_t)(unsigned)_mm_movemask_epi8(half[micro / 8]) << i;
+            half[micro / 8] = _mm_add_epi8(half[micro / 8], half[micro / 8]);
+        }
     }
+#else
+    for (i = 0; i < count; i++) {
+        unsigned mask = batch->mask[i];
+        for (; mask; mask &= mask - 1) batch->entries[ssdgs__lowest_bit(mask)] |= (uint64_t)1 << i;
+    }
+#endif
 }
 
-/* Gathers up to SSDGS__BATCH list entries from `from`; returns how many. */
-SSDGS__FI int F(batch_gather)(F(batch) *batch, const ssdgs__tile *tile, uint32_t from, uint32_t *gaussian) {
-    const uint32_t left = tile->count - from, n = left < SSDGS__BATCH ? left : SSDGS__BATCH;
-    uint32_t i;
-    int micro;
-    for (micro = 0; micro < 16; micro++) batch->count[micro] = 0;
-    for (i = 0; i < n; i++) {
-        const uint32_t instance = tile->list[from + i];
-        gaussian[i] = tile->owner[instance];
-        F(batch_add)(batch, (int)i, tile->record + (size_t)gaussian[i] * 8, tile->mask[instance], 0);
-    }
-    return (int)n;
+SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const ssdgs__tile *tile, uint32_t instance) {
+    const uint32_t gaussian = tile->owner[instance];
+    batch->instance[index] = instance;
+    batch->gaussian[index] = gaussian;
+    batch->mask[index] = tile->mask[instance];
+    memcpy(batch->record[index], tile->record + (size_t)gaussian * 8, 8 * sizeof(R));
+}
+
+/* Gathers the list's next entries with a mask from *from on; returns how many. */
+SSDGS__FI int F(batch_gather)(F(batch) *batch, const ssdgs__tile *tile, uint32_t *from) {
+    int n = 0;
+    for (; n < SSDGS__BATCH && *from < tile->count; ++*from)
+        if (tile->mask[tile->list[*from]]) F(batch_add)(batch, n++, tile, tile->list[*from]);
+    F(batch_transpose)(batch, n);
+    return n;
 }
 
 /* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
@@ -6010,59 +6054,97 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
     }
 }
 
-/* Transmittance walk of the camera: seen[instance] = 1 where a pixel blends it. */
-SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, unsigned char *seen) {
+/* Transmittance walk of the camera: seen[instance], the micro-tiles where a pixel blends it. With max_error > 0, needed[instance]
+   is 0 where every pixel can do without its colour: a pixel passes over small weights as long as their sum stays within
+   max_error, so what is not needed anywhere adds up to no more than that in any pixel. */
+SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *seen, unsigned char *needed, const int thrifty) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
-    R transmittance[16][16];
+    const V budget = VSET(tile->max_error), small = VSET(tile->max_error * SSDGS__SHARE);
+    R transmittance[16][16], passed_over[16][16];
     F(batch) batch;
-    uint32_t gaussian[SSDGS__BATCH], from;
-    int micro, e, v, n, live = 1;
+    uint32_t from = 0;
+    int micro, v, n, i;
+    unsigned live = 0xFFFF;
     for (micro = 0; micro < 16; micro++)
-        for (v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
-    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
-        n = F(batch_gather)(&batch, tile, from, gaussian);
-        live = 0;
+        for (v = 0; v < 16; v++) {
+            transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
+            passed_over[micro][v] = 0;
+        }
+    while (from < tile->count && live) {
+        unsigned char need[SSDGS__BATCH];
+        uint16_t blends[SSDGS__BATCH];
+        n = F(batch_gather)(&batch, tile, &from);
+        for (i = 0; i < n; i++) blends[i] = need[i] = 0;
         for (micro = 0; micro < 16; micro++) {
-            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV];
+            uint64_t left = live >> micro & 1u ? batch.entries[micro] : 0;
+            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], over[SSDGS__NV];
+            int alive = 0;
+            if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
-            for (e = 0; e < batch.count[micro]; e++) {
-                const int index = batch.entry[micro][e];
-                int any = 0;
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+                over[v] = VLOAD(passed_over[micro] + v * SSDGS__VW);
+            }
+            for (; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left);
+                int any = 0, must = 0;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha;
                     VM drawn, blended;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     blended = VAND(drawn, VGE(t[v], stop));
-                    t[v] = VSEL(blended, VFNMA(alpha, t[v], t[v]), t[v]);
-                    any |= VANY(blended);
+                    any |= VBITS(blended);
+                    alpha = VSEL(blended, alpha, VSET(0));
+                    if (thrifty) {
+                        const V sum = VFMA(alpha, t[v], over[v]);
+                        const VM fits = VAND(VGE(budget, sum), VGE(VADD(over[v], small), sum));
+                        over[v] = VSEL(fits, sum, over[v]);
+                        must |= VBITS(blended) & ~VBITS(fits);
+                    }
+                    t[v] = VFNMA(alpha, t[v], t[v]);
                 }
-                if (any) seen[tile->list[from + (uint32_t)index]] = 1;
+                blends[index] = (uint16_t)(blends[index] | (unsigned)(any != 0) << micro);
+                if (thrifty) need[index] = (unsigned char)(need[index] | (must != 0));
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
-                live |= VANY(VGE(t[v], stop));
+                VSTORE(passed_over[micro] + v * SSDGS__VW, over[v]);
+                alive |= VBITS(VGE(t[v], stop));
             }
+            if (!alive) live &= ~(1u << micro);
         }
+        for (i = 0; i < n; i++) {
+            seen[batch.instance[i]] = blends[i];
+            if (thrifty) needed[batch.instance[i]] = need[i];
+        }
+    }
+    for (; from < tile->count; from++) {
+        seen[tile->list[from]] = 0;
+        if (thrifty) needed[tile->list[from]] = 0;
     }
 }
 
-/* Light walk, eqs. 6, 7 and the depth cue: per instance, sums (n, 4) of rho v, rho, rho x cue, solid angle x blend weight.
-   An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes part in it once its
-   own distance is reached; both at once where nothing lies between. */
-SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
+SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *seen, unsigned char *needed) {
+    if (needed) F(walk_camera_lanes)(tile, seen, needed, 1);
+    else F(walk_camera_lanes)(tile, seen, needed, 0);
+}
+
+/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per instance, sums (n, 4) of rho v, rho, rho x cue, solid
+   angle x blend weight. An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes
+   part in it once its own distance is reached; both at once where nothing lies between. */
+SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     R transmittance[16][16], met[16][16]; /* met: sum of blend weight x distance */
     F(batch) batch;
-    uint32_t instance[SSDGS__BATCH], sampled = 0, applied = 0;
-    int micro, e, v, n;
+    uint32_t sampled = 0, applied = 0;
+    int micro, v, n, i;
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
             met[micro][v] = 0;
         }
     while (applied < tile->count) {
-        for (micro = 0; micro < 16; micro++) batch.count[micro] = 0;
+        unsigned char codes[SSDGS__BATCH];
         for (n = 0; n < SSDGS__BATCH && applied < tile->count; n++) {
             const R apply_at = tile->depth[tile->owner[tile->list[applied]]];
             int code = SSDGS__APPLY;
@@ -6071,48 +6153,54 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                 if (sampled == applied && (sampled + 1 == tile->count ||
                     tile->depth[tile->owner[tile->list[sampled + 1]]] - tile->bias > apply_at)) code |= SSDGS__APPLY;
             }
-            instance[n] = tile->list[code & SSDGS__SAMPLE ? sampled : applied];
-            F(batch_add)(&batch, n, tile->record + (size_t)tile->owner[instance[n]] * 8, tile->mask[instance[n]], code);
-            batch.record[n][6] = tile->depth[tile->owner[instance[n]]] - tile->depth_origin;
+            F(batch_add)(&batch, n, tile, tile->list[code & SSDGS__SAMPLE ? sampled : applied]);
+            batch.record[n][6] = tile->depth[batch.gaussian[n]] - tile->depth_origin;
+            codes[n] = (unsigned char)code;
+            if (code & SSDGS__SAMPLE) /* its first appearance */
+                for (i = 0; i < 4; i++) sums[(size_t)batch.instance[n] * 4 + (size_t)i] = 0;
             sampled += code & SSDGS__SAMPLE ? 1u : 0u;
             applied += code & SSDGS__APPLY ? 1u : 0u;
         }
+        F(batch_transpose)(&batch, n);
         for (micro = 0; micro < 16; micro++) {
+            uint64_t left = batch.entries[micro];
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
+            if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
-                w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
-                cosine2 = VDIV(one, VFMA(u, u, VFMA(w, w, one)));
-                omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
+                if (flux) {
+                    V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
+                    w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
+                    cosine2 = VDIV(one, VFMA(u, u, VFMA(w, w, one)));
+                    omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
+                }
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 b[v] = VLOAD(met[micro] + v * SSDGS__VW);
             }
-            for (e = 0; e < batch.count[micro]; e++) {
-                const int code = batch.entry[micro][e], index = code & (SSDGS__BATCH - 1);
+            for (; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left), code = codes[index];
                 const V distance = VSET(batch.record[index][6]);
                 V sum[4];
-                int any = 0;
                 for (v = 0; v < 4; v++) sum[v] = VSET(0);
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    any |= VANY(drawn);
                     if (code & SSDGS__SAMPLE) {
                         raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: the opacity cancels in the ratio */
                         sum[0] = VFMA(raw, t[v], sum[0]);
                         sum[1] = VADD(sum[1], raw);
-                        sum[2] = VFMA(raw, VFNMA(distance, t[v], VSUB(distance, b[v])), sum[2]);
+                        if (cue) sum[2] = VFMA(raw, VFNMA(distance, t[v], VSUB(distance, b[v])), sum[2]);
                     }
                     if (code & SSDGS__APPLY) {
                         w = VMUL(alpha, t[v]);
-                        sum[3] = VFMA(omega[v], w, sum[3]);
-                        b[v] = VFMA(w, distance, b[v]);
+                        if (flux) sum[3] = VFMA(omega[v], w, sum[3]);
+                        if (cue) b[v] = VFMA(w, distance, b[v]);
                         t[v] = VMAX(VSUB(t[v], w), VSET(1e-20)); /* no subnormals deep inside */
                     }
                 }
-                if (any) F(sum4)(sums + (size_t)instance[index] * 4, sum[0], sum[1], sum[2], sum[3]);
+                if (code & SSDGS__SAMPLE || flux)
+                    F(sum4)(sums + (size_t)batch.instance[index] * 4, sum[0], sum[1], sum[2], sum[3]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
@@ -6122,31 +6210,37 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     }
 }
 
+SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
+    if (tile->flux) F(walk_light_lanes)(tile, sums, 1, 1);
+    else if (tile->cue) F(walk_light_lanes)(tile, sums, 1, 0);
+    else F(walk_light_lanes)(tile, sums, 0, 0);
+}
+
 /* ==== >>composite_kernel  eq. 1: color (n, 4) of Gaussians -> three planes of the tile's pixels ====
    pixels: [micro-tile][3 colours, transmittance][16 lanes]. */
 SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
     R local[SSDGS__BATCH][4];
-    uint32_t gaussian[SSDGS__BATCH], from;
-    int micro, e, v, i, n, live = 1;
+    uint32_t from = 0;
+    int micro, v, i, n;
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 64; v++) pixels[micro * 64 + v] = v < 48 ? (R)0 : ssdgs__start_transmittance(tile, micro, v - 48);
-    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
-        n = F(batch_gather)(&batch, tile, from, gaussian);
-        live = 0;
-        for (e = 0; e < n; e++)
-            for (i = 0; i < 3; i++) local[e][i] = color[(size_t)gaussian[e] * 4 + (size_t)i];
+    while (from < tile->count) {
+        n = F(batch_gather)(&batch, tile, &from);
+        for (i = 0; i < n; i++) memcpy(local[i], color + (size_t)batch.gaussian[i] * 4, 4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
+            uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
             V px[SSDGS__NV], py[SSDGS__NV], c[3][SSDGS__NV], t[SSDGS__NV];
+            if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
                 t[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
             }
-            for (e = 0; e < batch.count[micro]; e++) {
-                const int index = batch.entry[micro][e];
+            for (; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left);
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
@@ -6160,7 +6254,6 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 SSDGS__UNROLL for (i = 0; i < 3; i++) VSTORE(pixel + 16 * i + v * SSDGS__VW, c[i][v]);
                 VSTORE(pixel + 48 + v * SSDGS__VW, t[v]);
-                live |= VANY(VGE(t[v], stop));
             }
         }
     }
@@ -6173,40 +6266,41 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
     F(batch) batch;
     R local[SSDGS__BATCH][4], passed[16][16], transmittance[16][16];
-    uint32_t gaussian[SSDGS__BATCH], from;
-    int micro, e, v, i, n, live = 1;
+    uint32_t from = 0;
+    int micro, v, i, n;
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             passed[micro][v] = 0;
             transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
         }
-    for (from = 0; from < tile->count && live; from += (uint32_t)n) {
-        n = F(batch_gather)(&batch, tile, from, gaussian);
-        live = 0;
-        for (e = 0; e < n; e++)
-            for (i = 0; i < 3; i++) local[e][i] = color[(size_t)gaussian[e] * 4 + (size_t)i];
+    while (from < tile->count) {
+        n = F(batch_gather)(&batch, tile, &from);
+        for (i = 0; i < n; i++) {
+            memcpy(local[i], color + (size_t)batch.gaussian[i] * 4, 4 * sizeof(R));
+            memset(sums + (size_t)batch.instance[i] * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
+        }
         for (micro = 0; micro < 16; micro++) {
+            uint64_t left = batch.entries[micro];
             const R *pixel = pixels + micro * 64;
             V px[SSDGS__NV], py[SSDGS__NV], dc[4][SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
+            if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 SSDGS__UNROLL for (i = 0; i < 4; i++) dc[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
             }
-            for (e = 0; e < batch.count[micro]; e++) {
-                const int index = batch.entry[micro][e];
+            for (; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left);
                 const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
-                R *out = sums + (size_t)tile->list[from + (uint32_t)index] * SSDGS__SUMS;
+                R *out = sums + (size_t)batch.instance[index] * SSDGS__SUMS;
                 V sum[12];
-                int any = 0;
                 for (i = 0; i < 12; i++) sum[i] = zero;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w, shade, behind, g, gx, gy;
                     VM drawn, blended;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     blended = VAND(drawn, VGE(t[v], stop));
-                    any |= VANY(blended);
                     alpha = VSEL(blended, alpha, zero);
                     w = VMUL(alpha, t[v]);
                     shade = VDOT3(red, green, blue, dc[0][v], dc[1][v], dc[2][v]);
@@ -6228,7 +6322,6 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                     sum[9] = VFMA(w, dc[1][v], sum[9]);
                     sum[10] = VFMA(w, dc[2][v], sum[10]);
                 }
-                if (!any) continue;
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
                 F(sum4)(out + 8, sum[8], sum[9], sum[10], sum[11]);
@@ -6236,7 +6329,6 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
                 VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
-                live |= VANY(VGE(t[v], stop));
             }
         }
     }
@@ -6931,7 +7023,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 }
 
 static const ssdgs__kernels F(kernels) = {
-    F(project), F(project_backward), F(row_spans), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
+    F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
     F(dense), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
         F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(adam)
@@ -6958,7 +7050,7 @@ static const ssdgs__kernels F(kernels) = {
 #undef VLT
 #undef VGE
 #undef VAND
-#undef VANY
+#undef VBITS
 #undef VSEL
 #undef VROUND
 #undef VPOW2

@@ -188,12 +188,14 @@ static void test_light_pass(const char *name) {
     v->cy = camera.cy;
     v->near_plane = (ssdgs_real)0.01;
     v->steepest = (ssdgs_real)1e30;
-    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     n = (size_t)model->count;
+    frame.flux = reals(n);
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     CHECK_NEAR(v->depth, gold(&file, "distance", NULL), n, value_bound(), 0, "light pass: distance");
     CHECK_NEAR(frame.visibility, gold(&file, "visibility", NULL), n, value_bound(), 0, "light pass: visibility");
     CHECK_NEAR(frame.depth_cue, gold(&file, "depth_cue", NULL), n, value_bound(), 0, "light pass: depth cue");
     CHECK_NEAR(frame.flux, gold(&file, "flux", NULL), n, value_bound() * 1e-2, value_bound(), "light pass: flux");
+    free(frame.flux);
     ssdgs_model_destroy(model);
     gold_close(&file);
 }
