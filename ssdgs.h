@@ -738,6 +738,11 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #ifndef SSDGS__UNROLL
 #define SSDGS__UNROLL
 #endif
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS__PREFETCH(p) __builtin_prefetch(p)
+#else
+#define SSDGS__PREFETCH(p) ((void)(p))
+#endif
 
 #define SSDGS__ISA_SCALAR 1
 #define SSDGS__ISA_SSE2 2
@@ -815,6 +820,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 
 #define SSDGS__BLOCK 64      /* Gaussians shaded together */
+#define SSDGS__AHEAD 12      /* ranks; their records lie anywhere in memory */
 #define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
 #define SSDGS__SAMPLE 1
 #define SSDGS__APPLY 2
@@ -822,7 +828,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
-#define SSDGS__TV 4          /* vectors in a dense tile */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__SHARE ((ssdgs_real)0.25) /* of max_error, the most that one splat may take */
 #define SSDGS__F0 0.04       /* Schlick */
@@ -855,6 +860,7 @@ typedef struct ssdgs__product {
     ssdgs_real *out;
     const ssdgs_real *a, *b, *bias;
     size_t out_stride, a_row, a_k, b_stride;
+    const uint16_t *row_list, *depth_list; /* (rows), (depth) */
     int rows, columns, depth, accumulate, relu;
 } ssdgs__product;
 
@@ -874,9 +880,11 @@ typedef struct ssdgs__kernels {
     void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
     void (*composite_backward)(const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*dense)(const ssdgs__product *);
+    int (*live_rows)(const ssdgs_real *, int, uint16_t *);
+    void (*transpose)(const ssdgs_real *, int, size_t, ssdgs_real *);
     void (*dense_bf16)(const ssdgs__product *, const uint32_t *, uint32_t *); /* NULL where there is none */
-    void (*relu_backward)(ssdgs_real *, const ssdgs_real *, int);
-    void (*row_sums)(ssdgs_real *, const ssdgs_real *, int);
+    void (*relu_backward)(ssdgs_real *, const ssdgs_real *, const uint16_t *, int);
+    void (*row_sums)(ssdgs_real *, const ssdgs_real *, const uint16_t *, int);
     void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
@@ -2156,8 +2164,9 @@ static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record,
     int a;
     for (a = 0; a < 2; a++) {
         const ssdgs_real last = (ssdgs_real)(16 * tiles[a] - 1);
-        box[a] = (int)(low[a] < 0 ? 0 : low[a] < last ? low[a] : last) / 16;
-        box[2 + a] = (int)(high[a] < 0 ? 0 : high[a] < last ? high[a] : last) / 16;
+        const ssdgs_real from = low[a] < last ? low[a] : last, to = high[a] < last ? high[a] : last;
+        box[a] = (int)((unsigned)(int)(from > 0 ? from : 0) / 16);
+        box[2 + a] = (int)((unsigned)(int)(to > 0 ? to : 0) / 16);
     }
 }
 
@@ -2176,6 +2185,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     int begin, end, rank, box[4];
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
+        if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
         ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, box);
         room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
     }
@@ -2202,6 +2212,7 @@ static void ssdgs__bin_task(void *data, int index) {
     for (rank = begin; rank < end; rank++) {
         const uint32_t gaussian = v->order[rank];
         const ssdgs_real *record = v->record + (size_t)gaussian * 8;
+        if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
         ssdgs__tile_box(v, record, box);
         count = frame->context->k->bin(record, threshold, box, v->tiles_x, v->instance_tile + at, v->instance_mask + at);
         v->first_instance[rank] = at;
@@ -2534,14 +2545,23 @@ static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_r
     return packed;
 }
 
-/* Activations: inputs, then every layer's outputs, (size, BLOCK) each. The last layer has no ReLU. With packed weights the
-   products run in bf16; pairs is their working memory. */
+/* Lists of rows for dense products: all of them, and those that live. */
+typedef struct ssdgs__row_lists { uint16_t all[1024], in[1024], out[1024]; } ssdgs__row_lists;
+
+static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
+    int i;
+    for (i = 0; i < 1024; i++) lists->all[i] = (uint16_t)i;
+}
+
+/* Activations: inputs, then every layer's outputs, (size, BLOCK) each. The last layer has no ReLU. Neurons that are 0 in the
+   whole block are left out of the sums, which changes no bit. With packed weights the products run in bf16; pairs is their
+   working memory. */
 static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                   const uint32_t *packed,
-                                   uint32_t *pairs, ssdgs_real *activations) {
+                                   const uint32_t *packed, uint32_t *pairs, ssdgs__row_lists *lists, ssdgs_real *activations) {
     ssdgs__product p;
     int layer;
     memset(&p, 0, sizeof p);
+    p.row_list = lists->all;
     for (layer = 0; layer < layers; layer++) {
         const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1];
         p.a = weights;
@@ -2554,48 +2574,58 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
         p.columns = SSDGS__BLOCK;
         p.rows = sizes[layer + 1];
         p.depth = sizes[layer];
+        p.depth_list = lists->all;
         p.relu = layer < layers - 1;
         if (packed) {
             k->dense_bf16(&p, packed, pairs);
             packed += out * ((in + 1) / 2);
-        } else k->dense(&p);
+        } else {
+            if (layer) {
+                p.depth = k->live_rows(p.b, sizes[layer], lists->in);
+                p.depth_list = lists->in;
+            }
+            k->dense(&p);
+        }
         weights += (in + 1) * out;
     }
 }
 
-/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. */
+/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. Neurons that are 0 in
+   the whole block have no part in it. */
 static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
                                            const ssdgs_real *activations, ssdgs_real *d, ssdgs_real *spare,
-                                               ssdgs_real *transposed, ssdgs_real *dweights) {
+                                           ssdgs_real *transposed, ssdgs__row_lists *lists, ssdgs_real *dweights) {
     const ssdgs_real *layer_in = activations;
-    size_t at = 0, i, s;
-    int layer;
+    size_t at = 0;
+    int layer, live_out = sizes[layers];
+    const uint16_t *outs = lists->all;
     for (layer = 0; layer < layers - 1; layer++) {
         layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
         at += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
     }
     for (layer = layers - 1; layer >= 0; layer--) {
         const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = (in + 15) / 16 * 16;
+        uint16_t *list = outs == lists->in ? lists->out : lists->in;
+        const int live_in = layer ? k->live_rows(layer_in, sizes[layer], list) : sizes[layer];
         ssdgs_real *swap = d;
         ssdgs__product p;
         memset(&p, 0, sizeof p);
-        for (s = 0; s < SSDGS__BLOCK; s++) {
-            for (i = 0; i < in; i++) transposed[s * padded + i] = layer_in[i * SSDGS__BLOCK + s];
-            for (; i < padded; i++) transposed[s * padded + i] = 0; /* so the columns beyond a row add 0 to the next */
-        }
-        p.out = dweights + at; /* dW += d x^T */
+        k->transpose(layer_in, sizes[layer], padded, transposed);
+        p.out = dweights + at; /* dW += d x^T; the columns beyond a row add 0 to the next */
         p.out_stride = in;
         p.a = d;
         p.a_row = SSDGS__BLOCK;
         p.a_k = 1;
         p.b = transposed;
         p.b_stride = padded;
-        p.rows = (int)out;
+        p.rows = live_out;
+        p.row_list = outs;
         p.columns = (int)padded;
         p.depth = SSDGS__BLOCK;
+        p.depth_list = lists->all;
         p.accumulate = 1;
         k->dense(&p);
-        k->row_sums(dweights + at + in * out, d, (int)out);
+        k->row_sums(dweights + at + in * out, d, outs, live_out);
         p.out = spare; /* dx = W^T d */
         p.out_stride = p.b_stride = SSDGS__BLOCK;
         p.columns = SSDGS__BLOCK;
@@ -2603,15 +2633,19 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         p.a_row = 1;
         p.a_k = in;
         p.b = d;
-        p.rows = (int)in;
-        p.depth = (int)out;
+        p.rows = live_in;
+        p.row_list = layer ? list : lists->all;
+        p.depth = live_out;
+        p.depth_list = outs;
         p.accumulate = 0;
         k->dense(&p);
         if (layer) {
-            k->relu_backward(spare, layer_in, (int)in);
+            k->relu_backward(spare, layer_in, list, live_in);
             layer_in -= (size_t)sizes[layer - 1] * SSDGS__BLOCK;
             at -= (size_t)(sizes[layer - 1] + 1) * in;
         }
+        live_out = live_in;
+        outs = list;
         d = spare;
         spare = swap;
     }
@@ -2695,17 +2729,18 @@ static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
     return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_real *memory) {
+static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const size_t n = (size_t)frame->gaussians.count;
     ssdgs_real *gauss = memory + l->gauss, *outs = memory + l->outs;
+    size_t at[SSDGS__BLOCK];
     int light, s, i, c;
-    for (s = 0; s < SSDGS__BLOCK; s++) {
-        const size_t g = ssdgs__block_lane(frame, block, s);
-        for (i = 0; i < SSDGS_CHANNELS; i++) gauss[i * SSDGS__BLOCK + s] =
-            frame->gaussians.gaussians[(size_t)i * frame->gaussians.stride + g];
+    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    for (i = 0; i < SSDGS_CHANNELS; i++) {
+        const ssdgs_real *plane = frame->gaussians.gaussians + (size_t)i * frame->gaussians.stride;
+        for (s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s]];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     for (light = 0; light < frame->light_count; light++) {
@@ -2714,27 +2749,26 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs_rea
             *scattering = NULL;
         k->reflect(lighting, gauss, part + l->rows);
         for (s = 0; s < SSDGS__BLOCK; s++) {
-            const size_t at = n * (size_t)light + ssdgs__block_lane(frame, block, s);
-            part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[at] : 1;
-            part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[at] : 0;
+            const size_t of_light = n * (size_t)light + at[s];
+            part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
+            part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
         }
         if (l->shadow_layers) {
             ssdgs__encode_inputs(frame, l, 1, gauss, part, part + l->shadow_at);
             ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1],
-                                   (uint32_t *)(memory + l->pairs), part + l->shadow_at);
+                                   (uint32_t *)(memory + l->pairs), lists, part + l->shadow_at);
             shadow = part + l->scattering_at - SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, part + l->scattering_at);
             ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0],
-                                   (uint32_t *)(memory + l->pairs),
-                                   part + l->scattering_at);
+                                   (uint32_t *)(memory + l->pairs), lists, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
     }
     for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++) {
-        const size_t g = ssdgs__block_lane(frame, block, s);
+        const size_t g = at[s];
         const ssdgs_real *o = outs + s;
         for (c = 0; c < 3; c++)
             frame->color[4 * g + (size_t)c] = frame->settings.baked
@@ -2765,9 +2799,11 @@ static int ssdgs__slot_begin(const ssdgs__shade_job *job, int slot) { return (in
 
 static void ssdgs__shade_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
+    ssdgs__row_lists lists;
     int block;
+    ssdgs__row_lists_fill(&lists);
     for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
-        ssdgs__shade_block(job, block, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot));
+        ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot));
 }
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
@@ -2805,7 +2841,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
-static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, int slot) {
+static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
@@ -2814,7 +2850,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], at[SSDGS__BLOCK];
     int light, s, c;
     ssdgs__global_groups(&frame->settings, first);
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
@@ -2836,32 +2872,33 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         if (l->scattering_layers) {
             dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering,
                                               part + l->scattering_at, dnet, dnet2,
-                                              scratch + l->transposed, slot_gradient + first[SSDGS__SCATTERING_NET]);
+                                              scratch + l->transposed, lists, slot_gradient + first[SSDGS__SCATTERING_NET]);
             ssdgs__encode_inputs_backward(frame, l, 0, part + l->scattering_at, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
             dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at, dnet,
-                                              dnet2,
-                                              scratch + l->transposed, slot_gradient + first[SSDGS__SHADOW_NET]);
+                                              dnet2, scratch + l->transposed, lists, slot_gradient + first[SSDGS__SHADOW_NET]);
             ssdgs__encode_inputs_backward(frame, l, 1, part + l->shadow_at, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
+    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
     for (c = 0; c < SSDGS_CHANNELS; c++)
         for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++)
-            frame->gradient[(size_t)c * frame->gaussians.stride + ssdgs__block_lane(frame, block,
-                    s)] = dgauss[c * SSDGS__BLOCK + s];
+            frame->gradient[(size_t)c * frame->gaussians.stride + at[s]] = dgauss[c * SSDGS__BLOCK + s];
 }
 
 static void ssdgs__shade_backward_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
     const size_t lanes = (size_t)SSDGS__LANE_SUMS * 16 * (size_t)job->frame->light_count;
+    ssdgs__row_lists lists;
     int block;
+    ssdgs__row_lists_fill(&lists);
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
     memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
-    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++) ssdgs__shade_backward_block(job,
-            block, slot);
+    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
+        ssdgs__shade_backward_block(job, block, &lists, slot);
 }
 
 #define SSDGS__REDUCE 4096 /* shared parameters summed by one task */
@@ -5426,6 +5463,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
 #define SSDGS__NAME(name) ssdgs__##name##_scalar
+#define SSDGS__TR 2
+#define SSDGS__TV 4
 #define SSDGS__TARGET
 #define R ssdgs_real
 #define V ssdgs_real
@@ -5449,11 +5488,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VBITS(m) (m)
 #define VSEL(m, a, b) ((m) ? (a) : (b))
 #define VROUND(a) ssdgs__round(a)
-#define VPOW2(n) ssdgs__pow2(n)
+#define VLDEXP(x, n) ((x) * ssdgs__pow2(n))
 #define VEXPONENT(x) ssdgs__exponent(x)
 
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
 #define SSDGS__NAME(name) ssdgs__##name##_sse2
+#define SSDGS__TR 6
+#define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("sse2")
 #define R float
 #define V __m128
@@ -5477,11 +5518,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VBITS(m) _mm_movemask_ps(m)
 #define VSEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
 #define VROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
-#define VPOW2(n) _mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(_mm_cvtps_epi32(n), _mm_set1_epi32(127)), 23))
+#define VLDEXP(x, n) _mm_castsi128_ps(_mm_add_epi32(_mm_castps_si128(x), _mm_slli_epi32(_mm_cvtps_epi32(n), 23)))
 #define VEXPONENT(x) _mm_cvtepi32_ps(_mm_sub_epi32(_mm_srli_epi32(_mm_castps_si128(x), 23), _mm_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
 #define SSDGS__NAME(name) ssdgs__##name##_avx2
+#define SSDGS__TR 6
+#define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("avx2,fma")
 #define R float
 #define V __m256
@@ -5505,11 +5548,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VBITS(m) _mm256_movemask_ps(m)
 #define VSEL(m, a, b) _mm256_blendv_ps(b, a, m)
 #define VROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
-#define VPOW2(n) _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(n), _mm256_set1_epi32(127)), 23))
+#define VLDEXP(x, n) _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x), _mm256_slli_epi32(_mm256_cvtps_epi32(n), 23)))
 #define VEXPONENT(x) _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(x), 23), _mm256_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX512
 #define SSDGS__NAME(name) ssdgs__##name##_avx512
+#define SSDGS__TR 6
+#define SSDGS__TV 4
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("avx512f")
 #define R float
 #define V __m512
@@ -5532,12 +5577,14 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VAND(m, n) ((__mmask16)((m) & (n)))
 #define VBITS(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvtps_epi32(a))
-#define VPOW2(n) _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_add_epi32(_mm512_cvtps_epi32(n), _mm512_set1_epi32(127)), 23))
+#define VROUND(a) _mm512_roundscale_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
+#define VLDEXP(x, n) _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
 #define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_NEON
 #define SSDGS__NAME(name) ssdgs__##name##_neon
+#define SSDGS__TR 6
+#define SSDGS__TV 4
 #define SSDGS__TARGET
 #define R float
 #define V float32x4_t
@@ -5561,7 +5608,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VBITS(m) ((int)vaddvq_u32(vandq_u32(m, vld1q_u32(ssdgs__lane_bits))))
 #define VSEL(m, a, b) vbslq_f32(m, a, b)
 #define VROUND(a) vrndnq_f32(a)
-#define VPOW2(n) vreinterpretq_f32_s32(vshlq_n_s32(vaddq_s32(vcvtnq_s32_f32(n), vdupq_n_s32(127)), 23))
+#define VLDEXP(x, n) vreinterpretq_f32_s32(vaddq_s32(vreinterpretq_s32_f32(x), vshlq_n_s32(vcvtnq_s32_f32(n), 23)))
 #define VEXPONENT(x) vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
 #endif
 
@@ -5620,6 +5667,7 @@ SSDGS__FI void F(sum4)(R *out, V a, V b, V c, V d) {
 #ifdef SSDGS_REAL64
 SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
 SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
+SSDGS__FI V F(exp2_walk)(V x) { return F(exp2)(x); }
 SSDGS__FI V F(log)(V x) { return log(x); }
 SSDGS__FI void F(sincos)(V x, V *s, V *c) { *s = sin(x); *c = cos(x); }
 SSDGS__FI V F(atan2_upper)(V y, V x) { return atan2(y, x); }
@@ -5637,7 +5685,21 @@ SSDGS__FI V F(exp2)(V x) {
     p = VFMA(p, f, VSET(2.40226507e-1));
     p = VFMA(p, f, VSET(6.93147182e-1));
     p = VFMA(p, f, VSET(1));
-    return VMUL(p, VPOW2(whole));
+    return VLDEXP(p, whole);
+}
+
+/* The same for -126 <= x < 1 or so, degree 5: 2.2e-7, for the many of a walk. */
+SSDGS__FI V F(exp2_walk)(V x) {
+    V whole, f, p;
+    x = VMAX(VSET(-126), x);
+    whole = VROUND(x);
+    f = VSUB(x, whole);
+    p = VFMA(f, VSET(1.33908633e-3), VSET(9.67603177e-3));
+    p = VFMA(p, f, VSET(5.55035695e-2));
+    p = VFMA(p, f, VSET(2.40221068e-1));
+    p = VFMA(p, f, VSET(6.93147182e-1));
+    p = VFMA(p, f, VSET(1.00000012));
+    return VLDEXP(p, whole);
 }
 
 /* e^x, saturating beyond +-87; ln 2 in two parts keeps the error independent of |x|. */
@@ -5652,12 +5714,12 @@ SSDGS__FI V F(exp)(V x) {
     p = VFMA(p, f, VSET(1.6666665459e-1));
     p = VFMA(p, f, VSET(5.0000001201e-1));
     p = VADD(VFMA(p, VMUL(f, f), f), VSET(1));
-    return VMUL(p, VPOW2(whole));
+    return VLDEXP(p, whole);
 }
 
 /* ln x for normal x > 0: 2 atanh((m - 1) / (m + 1)) + e ln 2, m in [sqrt(1/2), sqrt 2). */
 SSDGS__FI V F(log)(V x) {
-    V e = VEXPONENT(x), m = VMUL(x, VPOW2(VNEG(e))), t, t2, p;
+    V e = VEXPONENT(x), m = VLDEXP(x, VNEG(e)), t, t2, p;
     VM big = VLT(VSET(1.41421356), m);
     m = VSEL(big, VMUL(m, VSET(0.5)), m);
     e = VSEL(big, VADD(e, VSET(1)), e);
@@ -6042,7 +6104,7 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
     *dy = VSUB(py, VSET(record[1]));
     p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy, VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
     *drawn = VGE(p, log2_threshold);
-    *raw = VEXP2(p);
+    *raw = F(exp2_walk)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
 }
 
@@ -6145,6 +6207,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         }
     while (applied < tile->count) {
         unsigned char codes[SSDGS__BATCH];
+        R lanes[SSDGS__BATCH][4][SSDGS__VW]; /* an entry's sums before the lanes are added up */
         for (n = 0; n < SSDGS__BATCH && applied < tile->count; n++) {
             const R apply_at = tile->depth[tile->owner[tile->list[applied]]];
             int code = SSDGS__APPLY;
@@ -6155,13 +6218,15 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             }
             F(batch_add)(&batch, n, tile, tile->list[code & SSDGS__SAMPLE ? sampled : applied]);
             batch.record[n][6] = tile->depth[batch.gaussian[n]] - tile->depth_origin;
-            codes[n] = (unsigned char)code;
             if (code & SSDGS__SAMPLE) /* its first appearance */
-                for (i = 0; i < 4; i++) sums[(size_t)batch.instance[n] * 4 + (size_t)i] = 0;
+                memset(sums + (size_t)batch.instance[n] * 4, 0, 4 * sizeof(R));
             sampled += code & SSDGS__SAMPLE ? 1u : 0u;
             applied += code & SSDGS__APPLY ? 1u : 0u;
+            codes[n] = (unsigned char)code;
         }
         F(batch_transpose)(&batch, n);
+        for (i = 0; i < n; i++)
+            for (v = 0; v < 4; v++) VSTORE(lanes[i][v], VSET(0));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
@@ -6181,7 +6246,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 const int index = ssdgs__lowest_bit(left), code = codes[index];
                 const V distance = VSET(batch.record[index][6]);
                 V sum[4];
-                for (v = 0; v < 4; v++) sum[v] = VSET(0);
+                SSDGS__UNROLL for (v = 0; v < 4; v++) sum[v] = VLOAD(lanes[index][v]);
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
@@ -6196,17 +6261,19 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                         w = VMUL(alpha, t[v]);
                         if (flux) sum[3] = VFMA(omega[v], w, sum[3]);
                         if (cue) b[v] = VFMA(w, distance, b[v]);
-                        t[v] = VMAX(VSUB(t[v], w), VSET(1e-20)); /* no subnormals deep inside */
+                        t[v] = VFNMA(alpha, t[v], t[v]);
                     }
                 }
-                if (code & SSDGS__SAMPLE || flux)
-                    F(sum4)(sums + (size_t)batch.instance[index] * 4, sum[0], sum[1], sum[2], sum[3]);
+                SSDGS__UNROLL for (v = 0; v < 2 + cue + flux; v++) VSTORE(lanes[index][v], sum[v]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                VSTORE(transmittance[micro] + v * SSDGS__VW, VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
                 VSTORE(met[micro] + v * SSDGS__VW, b[v]);
             }
         }
+        for (i = 0; i < n; i++)
+            F(sum4)(sums + (size_t)batch.instance[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
+                    VLOAD(lanes[i][3]));
     }
 }
 
@@ -6335,43 +6402,85 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
 }
 
 /* ==== >>dense_kernel  all three matrix products of a linear layer ====
-   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU]; a is read as
-   a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes run over the
-   columns. Tiles of 4 rows x SSDGS__TV vectors stay in registers; columns must be a multiple of 16. */
-SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int vectors, int row, int column) {
-    V sum[4][4];
-    const R *a = p->a + (size_t)row * p->a_row, *b = p->b + column;
-    R *out = p->out + (size_t)row * p->out_stride + column;
+   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and the depths listed;
+   a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes
+   run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
+SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int vectors, const uint16_t *row, int column) {
+    V sum[6][SSDGS__TV];
+    const R *a[6];
     int i, v, k;
-    SSDGS__UNROLL for (i = 0; i < rows; i++)
-        SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row + i]) : VSET(0);
-    for (k = 0; k < p->depth; k++, a += p->a_k, b += p->b_stride) {
-        V lanes[4];
+    SSDGS__UNROLL for (i = 0; i < rows; i++) {
+        a[i] = p->a + (size_t)row[i] * p->a_row;
+        SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
+    }
+    for (k = 0; k < p->depth; k++) {
+        const size_t at = p->depth_list[k];
+        const R *b = p->b + at * p->b_stride + column;
+        V lanes[SSDGS__TV];
         SSDGS__UNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
         SSDGS__UNROLL for (i = 0; i < rows; i++) {
-            const V weight = VSET(a[(size_t)i * p->a_row]);
+            const V weight = VSET(a[i][at * p->a_k]);
             SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
         }
     }
     SSDGS__UNROLL for (i = 0; i < rows; i++)
         SSDGS__UNROLL for (v = 0; v < vectors; v++) {
-            R *o = out + (size_t)i * p->out_stride + v * SSDGS__VW;
+            R *o = p->out + (size_t)row[i] * p->out_stride + column + v * SSDGS__VW;
             if (p->accumulate) sum[i][v] = VADD(sum[i][v], VLOAD(o));
             if (p->relu) sum[i][v] = VMAX(sum[i][v], VSET(0));
             VSTORE(o, sum[i][v]);
         }
 }
 
+/* All rows over some columns, in tiles of about equal height. */
+SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const int vectors, int column) {
+    int left = (p->rows + SSDGS__TR - 1) / SSDGS__TR, row = 0;
+    for (; left; left--) {
+        const int rows = (p->rows - row + left - 1) / left;
+        const uint16_t *list = p->row_list + row;
+        if (rows == 6) F(dense_tile)(p, 6, vectors, list, column);
+        else if (rows == 5) F(dense_tile)(p, 5, vectors, list, column);
+        else if (rows == 4) F(dense_tile)(p, 4, vectors, list, column);
+        else if (rows == 3) F(dense_tile)(p, 3, vectors, list, column);
+        else if (rows == 2) F(dense_tile)(p, 2, vectors, list, column);
+        else F(dense_tile)(p, 1, vectors, list, column);
+        row += rows;
+    }
+}
+
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
-    int row, column = 0;
-    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) {
-        for (row = 0; row + 4 <= p->rows; row += 4) F(dense_tile)(p, 4, SSDGS__TV, row, column);
-        for (; row < p->rows; row++) F(dense_tile)(p, 1, SSDGS__TV, row, column);
+    int column = 0;
+    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) F(dense_columns)(p, SSDGS__TV, column);
+    for (; column < p->columns; column += SSDGS__VW) F(dense_columns)(p, 1, column);
+}
+
+/* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns how many. */
+SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
+    int i, s, n = 0;
+    for (i = 0; i < count; i++) {
+        V most = VLOAD(rows + i * SSDGS__BLOCK);
+        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) most = VMAX(most, VLOAD(rows + i * SSDGS__BLOCK + s));
+        list[n] = (uint16_t)i;
+        n += VBITS(VLT(VSET(0), most)) != 0;
     }
-    for (; column < p->columns; column += SSDGS__VW) {
-        for (row = 0; row + 4 <= p->rows; row += 4) F(dense_tile)(p, 4, 1, row, column);
-        for (; row < p->rows; row++) F(dense_tile)(p, 1, 1, row, column);
-    }
+    return n;
+}
+
+/* (count, BLOCK) -> (BLOCK, stride), columns from count to stride 0. */
+SSDGS__FN void F(transpose)(const R *rows, int count, size_t stride, R *out) {
+    size_t i = 0, s;
+#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+    for (; i + 4 <= (size_t)count; i += 4)
+        for (s = 0; s < SSDGS__BLOCK; s += 4) {
+            __m128 r[4];
+            int l;
+            SSDGS__UNROLL for (l = 0; l < 4; l++) r[l] = _mm_loadu_ps(rows + (i + (size_t)l) * SSDGS__BLOCK + s);
+            _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+            SSDGS__UNROLL for (l = 0; l < 4; l++) _mm_storeu_ps(out + (s + (size_t)l) * stride + i, r[l]);
+        }
+#endif
+    for (; i < stride; i++)
+        for (s = 0; s < SSDGS__BLOCK; s++) out[s * stride + i] = i < (size_t)count ? rows[i * SSDGS__BLOCK + s] : 0;
 }
 
 #if SSDGS__ISA == SSDGS__ISA_AVX512 && SSDGS__BF16
@@ -6387,7 +6496,7 @@ SSDGS__BF16_FI __m512i F(bf16_pairs)(__m512i a, __m512i b) {
 }
 
 SSDGS__BF16_FI void F(dense_bf16_tile)(const ssdgs__product *p, const uint32_t *a, const uint32_t *b, const int rows, int row) {
-    __m512 sum[4][4];
+    __m512 sum[6][4];
     const int pairs = (p->depth + 1) / 2;
     int i, v, k;
     SSDGS__UNROLL for (i = 0; i < rows; i++)
@@ -6416,7 +6525,8 @@ SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weigh
                 : _mm512_setzero_si512();
             _mm512_storeu_si512(pairs + k / 2 * SSDGS__BLOCK + v, F(bf16_pairs)(low, high));
         }
-    for (row = 0; row + 4 <= p->rows; row += 4) F(dense_bf16_tile)(p, weights, pairs, 4, row);
+    for (row = 0; row + 6 <= p->rows; row += 6) F(dense_bf16_tile)(p, weights, pairs, 6, row);
+    for (; row + 2 <= p->rows; row += 2) F(dense_bf16_tile)(p, weights, pairs, 2, row);
     for (; row < p->rows; row++) F(dense_bf16_tile)(p, weights, pairs, 1, row);
 }
 #define SSDGS__DENSE_BF16 F(dense_bf16)
@@ -6424,19 +6534,22 @@ SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weigh
 #define SSDGS__DENSE_BF16 NULL
 #endif
 
-/* d(ReLU): gradient (rows, SSDGS__BLOCK) is zeroed where the layer's output is not positive; its row sums join the biases'. */
-SSDGS__FN void F(relu_backward)(R *gradient, const R *output, int rows) {
-    int i;
-    for (i = 0; i < rows * SSDGS__BLOCK; i += SSDGS__VW)
-        VSTORE(gradient + i, VSEL(VLT(VSET(0), VLOAD(output + i)), VLOAD(gradient + i), VSET(0)));
+/* d(ReLU): the listed rows of gradient (rows, SSDGS__BLOCK) are zeroed where the layer's output is not positive. */
+SSDGS__FN void F(relu_backward)(R *gradient, const R *output, const uint16_t *list, int count) {
+    int i, s;
+    for (i = 0; i < count; i++)
+        for (s = list[i] * SSDGS__BLOCK; s < (list[i] + 1) * SSDGS__BLOCK; s += SSDGS__VW)
+            VSTORE(gradient + s, VSEL(VLT(VSET(0), VLOAD(output + s)), VLOAD(gradient + s), VSET(0)));
 }
 
-SSDGS__FN void F(row_sums)(R *sums, const R *rows, int count) {
+/* sums[row] += the sum of each listed row of rows (., SSDGS__BLOCK). */
+SSDGS__FN void F(row_sums)(R *sums, const R *rows, const uint16_t *list, int count) {
     int i, s;
     for (i = 0; i < count; i++) {
-        V sum = VLOAD(rows + i * SSDGS__BLOCK);
-        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) sum = VADD(sum, VLOAD(rows + i * SSDGS__BLOCK + s));
-        sums[i] += F(sum)(sum);
+        const R *row = rows + list[i] * SSDGS__BLOCK;
+        V sum = VLOAD(row);
+        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) sum = VADD(sum, VLOAD(row + s));
+        sums[list[i]] += F(sum)(sum);
     }
 }
 
@@ -7024,12 +7137,14 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(dense), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
+    F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
         F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(adam)
 };
 
 #undef SSDGS__NAME
+#undef SSDGS__TR
+#undef SSDGS__TV
 #undef SSDGS__TARGET
 #undef R
 #undef V
@@ -7053,7 +7168,7 @@ static const ssdgs__kernels F(kernels) = {
 #undef VBITS
 #undef VSEL
 #undef VROUND
-#undef VPOW2
+#undef VLDEXP
 #undef VEXPONENT
 #undef VEXP
 #undef VEXP2

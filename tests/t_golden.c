@@ -389,6 +389,7 @@ static void test_dipole(void) {
 static void test_network(const char *name, int shadow, int residual, int defaults) {
     ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
     ssdgs_frame frame;
+    ssdgs__row_lists lists;
     ssdgs__block_layout l;
     ssdgs__lighting k;
     ssdgs_real *memory, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
@@ -440,13 +441,14 @@ static void test_network(const char *name, int shadow, int residual, int default
         const double eta = 1.3, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
         k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
     }
+    ssdgs__row_lists_fill(&lists);
     sizes = shadow ? l.shadow : l.scattering;
     layers = shadow ? l.shadow_layers : l.scattering_layers;
     CHECK((size_t)sizes[0] == (size_t)gold(&file, "layer_sizes", NULL)[0]);
     {
         ssdgs_real *activations = part + (shadow ? l.shadow_at : l.scattering_at), *head = activations + BLOCK * (ssdgs__activation_rows(sizes, layers) - (size_t)sizes[layers]);
         ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, activations);
-        ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, activations);
+        ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, &lists, activations);
         context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         memset(one, 0, sizeof one);
@@ -474,7 +476,7 @@ static void test_network(const char *name, int shadow, int residual, int default
         context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, dgauss, drows, shadow ? dnet : dother,
                                     shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, activations, dnet, spare, transposed, dweights);
+        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, activations, dnet, spare, transposed, &lists, dweights);
         ssdgs__encode_inputs_backward(&frame, &l, shadow, activations, dinputs, dgauss, drows, dvisibility);
     }
     snprintf(key, sizeof key, "%sgrad_weights", prefix);

@@ -631,12 +631,15 @@ static void test_bf16(void) {
         static ssdgs_real weights[(IN + 1) * OUT], inputs[IN * SSDGS__BLOCK], exact[OUT * SSDGS__BLOCK], half[OUT * SSDGS__BLOCK];
         static uint32_t packed[OUT * (IN + 1) / 2], pairs[(IN + 1) / 2 * SSDGS__BLOCK];
         static const int sizes[2] = {IN, OUT};
+        ssdgs__row_lists lists;
         ssdgs__product p;
         double error = 0, norm = 0;
         int i;
         for (i = 0; i < (IN + 1) * OUT; i++) weights[i] = (ssdgs_real)(ssdgs__uniform(8, (uint64_t)i) - 0.5);
         for (i = 0; i < IN * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)(ssdgs__uniform(9, (uint64_t)i) - 0.5);
         memset(&p, 0, sizeof p);
+        ssdgs__row_lists_fill(&lists);
+        p.row_list = p.depth_list = lists.all;
         p.a = weights;
         p.depth = IN;
         p.a_row = IN;
