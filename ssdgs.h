@@ -904,6 +904,7 @@ typedef struct ssdgs__kernels {
     void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, const ssdgs_real *,
                               const ssdgs_real *,
                               const ssdgs_real *, ssdgs_real, ssdgs_real, ssdgs_real *);
+    int (*finite)(const ssdgs_real *, size_t);
     void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real);
 } ssdgs__kernels;
 
@@ -2415,18 +2416,21 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
 
 /* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks: geometry, both networks, colour ==== */
 
-/* How a block's working memory is laid out, in values; per light the geometry, the cues and both networks' activations. */
+/* How a block's memory is laid out, in values. What the backward asks for again: the Gaussians' channels and, per light, the
+   geometry, the cues and the layers' outputs. Scratch, one per slot: the networks' inputs, cheaper made again than kept. */
 typedef struct ssdgs__block_layout {
     int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers, widest;
     size_t rows, visibility, cue, shadow_at, scattering_at, light_size; /* within a light's part */
-    size_t gauss, outs, pairs, lights, size;                              /* within the block */
-    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dvisibility, scratch; /* the backward's */
+    size_t gauss, lights, size;                                          /* within the block */
+    size_t inputs, pairs, outs;                                          /* scratch of both directions */
+    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dvisibility, scratch; /* and of the backward */
 } ssdgs__block_layout;
 
-static size_t ssdgs__activation_rows(const int *sizes, int layers) {
+/* Rows of all layers' outputs. */
+static size_t ssdgs__output_rows(const int *sizes, int layers) {
     size_t rows = 0;
     int i;
-    for (i = 0; layers && i <= layers; i++) rows += (size_t)sizes[i];
+    for (i = 1; i <= layers; i++) rows += (size_t)sizes[i];
     return rows;
 }
 
@@ -2444,13 +2448,14 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.visibility = SSDGS__ROWS * b;
     l.cue = l.visibility + b;
     l.shadow_at = l.cue + b;
-    l.scattering_at = l.shadow_at + b * ssdgs__activation_rows(l.shadow, l.shadow_layers);
-    l.light_size = l.scattering_at + b * ssdgs__activation_rows(l.scattering, l.scattering_layers);
-    l.outs = b * SSDGS_CHANNELS;
-    l.pairs = l.outs + b * SSDGS__OUTS;
-    l.lights = l.pairs + b * (size_t)((l.widest + 1) / 2);
+    l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
+    l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
+    l.lights = b * SSDGS_CHANNELS;
     l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count : 1); /* only the backward asks again */
-    l.drows = b * SSDGS_CHANNELS;
+    l.pairs = b * (size_t)(l.widest + 1);
+    l.outs = l.pairs + b * (size_t)((l.widest + 1) / 2);
+    l.dgauss = l.outs + b * SSDGS__OUTS;
+    l.drows = l.dgauss + b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
     l.dvisibility = l.dcolor + b * 3;
     l.dnet = l.dvisibility + b;
@@ -2553,11 +2558,12 @@ static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     for (i = 0; i < 1024; i++) lists->all[i] = (uint16_t)i;
 }
 
-/* Activations: inputs, then every layer's outputs, (size, BLOCK) each. The last layer has no ReLU. Neurons that are 0 in the
+/* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that are 0 in the
    whole block are left out of the sums, which changes no bit. With packed weights the products run in bf16; pairs is their
    working memory. */
 static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                   const uint32_t *packed, uint32_t *pairs, ssdgs__row_lists *lists, ssdgs_real *activations) {
+                                   const uint32_t *packed, uint32_t *pairs, ssdgs__row_lists *lists, const ssdgs_real *inputs,
+                                   ssdgs_real *outputs) {
     ssdgs__product p;
     int layer;
     memset(&p, 0, sizeof p);
@@ -2567,9 +2573,11 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
         p.a = weights;
         p.a_row = in;
         p.a_k = 1;
-        p.b = activations;
+        p.b = inputs;
         p.bias = weights + in * out;
-        p.out = activations += in * SSDGS__BLOCK;
+        p.out = outputs;
+        inputs = outputs;
+        outputs += out * SSDGS__BLOCK;
         p.out_stride = p.b_stride = SSDGS__BLOCK;
         p.columns = SSDGS__BLOCK;
         p.rows = sizes[layer + 1];
@@ -2593,14 +2601,14 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
 /* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. Neurons that are 0 in
    the whole block have no part in it. */
 static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                           const ssdgs_real *activations, ssdgs_real *d, ssdgs_real *spare,
+                                           const ssdgs_real *inputs, const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
                                            ssdgs_real *transposed, ssdgs__row_lists *lists, ssdgs_real *dweights) {
-    const ssdgs_real *layer_in = activations;
+    const ssdgs_real *layer_in = outputs;
     size_t at = 0;
     int layer, live_out = sizes[layers];
     const uint16_t *outs = lists->all;
     for (layer = 0; layer < layers - 1; layer++) {
-        layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
+        if (layer) layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
         at += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
     }
     for (layer = layers - 1; layer >= 0; layer--) {
@@ -2641,7 +2649,7 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         k->dense(&p);
         if (layer) {
             k->relu_backward(spare, layer_in, list, live_in);
-            layer_in -= (size_t)sizes[layer - 1] * SSDGS__BLOCK;
+            layer_in = layer > 1 ? layer_in - (size_t)sizes[layer - 1] * SSDGS__BLOCK : inputs;
             at -= (size_t)(sizes[layer - 1] + 1) * in;
         }
         live_out = live_in;
@@ -2729,12 +2737,14 @@ static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
     return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory) {
+static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory,
+                               ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const size_t n = (size_t)frame->gaussians.count;
-    ssdgs_real *gauss = memory + l->gauss, *outs = memory + l->outs;
+    ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
+    uint32_t *pairs = (uint32_t *)(void *)(scratch + l->pairs);
     size_t at[SSDGS__BLOCK];
     int light, s, i, c;
     for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
@@ -2754,15 +2764,15 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
         }
         if (l->shadow_layers) {
-            ssdgs__encode_inputs(frame, l, 1, gauss, part, part + l->shadow_at);
-            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1],
-                                   (uint32_t *)(memory + l->pairs), lists, part + l->shadow_at);
+            ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
+            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists, inputs,
+                                   part + l->shadow_at);
             shadow = part + l->scattering_at - SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
-            ssdgs__encode_inputs(frame, l, 0, gauss, part, part + l->scattering_at);
-            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0],
-                                   (uint32_t *)(memory + l->pairs), lists, part + l->scattering_at);
+            ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
+            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0], pairs,
+                                   lists, inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
@@ -2803,7 +2813,8 @@ static void ssdgs__shade_task(void *data, int slot) {
     int block;
     ssdgs__row_lists_fill(&lists);
     for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
-        ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot));
+        ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
+                           job->scratch + job->layout.scratch * (size_t)slot);
 }
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
@@ -2813,6 +2824,7 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     job->frame = frame;
     job->layout = ssdgs__layout(frame);
     job->blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    SSDGS__RESERVE(frame->memory->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->lightings, job->lightings, ssdgs__lighting, frame->light_count + 1);
     for (light = 0; light < frame->light_count; light++) job->lightings[light] = ssdgs__lighting_of(frame, light);
     if (frame->options.bf16 && context->bf16 && !frame->training) {
@@ -2846,7 +2858,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
-    ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *dgauss = scratch, *drows = scratch + l->drows,
+    ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *inputs = scratch + l->inputs;
+    ssdgs_real *dgauss = scratch + l->dgauss, *drows = scratch + l->drows,
         *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
@@ -2870,16 +2883,18 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor, dgauss, drows,
                            scratch + l->transposed - SSDGS__BLOCK, dnet, dvisibility);
         if (l->scattering_layers) {
-            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering,
+            ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
+            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
                                               part + l->scattering_at, dnet, dnet2,
                                               scratch + l->transposed, lists, slot_gradient + first[SSDGS__SCATTERING_NET]);
-            ssdgs__encode_inputs_backward(frame, l, 0, part + l->scattering_at, dinputs, dgauss, drows, dvisibility);
+            ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
-            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, part + l->shadow_at, dnet,
-                                              dnet2, scratch + l->transposed, lists, slot_gradient + first[SSDGS__SHADOW_NET]);
-            ssdgs__encode_inputs_backward(frame, l, 1, part + l->shadow_at, dinputs, dgauss, drows, dvisibility);
+            ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
+            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
+                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists, slot_gradient + first[SSDGS__SHADOW_NET]);
+            ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
@@ -2927,7 +2942,6 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     if (result) return result;
     job.slot_stride = (frame->model->global_count + 79) / 64 * 64;
     job.activations = (ssdgs_real *)frame->memory->activations.memory;
-    SSDGS__RESERVE(frame->memory->scratch, job.scratch, ssdgs_real, job.layout.scratch * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
     memset(frame->gradient, 0, n * sizeof(ssdgs_real));
@@ -4617,11 +4631,11 @@ typedef struct ssdgs__adam_job {
 } ssdgs__adam_job;
 
 static void ssdgs__finite_task(void *data, int index) {
+    const ssdgs__adam_job *job = (const ssdgs__adam_job *)data;
     ssdgs__adam_range *r = ((ssdgs__adam_job *)data)->range + index;
     size_t i;
-    int bad = 0;
-    for (i = 0; i < r->n; i++) bad |= !ssdgs__finite(r->gradient[i]);
-    for (i = 0; bad && i < r->n && !r->bad; i++)
+    if (job->k->finite(r->gradient, r->n)) return;
+    for (i = 0; i < r->n && !r->bad; i++)
         if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
 }
 
@@ -4783,6 +4797,45 @@ static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest firs
     return x->index < y->index ? -1 : x->index > y->index;
 }
 
+static int ssdgs__key_compare(const void *a, const void *b) {
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Puts the Gaussians listed (keys, their indices in the low halves) in Morton order and drops the others. Neighbours in space
+   then share a block, whose neurons live and die together, and the cache. scratch: count values. */
+static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count, ssdgs_real *scratch) {
+    ssdgs_real *const planes[3] = {trainer->model->gaussians, trainer->mean, trainer->square};
+    double low[3], longest = 1e-30;
+    size_t i, c;
+    int bit, part;
+    for (c = 0; c < 3; c++) {
+        const ssdgs_real *x = planes[0] + (SSDGS_POSITION + c) * trainer->stride;
+        double high = -1e30;
+        low[c] = 1e30;
+        for (i = 0; i < count; i++) {
+            const double at = (double)x[(uint32_t)keys[i]];
+            low[c] = at < low[c] ? at : low[c];
+            high = at > high ? at : high;
+        }
+        if (high - low[c] > longest) longest = high - low[c];
+    }
+    for (i = 0; i < count; i++)
+        for (c = 0; c < 3; c++) {
+            const double at = (double)planes[0][(SSDGS_POSITION + c) * trainer->stride + (uint32_t)keys[i]] - low[c];
+            const uint32_t cell = at > 0 && at <= longest ? (uint32_t)(at / longest * 1023) : 0;
+            for (bit = 0; bit < 10; bit++) keys[i] |= (uint64_t)(cell >> bit & 1u) << (32 + 3 * bit + (int)c);
+        }
+    qsort(keys, count, sizeof *keys, ssdgs__key_compare);
+    for (part = 0; part < 3; part++)
+        for (c = 0; c < SSDGS_CHANNELS; c++) {
+            ssdgs_real *plane = planes[part] + c * trainer->stride;
+            for (i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
+            memcpy(plane, scratch, count * sizeof *plane);
+        }
+    trainer->model->count = (int)count;
+}
+
 static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
@@ -4792,14 +4845,17 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
     ssdgs__ranked *candidates;
+    uint64_t *order;
     unsigned char *drop;
     size_t i, kept = 0, dropped = 0, wanted = 0, added, room;
     ssdgs_real *p;
     ssdgs_result result;
     int c;
-    candidates = (ssdgs__ranked *)ssdgs__allocate(context, n * (2 * sizeof *candidates + 1) + 1);
+    /* two lists of n candidates; at most 2 n Gaussians' order, a plane of them; what is dropped */
+    candidates = (ssdgs__ranked *)ssdgs__allocate(context, n * (2 * sizeof *candidates + 2 * sizeof *order + 2 * sizeof *p + 1) + 1);
     if (!candidates) return SSDGS_ERR_MEMORY;
-    drop = (unsigned char *)(candidates + 2 * n);
+    order = (uint64_t *)(void *)(candidates + 2 * n);
+    drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
     p = model->gaussians;
     for (i = 0; i < n; i++) {
         ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
@@ -4877,16 +4933,9 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     for (i = n; i < n + added; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] =
             trainer->square[(size_t)c * trainer->stride + i] = 0;
-    for (i = 0; i < n + added; i++) {
-        if (i < n && drop[i]) continue;
-        if (kept != i) {
-            ssdgs__copy_gaussian(model->gaussians, trainer->stride, kept, i);
-            ssdgs__copy_gaussian(trainer->mean, trainer->stride, kept, i);
-            ssdgs__copy_gaussian(trainer->square, trainer->stride, kept, i);
-        }
-        kept++;
-    }
-    model->count = (int)kept;
+    for (i = 0; i < n + added; i++)
+        if (i >= n || !drop[i]) order[kept++] = i;
+    ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + 2 * n));
     memset(trainer->screen_gradient, 0, 3 * trainer->stride * sizeof(ssdgs_real));
     ssdgs__release(context, candidates);
     return SSDGS_OK;
@@ -5189,12 +5238,12 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
     int sizes[SSDGS_MAX_LAYERS + 1], layers;
-    size_t per_gaussian, first[SSDGS__GLOBAL_GROUPS + 1], activations = SSDGS_CHANNELS + SSDGS__ROWS + SSDGS__OUTS + 2;
+    size_t per_gaussian, first[SSDGS__GLOBAL_GROUPS + 1], activations = SSDGS_CHANNELS + SSDGS__ROWS + 2;
     if (!settings || !options || width < 1 || height < 1) return 0;
     layers = ssdgs__network_sizes(settings, 0, sizes);
-    activations += ssdgs__activation_rows(sizes, layers);
+    activations += ssdgs__output_rows(sizes, layers);
     layers = ssdgs__network_sizes(settings, 1, sizes);
-    activations += ssdgs__activation_rows(sizes, layers);
+    activations += ssdgs__output_rows(sizes, layers);
     ssdgs__global_groups(settings, first);
     /* parameters, gradient and two moments with a quarter of slack, splat records of two views, instances, activations of half */
     per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 16 + 8 + activations / 2 + 3 * (SSDGS__SUMS + 4)) + 160;
@@ -7099,6 +7148,17 @@ SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int widt
     }
 }
 
+/* Whether all of n values are finite. */
+SSDGS__FN int F(finite)(const R *values, size_t n) {
+    size_t i = 0;
+    int bad = 0;
+#if SSDGS__VW > 1
+    for (; i + SSDGS__VW <= n; i += SSDGS__VW) bad |= VBITS(VGE(VSET(FLT_MAX), VABS(VLOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
+#endif
+    for (; i < n; i++) bad |= !ssdgs__finite(values[i]);
+    return !bad;
+}
+
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
    Gradients below 1e-18 count as 0: their squares are not representable; nor do moments linger as slow subnormals. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
@@ -7139,7 +7199,7 @@ static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
     F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
         F(dipole_profile),
-    F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(adam)
+    F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
 };
 
 #undef SSDGS__NAME

@@ -392,7 +392,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     ssdgs__row_lists lists;
     ssdgs__block_layout l;
     ssdgs__lighting k;
-    ssdgs_real *memory, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
+    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
     const char *prefix = shadow && residual ? "res_" : "";
     char key[64];
     double *out;
@@ -412,7 +412,9 @@ static void test_network(const char *name, int shadow, int residual, int default
     l = ssdgs__layout(&frame);
     memory = reals(l.size);
     gauss = memory + l.gauss;
-    outs = memory + l.outs;
+    scratch = reals(l.scratch);
+    outs = scratch + l.outs;
+    inputs = scratch + l.inputs;
     part = memory + l.lights;
     to_planes("x", gauss + SSDGS_POSITION * BLOCK, BLOCK);
     to_planes("material", gauss + SSDGS_MATERIAL * BLOCK, BLOCK);
@@ -446,9 +448,9 @@ static void test_network(const char *name, int shadow, int residual, int default
     layers = shadow ? l.shadow_layers : l.scattering_layers;
     CHECK((size_t)sizes[0] == (size_t)gold(&file, "layer_sizes", NULL)[0]);
     {
-        ssdgs_real *activations = part + (shadow ? l.shadow_at : l.scattering_at), *head = activations + BLOCK * (ssdgs__activation_rows(sizes, layers) - (size_t)sizes[layers]);
-        ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, activations);
-        ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, &lists, activations);
+        ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at), *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
+        ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, inputs);
+        ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, &lists, inputs, outputs);
         context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         memset(one, 0, sizeof one);
@@ -476,8 +478,8 @@ static void test_network(const char *name, int shadow, int residual, int default
         context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, dgauss, drows, shadow ? dnet : dother,
                                     shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, activations, dnet, spare, transposed, &lists, dweights);
-        ssdgs__encode_inputs_backward(&frame, &l, shadow, activations, dinputs, dgauss, drows, dvisibility);
+        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, dweights);
+        ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
     }
     snprintf(key, sizeof key, "%sgrad_weights", prefix);
     CHECK_L2(dweights, gold(&file, key, NULL), count, gradient_bound(), key);
@@ -495,6 +497,7 @@ static void test_network(const char *name, int shadow, int residual, int default
         check_planes("grad_normal", drows + SSDGS__NORMAL * BLOCK, BLOCK, gradient_bound());
     }
     free(memory);
+    free(scratch);
     free(weights);
     free(out);
     free(dgauss);
