@@ -829,7 +829,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__ALPHA_MAX 0.999
-#define SSDGS__SHARE ((ssdgs_real)0.25) /* of max_error, the most that one splat may take */
+#define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take */
 #define SSDGS__F0 0.04       /* Schlick */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
@@ -1838,8 +1838,8 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
 
 /* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very far, six faces of
    a cube from close by or inside. Returns how many; with views NULL only that. */
-static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, int index,
-                              ssdgs_splat_view *views) {
+static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, double detail,
+                              int index, ssdgs_splat_view *views) {
     double centre[3], position[3], to_scene[3], radius2 = 0, radius, distance2 = 0, distance, size;
     int i, faces, face, map;
     for (i = 0; i < 3; i++) {
@@ -1860,7 +1860,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         size = 2 * radius / exp(b->log_scale);
         map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
     }
-    map = (map + 15) / 16 * 16;
+    map = (int)(map * detail + 15) / 16 * 16;
     for (face = 0; face < faces; face++) {
         ssdgs_splat_view *v = views + face;
         double direction[3], eye[3], f;
@@ -2005,8 +2005,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (needs_light && frame->light_count) {
         result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &bounds);
         if (result) return result;
-        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i, i,
-                NULL);
+        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i,
+                (double)frame->options.light_detail, i, NULL);
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
@@ -2024,7 +2024,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->views[0].steepest = (ssdgs_real)1e30;
     memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i,
-            i, frame->views + j);
+            (double)frame->options.light_detail, i, frame->views + j);
     pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -2807,6 +2807,23 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
 /* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
 static int ssdgs__slot_begin(const ssdgs__shade_job *job, int slot) { return (int)((int64_t)job->blocks * slot / SSDGS__SLOTS); }
 
+/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, in Morton order. */
+static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
+    const ssdgs_frame *frame = job->frame;
+    ssdgs_real *const planes[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal, frame->shadow};
+    const int begin = ssdgs__slot_begin(job, slot), end = ssdgs__slot_begin(job, slot + 1);
+    const size_t n = (size_t)frame->gaussians.count, last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
+    size_t from, g;
+    int p;
+    if (begin == end) return;
+    from = frame->shaded[begin * SSDGS__BLOCK];
+    for (g = begin ? from : 0; g < last; g++) {
+        if (frame->seen[g] == SSDGS_SEEN) from = g;
+        if (frame->seen[g] != SSDGS_GLIMPSED) continue;
+        for (p = 0; p < (frame->components ? 6 : 1); p++) memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
+    }
+}
+
 static void ssdgs__shade_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
     ssdgs__row_lists lists;
@@ -2815,6 +2832,7 @@ static void ssdgs__shade_task(void *data, int slot) {
     for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
         ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
+    if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
 }
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
@@ -2844,6 +2862,10 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     frame->shaded_count = 0;
     for (i = 0; i < frame->gaussians.count; i++) {
         if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
+    }
+    if (!frame->shaded_count && frame->gaussians.count) { /* glimpses at most: some colour is needed */
+        frame->seen[0] = SSDGS_SEEN;
+        frame->shaded[frame->shaded_count++] = 0;
     }
     result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
