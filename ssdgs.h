@@ -609,6 +609,12 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 #define SSDGS_SPLAT_SUMS 12  /* per instance, both directions */
 #define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, unused */
 
+typedef struct ssdgs_tile_entry {
+    uint32_t instance, gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
+} ssdgs_tile_entry;
+
+enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
+
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
 typedef struct ssdgs_splat_view {
     int light;                  /* -1: the camera */
@@ -626,23 +632,19 @@ typedef struct ssdgs_splat_view {
     /* SSDGS_STAGE_SORT */
     uint32_t *order;            /* (visible) Gaussians, nearest first, ties by index */
     int visible;
-    /* SSDGS_STAGE_BIN: an instance is one Gaussian in one tile; a Gaussian's instances are neighbours, tiles ascending */
-    size_t instance_room;       /* indices in use, with gaps */
-    size_t instances;           /* instances without the gaps */
+    /* SSDGS_STAGE_BIN: an instance is one Gaussian in one tile; a Gaussian's instances are neighbours */
+    size_t instance_room;       /* instance numbers in use, with gaps */
+    size_t instances;           /* without the gaps */
     uint32_t *first_instance;   /* (visible) per rank in order */
     uint32_t *instance_count;   /* (visible) */
-    uint32_t *instance_owner;   /* (instance_room) Gaussian */
-    uint32_t *instance_tile;    /* (instance_room) */
-    uint16_t *instance_mask;    /* (instance_room) which of the tile's 4x4 micro-tiles it can touch */
-    uint32_t *tile_start;       /* (tiles + 1) */
-    uint32_t *tile_list;        /* (instances) per tile, nearest first */
+    uint32_t *tile_start;       /* (tiles + 1) places in tile_list */
+    ssdgs_tile_entry *tile_list; /* (instances) per tile, nearest first */
+    /* SSDGS_STAGE_WALK */
+    uint16_t *tile_seen;        /* (instances) camera: which micro-tiles blend it */
+    unsigned char *instance_seen; /* (instance_room) camera: SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
-    uint16_t *instance_seen;    /* (instance_room), camera: which micro-tiles blend it */
-    unsigned char *instance_needed; /* (instance_room), camera: it must be shaded; NULL = where it is seen */
     ssdgs_real *instance_sums;  /* (instance_room, SSDGS_SPLAT_SUMS) */
 } ssdgs_splat_view;
-
-enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 };
 
 typedef struct ssdgs_frame {
     ssdgs_context *context;
@@ -660,7 +662,7 @@ typedef struct ssdgs_frame {
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
-    unsigned char *seen;        /* (n) SSDGS_SEEN: shade it; SSDGS_GLIMPSED: blended, within max_error in every pixel; 0 */
+    unsigned char *seen;        /* (n) SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
     ssdgs_real *visibility;     /* (lights, n) eq. 7 */
     ssdgs_real *depth_cue;      /* (lights, n) world units */
     ssdgs_real *flux;           /* (lights, n) sr per unit intensity intercepted; NULL, so not computed, unless the caller of the
@@ -725,7 +727,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define SSDGS__INLINE inline __attribute__((always_inline))
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
-#if __GNUC__ >= 8 || defined(__clang__)
+#if defined(__clang__)
+#define SSDGS__UNROLL _Pragma("clang loop unroll(full)")
+#elif __GNUC__ >= 8
 #define SSDGS__UNROLL _Pragma("GCC unroll 16")
 #endif
 #elif defined(_MSC_VER)
@@ -848,8 +852,8 @@ typedef struct ssdgs__projection {
 
 typedef struct ssdgs__tile {
     const ssdgs_real *record, *depth;
-    const uint32_t *list, *owner;
-    const uint16_t *mask;
+    const ssdgs_tile_entry *list; /* (count) */
+    const uint16_t *seen;         /* (count) micro-tiles that the walk saw blend, NULL before it */
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
@@ -1665,7 +1669,7 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, first, count, owner, tile, mask, start, list, seen, needed, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, first, count, tile, mask, start, list, tile_seen, seen, sums, histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -2203,25 +2207,23 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
 static void ssdgs__bin_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     ssdgs_splat_view *v = frame->views + view;
-    uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
-    uint32_t at = (uint32_t)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->chunk_room[chunk];
+    uint32_t *histogram = ssdgs__histogram(frame, view, chunk), *tile = (uint32_t *)m->tile.memory;
+    uint16_t *mask = (uint16_t *)m->mask.memory;
+    uint32_t at = (uint32_t)m->chunk_room[chunk];
     const ssdgs_real threshold = ssdgs__log2_threshold(frame);
     int begin, end, rank, box[4], count, i;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
-        const uint32_t gaussian = v->order[rank];
-        const ssdgs_real *record = v->record + (size_t)gaussian * 8;
+        const ssdgs_real *record = v->record + (size_t)v->order[rank] * 8;
         if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
         ssdgs__tile_box(v, record, box);
-        count = frame->context->k->bin(record, threshold, box, v->tiles_x, v->instance_tile + at, v->instance_mask + at);
+        count = frame->context->k->bin(record, threshold, box, v->tiles_x, tile + at, mask + at);
         v->first_instance[rank] = at;
         v->instance_count[rank] = (uint32_t)count;
-        for (i = 0; i < count; i++, at++) {
-            v->instance_owner[at] = gaussian;
-            histogram[v->instance_tile[at]]++;
-        }
+        for (i = 0; i < count; i++) histogram[tile[at++]]++;
     }
 }
 
@@ -2248,13 +2250,20 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
 static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    const uint32_t *tile = (const uint32_t *)m->tile.memory;
+    const uint16_t *mask = (const uint16_t *)m->mask.memory;
     ssdgs_splat_view *v = frame->views + view;
     uint32_t *place = ssdgs__histogram(frame, view, index % SSDGS__BIN_CHUNKS), i;
     int begin, end, rank;
     ssdgs__bin_range(v, index % SSDGS__BIN_CHUNKS, &begin, &end);
     for (rank = begin; rank < end; rank++)
-        for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++)
-            v->tile_list[place[v->instance_tile[i]]++] = i;
+        for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++) {
+            const uint32_t at = place[tile[i]]++;
+            v->tile_list[at].instance = i;
+            v->tile_list[at].gaussian = v->order[rank];
+            v->tile_list[at].mask = mask[i];
+        }
 }
 
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
@@ -2265,7 +2274,8 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
-        uint32_t *histogram;
+        uint32_t *histogram, *tile;
+        uint16_t *mask;
         uint64_t room = 0, chunk_room;
         for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first place */
             chunk_room = m->chunk_room[chunk];
@@ -2277,13 +2287,12 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
         SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
-        SSDGS__RESERVE(m->owner, v->instance_owner, uint32_t, v->instance_room + 1);
-        SSDGS__RESERVE(m->tile, v->instance_tile, uint32_t, v->instance_room + 1);
-        SSDGS__RESERVE(m->mask, v->instance_mask, uint16_t, v->instance_room + 1);
-        SSDGS__RESERVE(m->list, v->tile_list, uint32_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->tile, tile, uint32_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->mask, mask, uint16_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->list, v->tile_list, ssdgs_tile_entry, v->instance_room + 1);
         SSDGS__RESERVE(m->start, v->tile_start, uint32_t, tiles + 1);
         SSDGS__RESERVE(m->histogram, histogram, uint32_t, tiles * SSDGS__BIN_CHUNKS);
-        (void)histogram;
+        (void)histogram, (void)tile, (void)mask;
     }
     ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_task, frame);
     ssdgs__parallel(context, frame->view_count, ssdgs__bin_offsets_task, frame);
@@ -2300,8 +2309,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.record = v->record;
     t.depth = v->depth;
     t.list = v->tile_list + v->tile_start[index];
-    t.owner = v->instance_owner;
-    t.mask = walked ? v->instance_seen : v->instance_mask;
+    t.seen = walked ? v->tile_seen + v->tile_start[index] : NULL;
     t.count = v->tile_start[index + 1] - v->tile_start[index];
     t.x = 16 * (index % v->tiles_x);
     t.y = 16 * (index / v->tiles_x);
@@ -2327,7 +2335,7 @@ static void ssdgs__walk_task(void *data, int index) {
     for (; index >= v->tiles_x * v->tiles_y; v++) index -= v->tiles_x * v->tiles_y;
     tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
-    if (v->light < 0) frame->context->k->walk_camera(&tile, v->instance_seen, v->instance_needed);
+    if (v->light < 0) frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index], v->instance_seen);
     else frame->context->k->walk_light(&tile, v->instance_sums);
 }
 
@@ -2373,12 +2381,10 @@ static void ssdgs__gather_camera_task(void *data, int index) {
     uint32_t instance;
     ssdgs__bin_range(v, index, &begin, &end);
     for (rank = begin; rank < end; rank++) {
-        unsigned blended = 0, needed = 0;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
-            blended |= v->instance_seen[instance];
-            needed |= v->instance_needed ? v->instance_needed[instance] : v->instance_seen[instance];
-        }
-        job->frame->seen[v->order[rank]] = (unsigned char)(needed ? SSDGS_SEEN : blended ? SSDGS_GLIMPSED : 0);
+        unsigned seen = 0;
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
+            seen |= v->instance_seen[instance];
+        job->frame->seen[v->order[rank]] = (unsigned char)(seen & SSDGS_SEEN ? SSDGS_SEEN : seen);
     }
 }
 
@@ -2392,9 +2398,8 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
-            SSDGS__RESERVE(m->seen, v->instance_seen, uint16_t, v->instance_room + 1);
-            v->instance_needed = NULL;
-            if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->instance_needed, unsigned char, v->instance_room + 1);
+            SSDGS__RESERVE(m->seen, v->instance_seen, unsigned char, v->instance_room + 1);
+            SSDGS__RESERVE(m->tile_seen, v->tile_seen, uint16_t, v->instances + 1);
         } else SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * 4 + 4);
     }
     SSDGS__RESERVE(frame->memory->light_sums, job.sums, ssdgs_real, n * 4 + 4);
@@ -6120,7 +6125,7 @@ SSDGS__FN int F(bin)(const R *record, R log2_threshold, const int *box, int tile
 
 typedef struct F(batch) {
     R record[SSDGS__BATCH][8];
-    uint32_t instance[SSDGS__BATCH], gaussian[SSDGS__BATCH];
+    uint32_t place[SSDGS__BATCH]; /* in the tile's lists */
     uint16_t mask[SSDGS__BATCH];
     uint64_t entries[16]; /* per micro-tile, which of the batch touch it */
 } F(batch);
@@ -6151,19 +6156,19 @@ SSDGS__FI void F(batch_transpose)(F(batch) *batch, int count) {
 #endif
 }
 
-SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const ssdgs__tile *tile, uint32_t instance) {
-    const uint32_t gaussian = tile->owner[instance];
-    batch->instance[index] = instance;
-    batch->gaussian[index] = gaussian;
-    batch->mask[index] = tile->mask[instance];
-    memcpy(batch->record[index], tile->record + (size_t)gaussian * 8, 8 * sizeof(R));
+SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const ssdgs__tile *tile, uint32_t place, unsigned mask) {
+    batch->place[index] = place;
+    batch->mask[index] = (uint16_t)mask;
+    memcpy(batch->record[index], tile->record + (size_t)tile->list[place].gaussian * 8, 8 * sizeof(R));
 }
 
-/* Gathers the list's next entries with a mask from *from on; returns how many. */
+/* Gathers the list's next entries that touch anything from *from on; returns how many. */
 SSDGS__FI int F(batch_gather)(F(batch) *batch, const ssdgs__tile *tile, uint32_t *from) {
     int n = 0;
-    for (; n < SSDGS__BATCH && *from < tile->count; ++*from)
-        if (tile->mask[tile->list[*from]]) F(batch_add)(batch, n++, tile, tile->list[*from]);
+    for (; n < SSDGS__BATCH && *from < tile->count; ++*from) {
+        const unsigned mask = tile->seen ? tile->seen[*from] : tile->list[*from].mask;
+        if (mask) F(batch_add)(batch, n++, tile, *from, mask);
+    }
     F(batch_transpose)(batch, n);
     return n;
 }
@@ -6179,6 +6184,9 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
 }
 
+/* Within a batch a transmittance runs on below the stop, which keeps the chain of products short; between two, -1 marks it. */
+SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
+
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
     int v;
     for (v = 0; v < SSDGS__NV; v++) {
@@ -6187,10 +6195,10 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
     }
 }
 
-/* Transmittance walk of the camera: seen[instance], the micro-tiles where a pixel blends it. With max_error > 0, needed[instance]
-   is 0 where every pixel can do without its colour: a pixel passes over small weights as long as their sum stays within
-   max_error, so what is not needed anywhere adds up to no more than that in any pixel. */
-SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *seen, unsigned char *needed, const int thrifty) {
+/* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it (blends, in the tile's order), and per
+   instance whether it must be shaded. With max_error > 0 a pixel passes over small weights as long as their sum stays within
+   max_error, so what no pixel needs adds up to no more than that in any. */
+SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *seen, const int thrifty) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     const V budget = VSET(tile->max_error), small = VSET(tile->max_error * SSDGS__SHARE);
     R transmittance[16][16], passed_over[16][16];
@@ -6198,16 +6206,16 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *seen, uns
     uint32_t from = 0;
     int micro, v, n, i;
     unsigned live = 0xFFFF;
+    memset(blends, 0, tile->count * sizeof *blends);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
             passed_over[micro][v] = 0;
         }
     while (from < tile->count && live) {
-        unsigned char need[SSDGS__BATCH];
-        uint16_t blends[SSDGS__BATCH];
+        unsigned char needed[SSDGS__BATCH];
         n = F(batch_gather)(&batch, tile, &from);
-        for (i = 0; i < n; i++) blends[i] = need[i] = 0;
+        for (i = 0; i < n; i++) needed[i] = 0;
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = live >> micro & 1u ? batch.entries[micro] : 0;
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], over[SSDGS__NV];
@@ -6227,39 +6235,34 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *seen, uns
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
-                    alpha = VSEL(blended, alpha, VSET(0));
-                    if (thrifty) {
-                        const V sum = VFMA(alpha, t[v], over[v]);
-                        const VM fits = VAND(VGE(budget, sum), VGE(VADD(over[v], small), sum));
-                        over[v] = VSEL(fits, sum, over[v]);
-                        must |= VBITS(blended) & ~VBITS(fits);
+                    if (thrifty) { /* once the budget is spent everything is needed */
+                        const V w = VMUL(alpha, t[v]);
+                        const VM light = VGE(small, w);
+                        over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
+                        must |= VBITS(blended) & ~VBITS(VAND(light, VGE(budget, over[v])));
                     }
                     t[v] = VFNMA(alpha, t[v], t[v]);
                 }
-                blends[index] = (uint16_t)(blends[index] | (unsigned)(any != 0) << micro);
-                if (thrifty) need[index] = (unsigned char)(need[index] | (must != 0));
+                blends[batch.place[index]] = (uint16_t)(blends[batch.place[index]] | (unsigned)(any != 0) << micro);
+                if (thrifty) needed[index] = (unsigned char)(needed[index] | (must != 0));
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed_over[micro] + v * SSDGS__VW, over[v]);
                 alive |= VBITS(VGE(t[v], stop));
             }
             if (!alive) live &= ~(1u << micro);
         }
-        for (i = 0; i < n; i++) {
-            seen[batch.instance[i]] = blends[i];
-            if (thrifty) needed[batch.instance[i]] = need[i];
-        }
+        for (i = 0; i < n; i++)
+            seen[tile->list[batch.place[i]].instance] = (unsigned char)(!blends[batch.place[i]] ? 0 : !thrifty || needed[i] ? SSDGS_SEEN
+                                                                                                         : SSDGS_GLIMPSED);
     }
-    for (; from < tile->count; from++) {
-        seen[tile->list[from]] = 0;
-        if (thrifty) needed[tile->list[from]] = 0;
-    }
+    for (; from < tile->count; from++) seen[tile->list[from].instance] = 0;
 }
 
-SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *seen, unsigned char *needed) {
-    if (needed) F(walk_camera_lanes)(tile, seen, needed, 1);
-    else F(walk_camera_lanes)(tile, seen, needed, 0);
+SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *seen) {
+    if (tile->max_error > 0) F(walk_camera_lanes)(tile, blends, seen, 1);
+    else F(walk_camera_lanes)(tile, blends, seen, 0);
 }
 
 /* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per instance, sums (n, 4) of rho v, rho, rho x cue, solid
@@ -6280,17 +6283,19 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         unsigned char codes[SSDGS__BATCH];
         R lanes[SSDGS__BATCH][4][SSDGS__VW]; /* an entry's sums before the lanes are added up */
         for (n = 0; n < SSDGS__BATCH && applied < tile->count; n++) {
-            const R apply_at = tile->depth[tile->owner[tile->list[applied]]];
+            const R apply_at = tile->depth[tile->list[applied].gaussian];
+            const ssdgs_tile_entry *entry;
             int code = SSDGS__APPLY;
-            if (sampled < tile->count && tile->depth[tile->owner[tile->list[sampled]]] - tile->bias <= apply_at) {
+            if (sampled < tile->count && tile->depth[tile->list[sampled].gaussian] - tile->bias <= apply_at) {
                 code = SSDGS__SAMPLE;
                 if (sampled == applied && (sampled + 1 == tile->count ||
-                    tile->depth[tile->owner[tile->list[sampled + 1]]] - tile->bias > apply_at)) code |= SSDGS__APPLY;
+                    tile->depth[tile->list[sampled + 1].gaussian] - tile->bias > apply_at)) code |= SSDGS__APPLY;
             }
-            F(batch_add)(&batch, n, tile, tile->list[code & SSDGS__SAMPLE ? sampled : applied]);
-            batch.record[n][6] = tile->depth[batch.gaussian[n]] - tile->depth_origin;
+            entry = tile->list + (code & SSDGS__SAMPLE ? sampled : applied);
+            F(batch_add)(&batch, n, tile, (uint32_t)(entry - tile->list), entry->mask);
+            batch.record[n][6] = tile->depth[entry->gaussian] - tile->depth_origin;
             if (code & SSDGS__SAMPLE) /* its first appearance */
-                memset(sums + (size_t)batch.instance[n] * 4, 0, 4 * sizeof(R));
+                memset(sums + (size_t)entry->instance * 4, 0, 4 * sizeof(R));
             sampled += code & SSDGS__SAMPLE ? 1u : 0u;
             applied += code & SSDGS__APPLY ? 1u : 0u;
             codes[n] = (unsigned char)code;
@@ -6343,7 +6348,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             }
         }
         for (i = 0; i < n; i++)
-            F(sum4)(sums + (size_t)batch.instance[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
+            F(sum4)(sums + (size_t)tile->list[batch.place[i]].instance * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
                     VLOAD(lanes[i][3]));
     }
 }
@@ -6359,39 +6364,43 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
 SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
-    R local[SSDGS__BATCH][4];
+    R local[SSDGS__BATCH][4], transmittance[16][16];
     uint32_t from = 0;
     int micro, v, i, n;
-    for (micro = 0; micro < 16; micro++)
-        for (v = 0; v < 64; v++) pixels[micro * 64 + v] = v < 48 ? (R)0 : ssdgs__start_transmittance(tile, micro, v - 48);
+    for (micro = 0; micro < 16; micro++) {
+        for (v = 0; v < 64; v++) pixels[micro * 64 + v] = v < 48 ? (R)0 : (R)1;
+        for (v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
+    }
     while (from < tile->count) {
         n = F(batch_gather)(&batch, tile, &from);
-        for (i = 0; i < n; i++) memcpy(local[i], color + (size_t)batch.gaussian[i] * 4, 4 * sizeof(R));
+        for (i = 0; i < n; i++) memcpy(local[i], color + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
-            V px[SSDGS__NV], py[SSDGS__NV], c[3][SSDGS__NV], t[SSDGS__NV];
+            V px[SSDGS__NV], py[SSDGS__NV], c[3][SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
-                t[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
+                last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
+                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
-                    VM drawn;
+                    VM drawn, live = VGE(t[v], stop);
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    alpha = VSEL(VGE(t[v], stop), alpha, VSET(0));
-                    w = VMUL(alpha, t[v]);
+                    w = VSEL(live, VMUL(alpha, t[v]), VSET(0));
                     t[v] = VFNMA(alpha, t[v], t[v]);
+                    last[v] = VSEL(live, t[v], last[v]);
                     SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VFMA(w, VSET(local[index][i]), c[i][v]);
                 }
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 SSDGS__UNROLL for (i = 0; i < 3; i++) VSTORE(pixel + 16 * i + v * SSDGS__VW, c[i][v]);
-                VSTORE(pixel + 48 + v * SSDGS__VW, t[v]);
+                VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
+                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
         }
     }
@@ -6414,8 +6423,8 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
     while (from < tile->count) {
         n = F(batch_gather)(&batch, tile, &from);
         for (i = 0; i < n; i++) {
-            memcpy(local[i], color + (size_t)batch.gaussian[i] * 4, 4 * sizeof(R));
-            memset(sums + (size_t)batch.instance[i] * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
+            memcpy(local[i], color + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
+            memset(sums + (size_t)tile->list[batch.place[i]].instance * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
         }
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
@@ -6431,22 +6440,21 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
-                R *out = sums + (size_t)batch.instance[index] * SSDGS__SUMS;
+                R *out = sums + (size_t)tile->list[batch.place[index]].instance * SSDGS__SUMS;
                 V sum[12];
                 for (i = 0; i < 12; i++) sum[i] = zero;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha, w, shade, behind, g, gx, gy;
-                    VM drawn, blended;
+                    V dx, dy, raw, alpha, w, shade, behind, g, gx, gy, before_it = t[v];
+                    VM drawn;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    blended = VAND(drawn, VGE(t[v], stop));
-                    alpha = VSEL(blended, alpha, zero);
-                    w = VMUL(alpha, t[v]);
+                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    alpha = VSEL(VGE(before_it, stop), alpha, zero);
+                    w = VMUL(alpha, before_it);
                     shade = VDOT3(red, green, blue, dc[0][v], dc[1][v], dc[2][v]);
                     before[v] = VFMA(w, shade, before[v]);
                     behind = VDIV(VSUB(dc[3][v], before[v]), VSUB(one, alpha));
-                    g = VMUL(alpha, VFMA(t[v], shade, VNEG(behind)));
+                    g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
                     g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
-                    t[v] = VFNMA(alpha, t[v], t[v]);
                     gx = VMUL(g, dx);
                     gy = VMUL(g, dy);
                     sum[0] = VADD(sum[0], g);
@@ -6465,7 +6473,7 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                 F(sum4)(out + 8, sum[8], sum[9], sum[10], sum[11]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, t[v]);
+                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
             }
         }
