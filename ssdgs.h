@@ -398,7 +398,8 @@ typedef struct ssdgs_settings {
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
 SSDGS_API ssdgs_settings ssdgs_settings_published(void);
 
-/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in code. */
+/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in code, and call
+   ssdgs_model_get() before every round of writing: rendering keeps what it found for a model that has not changed. */
 typedef struct ssdgs_model_view {
     int count;               /* Gaussians */
     size_t stride;           /* floats from one plane to the next */
@@ -496,8 +497,13 @@ typedef struct ssdgs_render_stats {
     int gaussians;      /* in the model */
     int visible;        /* inside the camera's frustum */
     int shaded;         /* contributing to a pixel */
+    int glimpsed;       /* contributing, but left unshaded within max_error */
     int rejected;       /* never drawn: position, rotation, scale or opacity is not finite */
-    int light_views;    /* light maps rendered */
+    int light_views;    /* light maps in use */
+    int camera_kept;    /* 1: projection, order, tiles and what the camera sees are the last frame's */
+    int lights_kept;    /* 1: so is the light pass */
+    int shadows_kept;   /* Gaussians x lights whose shadow network did not run again */
+    double network_work; /* share of the networks' multiplications done, neurons dead in a block left out */
     size_t instances;   /* (tile, splat) pairs of the camera */
 } ssdgs_render_stats;
 
@@ -622,6 +628,7 @@ typedef struct ssdgs_splat_view {
     int tiles_x, tiles_y;       /* of 16x16 px */
     int orthographic;
     int by_distance;            /* order by distance, not by depth */
+    int kept;                   /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
     int compensate;             /* opacity compensated for the blur */
     int blur;                   /* ssdgs_blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
@@ -1020,6 +1027,7 @@ struct ssdgs_context {
     struct ssdgs__pool *pool;
     struct ssdgs__frame_memory *frame; /* reused by every render on this context */
     int isa, threads, bf16;
+    uint64_t revisions; /* handed out to models */
     char message[SSDGS__MESSAGE];
 };
 
@@ -1449,6 +1457,7 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return conte
 struct ssdgs_model {
     ssdgs_context *context;
     ssdgs_settings settings;
+    uint64_t revision;    /* another one whenever the model may have changed */
     int count;
     size_t capacity;      /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -1623,6 +1632,7 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     if (!model) return SSDGS_ERR_MEMORY;
     model->context = context;
     model->settings = s;
+    model->revision = ++context->revisions;
     ssdgs__global_groups(&s, first);
     model->global_count = first[SSDGS__GLOBAL_GROUPS];
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
@@ -1647,7 +1657,9 @@ SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
     ssdgs__release(model->context, model);
 }
 
-SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
+static void ssdgs__model_changed(ssdgs_model *model) { model->revision = ++model->context->revisions; }
+
+static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
     ssdgs_model_view view;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
@@ -1664,6 +1676,11 @@ SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
     return view;
 }
 
+SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
+    ssdgs__model_changed(model);
+    return ssdgs__model_view(model);
+}
+
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return &model->settings; }
 
 /* ==== >>frame  memory of a frame, its views ==== */
@@ -1673,12 +1690,29 @@ typedef struct ssdgs__view_memory {
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
+/* What the last frame was of: as long as that stays, what was found for it does. */
+typedef struct ssdgs__kept {
+    uint64_t revision; /* of the model; 0 = nothing is kept */
+    ssdgs_camera camera;
+    ssdgs_render_options options;
+    int terms, light_count;
+    int camera_ready, lights_ready, shadows_ready, bounds_ready;
+    uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
+} ssdgs__kept;
+
+typedef struct ssdgs__bounds { /* what the light's map must cover, and how finely */
+    double low[3], high[3], log_scale;
+    int count;
+} ssdgs__bounds;
+
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, light_sums, shaded, color, component[5], pixels, transmittance;
     ssdgs__buffer lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target;
+    ssdgs__buffer bounds, image, target, kept_lights, shadow_logit, shadow_known;
     int view_room;
+    ssdgs__kept kept;
+    ssdgs__bounds scene;
 } ssdgs__frame_memory;
 
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
@@ -1769,12 +1803,6 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     camera.cy = (ssdgs_real)height / 2;
     return camera;
 }
-
-/* What the light's map must cover, and how finely. */
-typedef struct ssdgs__bounds {
-    double low[3], high[3], log_scale;
-    int count;
-} ssdgs__bounds;
 
 typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; ssdgs_real faint; } ssdgs__bounds_job;
 
@@ -1965,13 +1993,50 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
     return o;
 }
 
+/* Whether the lights' maps serve these terms. */
+static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
+    return (terms & SSDGS_SHADOW_TERM) || ((terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
+}
+
+/* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every time, and what
+   hooks leave is theirs. */
+static void ssdgs__compare_kept(ssdgs_frame *frame) {
+    ssdgs__kept *kept = &frame->memory->kept;
+    const ssdgs_render_options *now = &frame->options, *old = &kept->options;
+    const ssdgs_light *lights = (const ssdgs_light *)frame->memory->kept_lights.memory;
+    const ssdgs_camera *a = &frame->camera, *b = &kept->camera;
+    int known = !frame->training && kept->revision == frame->model->revision, i, j;
+    for (i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
+    kept->revision = frame->training ? 0 : frame->model->revision;
+    known = known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
+    kept->bounds_ready = kept->bounds_ready && known;
+    kept->camera_ready = kept->camera_ready && known && a->width == b->width && a->height == b->height &&
+        now->antialias == old->antialias && !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
+        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) && !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+    known = known && kept->lights_ready && frame->light_count == kept->light_count &&
+        !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
+        ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
+        !(frame->terms & ~kept->terms & SSDGS_SCATTERING_TERM); /* which alone asks for the depth cue */
+    for (i = 0; known && i < frame->light_count; i++) {
+        known = frame->lights[i].kind == lights[i].kind;
+        for (j = 0; j < 3; j++) known = known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
+    }
+    kept->lights_ready = known;
+    kept->shadows_ready = kept->shadows_ready && known && now->bf16 == old->bf16;
+    kept->camera = *a;
+    kept->options = *now;
+    kept->terms = frame->terms;
+    kept->light_count = frame->light_count;
+}
+
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
                                        const ssdgs_light *lights,
                                        int light_count, const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
-    ssdgs__bounds bounds;
+    ssdgs_light *kept_lights;
+    const void *views;
     ssdgs_result result;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
     size_t pixels;
@@ -1994,7 +2059,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->model = model;
     frame->memory = m;
     frame->settings = model->settings;
-    frame->gaussians = ssdgs_model_get(model);
+    frame->gaussians = ssdgs__model_view(model);
     frame->camera = *camera;
     frame->lights = lights;
     frame->light_count = model->settings.baked ? 0 : light_count;
@@ -2004,31 +2069,45 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     for (i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] *
                           camera->view[11]);
-    needs_light = (frame->terms & SSDGS_SHADOW_TERM) || ((frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
+    needs_light = ssdgs__needs_light(frame, frame->terms);
+    ssdgs__compare_kept(frame);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
-        result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &bounds);
-        if (result) return result;
-        for (i = 0; i < frame->light_count; i++) frame->view_count += ssdgs__light_views(&frame->settings, &bounds, lights + i,
-                (double)frame->options.light_detail, i, NULL);
+        if (!m->kept.bounds_ready) {
+            result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
+            if (result) return result;
+            m->kept.bounds_ready = m->kept.revision != 0;
+        }
+        for (i = 0; i < frame->light_count; i++)
+            frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail, i,
+                                                    NULL);
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
+    views = m->views.memory;
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    memset(frame->views, 0, sizeof *frame->views);
-    frame->views[0].light = -1;
-    frame->views[0].width = camera->width;
-    frame->views[0].height = camera->height;
-    frame->views[0].fx = camera->fx;
-    frame->views[0].fy = camera->fy;
-    frame->views[0].cx = camera->cx;
-    frame->views[0].cy = camera->cy;
-    frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
-    frame->views[0].compensate = frame->options.antialias;
-    frame->views[0].steepest = (ssdgs_real)1e30;
-    memcpy(frame->views[0].view, camera->view, sizeof camera->view);
-    for (i = 0, j = 1; needs_light && i < frame->light_count; i++) j += ssdgs__light_views(&frame->settings, &bounds, lights + i,
-            (double)frame->options.light_detail, i, frame->views + j);
+    if (frame->views != views) m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = 0;
+    if (!m->kept.camera_ready) {
+        memset(frame->views, 0, sizeof *frame->views);
+        frame->views[0].light = -1;
+        frame->views[0].width = camera->width;
+        frame->views[0].height = camera->height;
+        frame->views[0].fx = camera->fx;
+        frame->views[0].fy = camera->fy;
+        frame->views[0].cx = camera->cx;
+        frame->views[0].cy = camera->cy;
+        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
+        frame->views[0].compensate = frame->options.antialias;
+        frame->views[0].steepest = (ssdgs_real)1e30;
+        memcpy(frame->views[0].view, camera->view, sizeof camera->view);
+    }
+    for (i = 0, j = 1; needs_light && i < frame->light_count && !m->kept.lights_ready; i++)
+        j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail, i, frame->views + j);
+    frame->views[0].kept = m->kept.camera_ready;
+    for (i = 1; i < frame->view_count; i++) frame->views[i].kept = m->kept.lights_ready;
+    m->kept.camera_ready = m->kept.lights_ready = 0; /* again once the walks are done */
+    SSDGS__RESERVE(m->kept_lights, kept_lights, ssdgs_light, frame->light_count + 1);
+    for (i = 0; i < frame->light_count; i++) kept_lights[i] = lights[i];
     pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -2091,6 +2170,7 @@ static void ssdgs__project_task(void *data, int index) {
     const ssdgs__projection p = ssdgs__projection_of(frame, v);
     const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n
         ? begin + SSDGS__CHUNK : n;
+    if (v->kept) return;
     frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record, v->depth);
 }
 
@@ -2119,6 +2199,7 @@ static void ssdgs__sort_task(void *data, int index) {
         *swap;
     uint32_t *histogram = (uint32_t *)(to + n);
     int i, pass, visible = 0;
+    if (v->kept) return;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
     for (i = 0; i < n; i++) {
         const float depth = (float)v->depth[i];
@@ -2188,6 +2269,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     const ssdgs_splat_view *v = frame->views + view;
     uint64_t room = 0;
     int begin, end, rank, box[4];
+    if (v->kept) return;
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
         if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
@@ -2214,6 +2296,7 @@ static void ssdgs__bin_task(void *data, int index) {
     uint32_t at = (uint32_t)m->chunk_room[chunk];
     const ssdgs_real threshold = ssdgs__log2_threshold(frame);
     int begin, end, rank, box[4], count, i;
+    if (v->kept) return;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
@@ -2234,6 +2317,7 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
     const int tiles = v->tiles_x * v->tiles_y;
     uint32_t sum = 0;
     int tile, chunk;
+    if (v->kept) return;
     for (tile = 0; tile < tiles; tile++) {
         v->tile_start[tile] = sum;
         for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
@@ -2256,6 +2340,7 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
     ssdgs_splat_view *v = frame->views + view;
     uint32_t *place = ssdgs__histogram(frame, view, index % SSDGS__BIN_CHUNKS), i;
     int begin, end, rank;
+    if (v->kept) return;
     ssdgs__bin_range(v, index % SSDGS__BIN_CHUNKS, &begin, &end);
     for (rank = begin; rank < end; rank++)
         for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++) {
@@ -2277,6 +2362,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         uint32_t *histogram, *tile;
         uint16_t *mask;
         uint64_t room = 0, chunk_room;
+        if (v->kept) continue;
         for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first place */
             chunk_room = m->chunk_room[chunk];
             m->chunk_room[chunk] = room;
@@ -2332,7 +2418,7 @@ static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
     ssdgs__tile tile;
-    for (; index >= v->tiles_x * v->tiles_y; v++) index -= v->tiles_x * v->tiles_y;
+    for (; v->kept || index >= v->tiles_x * v->tiles_y; v++) index -= v->kept ? 0 : v->tiles_x * v->tiles_y;
     tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
     if (v->light < 0) frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index], v->instance_seen);
@@ -2396,6 +2482,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        if (v->kept) continue;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
             SSDGS__RESERVE(m->seen, v->instance_seen, unsigned char, v->instance_room + 1);
@@ -2406,9 +2493,11 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
     job.frame = frame;
     job.view = frame->views;
-    memset(frame->seen, 0, n);
-    ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
-    for (job.light = 0, i = 1; job.light < frame->light_count; job.light++) {
+    if (!job.view->kept) {
+        memset(frame->seen, 0, n);
+        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
+    }
+    for (job.light = 0, i = 1; job.light < frame->light_count && i < frame->view_count && !frame->views[i].kept; job.light++) {
         memset(job.sums, 0, n * 4 * sizeof(ssdgs_real));
         for (; i < frame->view_count && frame->views[i].light == job.light; i++) {
             job.view = frame->views + i;
@@ -2416,6 +2505,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         }
         ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__visibility_task, &job);
     }
+    frame->memory->kept.camera_ready = frame->memory->kept.lights_ready = 1;
     return SSDGS_OK;
 }
 
@@ -2556,11 +2646,17 @@ static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_r
 }
 
 /* Lists of rows for dense products: all of them, and those that live. */
-typedef struct ssdgs__row_lists { uint16_t all[1024], in[1024], out[1024]; } ssdgs__row_lists;
+typedef struct ssdgs__row_lists {
+    uint16_t all[1024], in[1024], out[1024];
+    uint64_t multiplied, multipliable; /* per Gaussian of a block: done, and of all neurons */
+    int shadows_kept;
+} ssdgs__row_lists;
 
 static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     int i;
     for (i = 0; i < 1024; i++) lists->all[i] = (uint16_t)i;
+    lists->multiplied = lists->multipliable = 0;
+    lists->shadows_kept = 0;
 }
 
 /* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that are 0 in the
@@ -2599,6 +2695,8 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
             }
             k->dense(&p);
         }
+        lists->multiplied += (uint64_t)p.depth * out;
+        lists->multipliable += (uint64_t)in * out;
         weights += (in + 1) * out;
     }
 }
@@ -2732,6 +2830,9 @@ typedef struct ssdgs__shade_job {
     int blocks;
     size_t slot_stride;
     ssdgs__lighting *lightings; /* per light */
+    ssdgs_real *shadow_logit;   /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
+    unsigned char *shadow_known; /* (lights, n) which of them */
+    uint64_t *counts;           /* per slot: multiplications done, those of all neurons, shadows kept */
     uint32_t *packed[2];        /* bf16 weights of the scattering and the shadow network, or NULL */
     ssdgs_real *activations, *scratch, *slots, *lane_slots;
 } ssdgs__shade_job;
@@ -2740,6 +2841,26 @@ typedef struct ssdgs__shade_job {
 static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
     const int i = block * SSDGS__BLOCK + s;
     return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
+}
+
+/* The shadow network's outputs for the Gaussians of a block, if all of them are known; it does not see the camera. */
+static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK], ssdgs_real *shadow) {
+    const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
+    int s;
+    if (!job->shadow_known) return 0;
+    for (s = 0; s < SSDGS__BLOCK; s++)
+        if (!job->shadow_known[first + at[s]]) return 0;
+    for (s = 0; s < SSDGS__BLOCK; s++) shadow[s] = job->shadow_logit[first + at[s]];
+    return 1;
+}
+
+static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK], const ssdgs_real *shadow) {
+    const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
+    int s;
+    for (s = 0; job->shadow_known && s < SSDGS__BLOCK; s++) {
+        job->shadow_known[first + at[s]] = 1;
+        job->shadow_logit[first + at[s]] = shadow[s];
+    }
 }
 
 static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory,
@@ -2769,10 +2890,13 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
         }
         if (l->shadow_layers) {
-            ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-            ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists, inputs,
-                                   part + l->shadow_at);
             shadow = part + l->scattering_at - SSDGS__BLOCK;
+            if (!ssdgs__shadow_recall(job, light, at, shadow)) {
+                ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
+                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists, inputs,
+                                       part + l->shadow_at);
+                ssdgs__shadow_keep(job, light, at, shadow);
+            } else lists->shadows_kept += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
@@ -2838,6 +2962,9 @@ static void ssdgs__shade_task(void *data, int slot) {
         ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
     if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
+    job->counts[3 * slot] = lists.multiplied;
+    job->counts[3 * slot + 1] = lists.multipliable;
+    job->counts[3 * slot + 2] = (uint64_t)lists.shadows_kept;
 }
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
@@ -2861,6 +2988,7 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
 
 static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
+    ssdgs__kept *kept = &frame->memory->kept;
     ssdgs__shade_job job;
     ssdgs_result result;
     int i;
@@ -2876,6 +3004,16 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     if (result) return result;
     SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real,
                    job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
+    if (job.layout.shadow_layers && !frame->training) { /* room from the first frame on, use from the second */
+        const size_t pairs = (size_t)frame->gaussians.count * (size_t)frame->light_count;
+        const int lights_kept = frame->view_count > 1 && frame->views[1].kept;
+        SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
+        SSDGS__RESERVE(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
+        if (lights_kept && !kept->shadows_ready) memset(job.shadow_known, 0, pairs);
+        if (!lights_kept) job.shadow_known = NULL;
+        kept->shadows_ready = lights_kept;
+    }
+    job.counts = kept->counts;
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
     return SSDGS_OK;
 }
@@ -3167,6 +3305,7 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
     ssdgs_result result;
     ssdgs_real *planes;
     size_t pixels, i;
+    double done = 0, all = 0;
     int stride, c, x, y;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!model || !camera || !image) return SSDGS_ERR_ARGUMENT;
@@ -3204,6 +3343,16 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         stats->visible = frame.views[0].visible;
         stats->shaded = frame.shaded_count;
         stats->light_views = frame.view_count - 1;
+        stats->camera_kept = frame.views[0].kept;
+        stats->lights_kept = frame.view_count > 1 && frame.views[1].kept;
+        for (i = 0; i < (size_t)model->count; i++) stats->glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+        for (c = 0; c < SSDGS__SLOTS; c++) {
+            const uint64_t *counts = frame.memory->kept.counts + 3 * c;
+            done += (double)counts[0];
+            all += (double)counts[1];
+            stats->shadows_kept += (int)counts[2];
+        }
+        stats->network_work = all > 0 ? done / all : 0;
         stats->instances = frame.views[0].instances;
         for (i = 0; i < (size_t)model->count; i++)
             for (c = 0; c < SSDGS_DIFFUSE; c++)
@@ -4609,7 +4758,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     ssdgs_context *context = model->context;
     const int srgb = model->settings.transfer == SSDGS_TRANSFER_SRGB;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_real *image, *slope, *target;
     ssdgs_result result;
     size_t i;
@@ -5157,6 +5306,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
     if (!trainer) return SSDGS_ERR_MEMORY;
     trainer->context = model->context;
     trainer->model = model;
+    ssdgs__model_changed(model);
     trainer->options = options ? *options : ssdgs_train_options_default();
     result = ssdgs__trainer_setup(trainer, photos, photo_count);
     if (result) {
@@ -5221,6 +5371,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         if (o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT)
             ssdgs__correction_step(correction, gradient, 1, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
     }
+    ssdgs__model_changed(trainer->model);
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
@@ -5281,7 +5432,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
                                       ssdgs_real *image, ssdgs_metrics *metrics) {
     ssdgs_context *context;
-    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_image out;
     ssdgs_real *rendered, *target, *planes;
     ssdgs_result result;
@@ -5518,6 +5669,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         for (i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         io.bytes = bytes + sizeof head;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
+        ssdgs__model_changed(trainer->model);
     }
     ssdgs__release(context, bytes);
     return result;
