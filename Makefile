@@ -3,26 +3,36 @@ CFLAGS ?= -O2
 CXX ?= c++
 BUILD = build
 ITERATIONS = 5000
+BENCH =
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) -Wstrict-prototypes -Wmissing-prototypes
 COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT))
 
 HEADERS = ssdgs.h examples/olat.h tests/test.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual
 DEMO = $(BUILD)/demo
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
 	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
 	  --out $(DEMO) --sheet $(DEMO)/sheet.png
+
+bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts (BENCH=--quick: a minute)
+	$(BUILD)/bench --models $(DEMO) $(BENCH)
+
+# Models to measure with, trained where there are none; the published networks take longer: fewer iterations.
+$(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
+	@mkdir -p $(DEMO)
+	$(BUILD)/train examples/data/waxcow -o $@ --background black \
+	  $(if $(findstring published,$@),--preset published --iterations 1000,--iterations $(ITERATIONS))
 
 # Each program closes with "N passed, N failed"; one that does not counts as one failed.
 test: $(TESTS) $(EXAMPLES) ## every test; SSDGS_GOLDEN=folder reads the golden files there
@@ -90,5 +100,5 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
-.PHONY: all demo test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: all demo bench test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 clean help

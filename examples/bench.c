@@ -1,0 +1,1119 @@
+/* cc -O2 examples/bench.c -o bench -lm -lpthread: how fast models render and train here, and what each shortcut costs in quality.
+   Tables on stdout, bench.json and bench.svg beside the program. Times are the best of several passes, taken view by view. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "olat.h"
+#ifndef _WIN32
+#include <sys/time.h>
+#endif
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__TINYC__)
+#define COMPILER "tcc"
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#else
+#define COMPILER "unknown"
+#endif
+
+enum {
+    SIDE = 256, /* px, of the timed frames */
+    MAX_PHOTOS = 16, MAX_JOBS = 32, MAX_COLUMNS = 12, MAX_TABLES = 32, MAX_FACTS = 64, MAX_PIXELS = 1920 * 1080
+};
+static const double none = -1e300; /* what could not be measured: - on stdout, null in JSON */
+static volatile double sink;       /* what is written here had to be computed */
+
+static void die(const char *what, const char *why) {
+    fprintf(stderr, "bench: %s: %s\n", what, why);
+    exit(1);
+}
+
+static void *make(size_t count, size_t size) {
+    void *memory = calloc(count + 1, size);
+    if (!memory) die("memory", "not enough");
+    return memory;
+}
+
+static double now(void) {
+#ifdef _WIN32
+    LARGE_INTEGER ticks, rate;
+    QueryPerformanceCounter(&ticks);
+    QueryPerformanceFrequency(&rate);
+    return (double)ticks.QuadPart / (double)rate.QuadPart;
+#else
+    struct timeval time;
+    gettimeofday(&time, NULL);
+    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
+#endif
+}
+
+/* ---- what is found: tables of named rows, and facts, the figures that others quote ---- */
+
+typedef struct row { char name[48]; double value[MAX_COLUMNS]; } row;
+typedef struct table {
+    char key[64];
+    const char *columns; /* names between spaces */
+    int column_count, row_count;
+    row rows[MAX_JOBS];
+} table;
+
+typedef struct bench {
+    int quick, best_isa, isas[SSDGS_ISA_COUNT], isa_count, threads[3], thread_count; /* threads: 1, 2, all; no doubles */
+    const char *dataset, *model, *prefix; /* the model at hand, and what stands before its tables' and facts' names */
+    olat_dataset data;                    /* the test split */
+    ssdgs_photo photos[MAX_PHOTOS], scaled[MAX_PHOTOS]; /* some of it, and to SIDE x SIDE */
+    int photo_count, views;               /* for quality, for times */
+    ssdgs_real *color;                    /* (MAX_PIXELS, 3) */
+    char cpu[128];
+    table tables[MAX_TABLES];
+    struct { char key[64]; double value; } facts[MAX_FACTS];
+    int table_count, fact_count;
+} bench;
+
+static table *new_table(bench *b, const char *key, const char *columns) {
+    table *t = b->tables + b->table_count++;
+    if (b->table_count > MAX_TABLES) die(key, "too many tables");
+    snprintf(t->key, sizeof t->key, "%s%s", b->prefix, key);
+    t->columns = columns;
+    for (t->column_count = 1; (columns = strchr(columns, ' ')) != NULL; columns++) t->column_count++;
+    return t;
+}
+
+static double *new_row(table *t, const char *name) {
+    row *r = t->rows + t->row_count++;
+    if (t->row_count > MAX_JOBS) die(t->key, "too many rows");
+    snprintf(r->name, sizeof r->name, "%s", name);
+    return r->value;
+}
+
+/* A row and its values: as many doubles as there are columns. */
+static const double *add_row(table *t, const char *name, ...) {
+    double *values = new_row(t, name);
+    va_list arguments;
+    int c;
+    va_start(arguments, name);
+    for (c = 0; c < t->column_count; c++) values[c] = va_arg(arguments, double);
+    va_end(arguments);
+    return values;
+}
+
+/* Keys between spaces, and a double for each. */
+static void add_facts(bench *b, const char *keys, ...) {
+    va_list arguments;
+    va_start(arguments, keys);
+    for (; *keys; keys += strspn(keys, " "), b->fact_count++) {
+        const int length = (int)strcspn(keys, " ");
+        if (b->fact_count == MAX_FACTS) die(keys, "too many facts");
+        snprintf(b->facts[b->fact_count].key, sizeof b->facts->key, "%s%.*s", b->prefix, length, keys);
+        b->facts[b->fact_count].value = va_arg(arguments, double);
+        keys += length;
+    }
+    va_end(arguments);
+}
+
+static void print_table(const table *t) {
+    int r, c;
+    for (r = -1; r < t->row_count; r++) { /* the names of the columns first */
+        const char *column = t->columns;
+        printf("%s%-30s", r < 0 ? "\n" : "", r < 0 ? t->key : t->rows[r].name);
+        for (c = 0; c < t->column_count; c++) {
+            const int length = (int)strcspn(column, " "), width = length < 8 ? 9 : length + 1;
+            const double x = r < 0 ? none : t->rows[r].value[c], size = fabs(x); /* three digits of it */
+            if (x <= none) printf("%*.*s", width, r < 0 ? length : 1, r < 0 ? column : "-");
+            else printf("%*.*f", width, size >= 100 || x == floor(x) ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : size > 0.1 ? 3 : 5,
+                        x);
+            column += length + 1;
+        }
+        printf("\n");
+    }
+    fflush(stdout);
+}
+
+static void write_number(FILE *file, const char *key, int length, double x) {
+    if (x <= none) fprintf(file, "\"%.*s\": null", length, key);
+    else fprintf(file, "\"%.*s\": %.6g", length, key, x);
+}
+
+static void write_json(const bench *b, FILE *file) {
+    int i, r, c;
+    fprintf(file, "{\n \"cpu\": \"%s\",\n \"isa\": \"%s\",\n \"threads\": %d,\n \"compiler\": \"%s\",\n \"dataset\": \"",
+            b->cpu, ssdgs_isa_string((ssdgs_isa)b->best_isa), b->threads[b->thread_count - 1], COMPILER);
+    for (i = 0; b->dataset[i]; i++) fputc(b->dataset[i] == '\\' || b->dataset[i] == '"' ? '/' : b->dataset[i], file);
+    fprintf(file, "\"");
+    for (i = 0; i < b->fact_count; i++) {
+        fprintf(file, ",\n ");
+        write_number(file, b->facts[i].key, 64, b->facts[i].value);
+    }
+    fprintf(file, ",\n \"tables\": {");
+    for (i = 0; i < b->table_count; i++) {
+        const table *t = b->tables + i;
+        fprintf(file, "%s\n  \"%s\": [", i ? "," : "", t->key);
+        for (r = 0; r < t->row_count; r++) {
+            const char *column = t->columns;
+            fprintf(file, "%s\n   {\"name\": \"%s\"", r ? "," : "", t->rows[r].name);
+            for (c = 0; c < t->column_count; c++, column += strcspn(column, " ") + 1) {
+                fprintf(file, ", ");
+                write_number(file, column, (int)strcspn(column, " "), t->rows[r].value[c]);
+            }
+            fprintf(file, "}");
+        }
+        fprintf(file, "\n  ]");
+    }
+    fprintf(file, "\n }\n}\n");
+}
+
+/* ---- kernels: the machine's peaks and the networks' layers ---- */
+
+/* Twelve chains of FMAs, enough to hide their latency; volatile, so that the compiler cannot know them to be the same. It may
+   make vectors of scalars, here as in the kernels. */
+static volatile float half = 0.5f;
+#define PEAK(name, attribute, vector, load, fma)                                              \
+    attribute static float name(long rounds) {                                                \
+        float lanes[28];                                                                      \
+        vector sum[12], x;                                                                    \
+        int i;                                                                                \
+        for (i = 0; i < 28; i++) lanes[i] = half;                                             \
+        x = load(lanes + 12);                                                                 \
+        SSDGS__UNROLL for (i = 0; i < 12; i++) sum[i] = load(lanes + i);                      \
+        for (; rounds > 0; rounds--) { SSDGS__UNROLL for (i = 0; i < 12; i++) sum[i] = fma; } \
+        SSDGS__UNROLL for (i = 0; i < 12; i++) x = fma;                                       \
+        memcpy(lanes, &x, sizeof x);                                                          \
+        return lanes[0];                                                                      \
+    }
+#define LOAD(p) (*(p))
+PEAK(peak_scalar, , float, LOAD, sum[i] * x + x)
+#if SSDGS__X86 >= 1
+PEAK(peak_sse2, SSDGS__ATTRIBUTE("sse2"), __m128, _mm_loadu_ps, _mm_add_ps(_mm_mul_ps(sum[i], x), x))
+#endif
+#if SSDGS__X86 >= 2
+PEAK(peak_avx2, SSDGS__ATTRIBUTE("avx2,fma"), __m256, _mm256_loadu_ps, _mm256_fmadd_ps(sum[i], x, x))
+#endif
+#if SSDGS__X86 >= 3
+PEAK(peak_avx512, SSDGS__ATTRIBUTE("avx512f"), __m512, _mm512_loadu_ps, _mm512_fmadd_ps(sum[i], x, x))
+#endif
+#if SSDGS__BF16
+PEAK(peak_bf16, SSDGS__ATTRIBUTE("avx512f,avx512bf16"), __m512, _mm512_loadu_ps,
+     _mm512_dpbf16_ps(sum[i], (__m512bh)_mm512_castps_si512(x), (__m512bh)_mm512_castps_si512(x)))
+#endif
+#if SSDGS__NEON
+PEAK(peak_neon, , float32x4_t, vld1q_f32, vfmaq_f32(x, sum[i], x))
+#endif
+enum { BF16 = SSDGS_ISA_COUNT };
+static const struct { int isa; float (*work)(long); double operations; } peaks[] = { /* operations of one round */
+#if SSDGS__X86 >= 1
+    {SSDGS_ISA_SSE2, peak_sse2, 12 * 4 * 2},
+#endif
+#if SSDGS__X86 >= 2
+    {SSDGS_ISA_AVX2, peak_avx2, 12 * 8 * 2},
+#endif
+#if SSDGS__X86 >= 3
+    {SSDGS_ISA_AVX512, peak_avx512, 12 * 16 * 2},
+#endif
+#if SSDGS__BF16
+    {BF16, peak_bf16, 12 * 16 * 4},
+#endif
+#if SSDGS__NEON
+    {SSDGS_ISA_NEON, peak_neon, 12 * 4 * 2},
+#endif
+    {SSDGS_ISA_SCALAR, peak_scalar, 12 * 2}
+};
+
+/* A network of the size of a model's scattering network in which no neuron is ever 0, so that none is left out, and memory
+   for one block. */
+typedef struct network {
+    int sizes[SSDGS_MAX_LAYERS + 1], layers;
+    ssdgs_real *weights, *gradient, *inputs, *outputs, *output_gradient, *d, *spare, *transposed;
+    uint32_t *packed, *pairs;
+    ssdgs__row_lists *lists;
+    double operations; /* of a block's forward; the backward's are twice as many */
+} network;
+
+static network make_network(ssdgs_model *model) {
+    network n;
+    size_t widest = 16, i, at = 0;
+    int l;
+    memset(&n, 0, sizeof n);
+    n.layers = ssdgs__network_sizes(&model->settings, 0, n.sizes);
+    n.weights = (ssdgs_real *)make(ssdgs__network_count(&model->settings, 0) + 16, sizeof(ssdgs_real));
+    n.lists = (ssdgs__row_lists *)make(1, sizeof *n.lists);
+    ssdgs__row_lists_fill(n.lists);
+    for (l = 0; l <= n.layers; l++) {
+        if (l) {
+            const size_t products = (size_t)n.sizes[l] * (size_t)n.sizes[l - 1], end = at + products + (size_t)n.sizes[l];
+            n.operations += 2.0 * (double)products * SSDGS__BLOCK;
+            for (i = 0; at < end; i++, at++)
+                n.weights[at] = i < products ? (ssdgs_real)((ssdgs__uniform(3, at) - 0.5) / n.sizes[l - 1]) : 2;
+        }
+        widest = (size_t)n.sizes[l] + 16 > widest ? (size_t)n.sizes[l] + 16 : widest;
+    }
+    n.output_gradient = (ssdgs_real *)make(widest * SSDGS__BLOCK * (5 + (size_t)n.layers), sizeof(ssdgs_real));
+    n.d = n.output_gradient + widest * SSDGS__BLOCK;
+    n.spare = n.d + widest * SSDGS__BLOCK;
+    n.transposed = n.spare + widest * SSDGS__BLOCK;
+    n.inputs = n.transposed + widest * SSDGS__BLOCK;
+    n.outputs = n.inputs + widest * SSDGS__BLOCK;
+    n.gradient = (ssdgs_real *)make(ssdgs__network_count(&model->settings, 0) + 128, sizeof(ssdgs_real));
+    n.packed = (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
+    n.pairs = ssdgs__pack_weights(n.sizes, n.layers, n.weights, n.packed);
+    for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
+        n.inputs[i] = (ssdgs_real)(2 * ssdgs__uniform(1, i) - 1);
+    for (i = 0; i < (size_t)n.sizes[n.layers] * SSDGS__BLOCK; i++)
+        n.output_gradient[i] = (ssdgs_real)(2e-3 * ssdgs__uniform(2, i) - 1e-3);
+    return n;
+}
+
+/* Work that is repeated until a clock can time it, on each of the context's threads. */
+typedef enum kind { PEAK_RATE, READ, FORWARD, FORWARD_BF16, BACKWARD } kind;
+typedef struct kernel {
+    kind work;
+    ssdgs_context *context;
+    float (*peak)(long);
+    const network *net;
+    const uint64_t *words; /* to read; a thread's share is a multiple of 8 */
+    size_t share;
+    long repeat;
+    double operations, best; /* operations of one repeat, all threads; 1e9 of them per second */
+} kernel;
+
+static void kernel_task(void *data, int task) {
+    const kernel *job = (const kernel *)data;
+    const ssdgs__kernels *k = job->context->k;
+    const network *n = job->net;
+    const uint64_t *p = job->words + (size_t)task * job->share;
+    uint64_t a = 0, b = 0, c = 0, d = 0;
+    size_t i;
+    long r;
+    if (job->work == PEAK_RATE) sink = (double)job->peak(job->repeat);
+    else for (r = 0; r < job->repeat; r++) switch (job->work) {
+        case FORWARD: case FORWARD_BF16:
+            ssdgs__network_forward(k, n->sizes, n->layers, n->weights, job->work == FORWARD ? NULL : n->packed, n->pairs,
+                                   n->lists, n->inputs, n->outputs);
+            break;
+        case BACKWARD:
+            memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
+            ssdgs__network_backward(k, n->sizes, n->layers, n->weights, n->inputs, n->outputs, n->d, n->spare,
+                                    n->transposed, n->lists, n->gradient);
+            break;
+        default:
+            for (i = 0; i < job->share; i += 8) {
+                a += p[i] + p[i + 1], b += p[i + 2] + p[i + 3];
+                c += p[i + 4] + p[i + 5], d += p[i + 6] + p[i + 7];
+            }
+            sink = (double)(a + b + c + d);
+    }
+}
+
+static kernel make_kernel(kind work, ssdgs_context *context, int isa, const network *net) {
+    kernel k = {work, context, NULL, net, NULL, 0, 1, 0, 0};
+    size_t i = 0;
+    while (peaks[i].isa != isa) i++;
+    k.peak = peaks[i].work;
+    k.operations = net ? net->operations * (work == BACKWARD ? 2 : 1) : peaks[i].operations * context->threads;
+    return k;
+}
+
+/* All in turn until the seconds are over: what disturbs one disturbs its neighbours too. */
+static void time_kernels(kernel *kernels, int count, double seconds) {
+    const double end = now() + seconds;
+    double start, elapsed, rate;
+    int i, round;
+    for (round = 0; round < 4 || now() < end; round++)
+        for (i = 0; i < count; i++) {
+            kernel *k = kernels + i;
+            for (;; k->repeat *= 2) {
+                start = now();
+                ssdgs__parallel(k->context, k->context->threads, kernel_task, k);
+                elapsed = now() - start;
+                if (elapsed > 8e-3) break; /* the processor's clock has settled after the one before */
+            }
+            rate = 1e-9 * k->operations * (double)k->repeat / elapsed;
+            k->best = rate > k->best ? rate : k->best;
+        }
+}
+
+/* ---- frames and training steps, timed stage by stage where hooks are set ---- */
+
+typedef struct session {
+    ssdgs_context *context;
+    ssdgs_model *model;
+    double stage[SSDGS_STAGE_COUNT]; /* seconds since they were last zeroed */
+} session;
+
+static void check(ssdgs_context *context, ssdgs_result result) {
+    if (result) die(ssdgs_result_string(result), context ? ssdgs_error_message(context) : "no context");
+}
+
+static ssdgs_result time_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
+    const double start = now();
+    const ssdgs_result result = ssdgs_stage_cpu(frame, stage);
+    ((session *)user)->stage[stage] += now() - start;
+    return result;
+}
+
+#define STAGES(X) \
+    X(PROJECT) X(SORT) X(BIN) X(WALK) X(SHADE) X(COMPOSITE) X(COMPOSITE_BACKWARD) X(SHADE_BACKWARD) X(PROJECT_BACKWARD)
+#define HOOK(name) \
+    static ssdgs_result time_##name(void *user, ssdgs_frame *frame) { return time_stage(user, frame, SSDGS_STAGE_##name); }
+STAGES(HOOK)
+
+/* A context with the model at hand; allocator may be NULL, threads 0 = all. The hooks want s to stay where it is. */
+static void open_session(const bench *b, session *s, int isa, int threads, int hooks, const ssdgs_allocator *allocator) {
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    memset(s, 0, sizeof *s);
+    desc.isa = (ssdgs_isa)isa;
+    desc.threads = threads;
+    if (allocator) desc.allocator = *allocator;
+#define SET(name) desc.gpu.stage[SSDGS_STAGE_##name] = hooks ? time_##name : NULL;
+    STAGES(SET)
+    desc.gpu.user = s;
+    check(NULL, ssdgs_context_create(&desc, &s->context));
+    check(s->context, ssdgs_model_load(s->context, b->model, &s->model, NULL));
+}
+
+static void close_session(session *s) {
+    ssdgs_model_destroy(s->model);
+    ssdgs_context_destroy(s->context);
+}
+
+/* A frame of each view or, with a trainer, a step. Light and camera move every time unless they are fixed. */
+typedef struct job {
+    session *s;
+    ssdgs_trainer *trainer;
+    int iteration; /* of the first view's step; a multiple of the views, where a pass over the photographs begins */
+    ssdgs_render_options options;
+    int width, height, views, fixed_light, fixed_camera, turned_away;
+    double ms, stage_ms[SSDGS_STAGE_COUNT]; /* means over the views of each one's best */
+    double shaded; /* fraction of the Gaussians */
+} job;
+
+static job make_job(const bench *b, session *s, ssdgs_render_options options) {
+    const int views = s->context->isa == b->best_isa || b->views < 4 ? b->views : 2; /* fewer where they take long */
+    job j = {s, NULL, 0, options, SIDE, SIDE, views, 0, 0, 0, 0, {0}, 0};
+    return j;
+}
+
+/* The same picture on a screen of another size; a wider one shows more on both sides. */
+static ssdgs_camera scaled_camera(const ssdgs_camera *camera, int width, int height) {
+    ssdgs_camera c = *camera;
+    const ssdgs_real scale = (ssdgs_real)height / (ssdgs_real)camera->height;
+    c.fx *= scale;
+    c.fy *= scale;
+    c.cx = c.cx * scale + ((ssdgs_real)width - (ssdgs_real)camera->width * scale) / 2;
+    c.cy *= scale;
+    c.width = width;
+    c.height = height;
+    return c;
+}
+
+/* stats may be NULL: they take their time too. */
+static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
+    const ssdgs_photo *seen = b->photos + (j->fixed_camera ? 0 : view * b->photo_count / j->views);
+    const ssdgs_photo *lit = b->photos + (j->fixed_light ? 0 : view * b->photo_count / j->views);
+    ssdgs_camera camera = scaled_camera(&seen->camera, j->width, j->height);
+    ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    int i;
+    for (i = 0; j->turned_away && i < 4; i++) { /* half a turn about the camera's y */
+        camera.view[i] = -camera.view[i];
+        camera.view[8 + i] = -camera.view[8 + i];
+    }
+    if (j->trainer) {
+        j->trainer->iteration = j->iteration + view;
+        check(j->s->context, ssdgs_trainer_step(j->trainer, NULL));
+    } else check(j->s->context, ssdgs_render_ex(j->s->model, &camera, &lit->light, 1, &j->options, &image, stats));
+}
+
+/* Jobs in turn, for at least two passes; the first also warms up. */
+static void time_jobs(bench *b, job *jobs, int count, double seconds) {
+    static double best[MAX_JOBS][MAX_PHOTOS][SSDGS_STAGE_COUNT + 1];
+    const double end = now() + seconds * (b->quick ? 0.2 : 1);
+    int i, v, round, stage;
+    if (count > MAX_JOBS) die("jobs", "too many");
+    for (round = 0; round < 2 || (round < 40 && now() < end); round++)
+        for (i = 0; i < count; i++) {
+            job *j = jobs + i;
+            ssdgs_render_stats stats = {0, 0, 0, 0, 0, 0};
+            run(b, j, j->views - 1, NULL); /* what is fixed must have been so in the frame before */
+            for (v = 0; v < j->views; v++) {
+                double took[SSDGS_STAGE_COUNT + 1], start;
+                memset(j->s->stage, 0, sizeof j->s->stage);
+                start = now();
+                run(b, j, v, round ? NULL : &stats);
+                took[SSDGS_STAGE_COUNT] = now() - start;
+                if (!round && stats.gaussians) j->shaded += (double)stats.shaded / stats.gaussians / j->views;
+                memcpy(took, j->s->stage, sizeof j->s->stage);
+                for (stage = 0; stage <= SSDGS_STAGE_COUNT; stage++)
+                    if (!round || took[stage] < best[i][v][stage]) best[i][v][stage] = took[stage];
+            }
+        }
+    for (i = 0; i < count; i++) {
+        job *j = jobs + i;
+        for (v = 0; v < j->views; v++) {
+            for (stage = 0; stage < SSDGS_STAGE_COUNT; stage++) j->stage_ms[stage] += 1e3 * best[i][v][stage] / j->views;
+            j->ms += 1e3 * best[i][v][SSDGS_STAGE_COUNT] / j->views;
+        }
+    }
+}
+
+/* Phases of the progressive schedule, in iterations of 60,000. */
+static const struct { const char *name; int from, to; } phases[] = {
+    {"diffuse", 0, 5000}, {"+ shadow", 5000, 9000}, {"+ scattering", 9000, 13000}, {"scattering network frozen", 13000, 16000},
+    {"+ specular", 16000, 20000}, {"all", 20000, 60000}
+};
+enum { PHASES = sizeof phases / sizeof *phases };
+
+/* The job as a training job at the model's number of Gaussians, on scaled photographs of its views. */
+static job training_job(const bench *b, job j, ssdgs_trainer *trainer, int phase) {
+    ssdgs_train_options options = ssdgs_train_options_default();
+    ssdgs_photo photos[MAX_PHOTOS];
+    int v;
+    options.densify_every = 1 << 30;
+    options.opacity_reset_every = 0;
+    options.max_gaussians = SSDGS__MAX_GAUSSIANS;
+    for (v = 0; v < j.views; v++) photos[v] = b->scaled[v * b->photo_count / j.views];
+    j.trainer = trainer;
+    if (!trainer) check(j.s->context, ssdgs_trainer_create(j.s->model, photos, j.views, &options, &j.trainer));
+    j.iteration = (phases[phase].from + j.views) / j.views * j.views;
+    return j;
+}
+
+/* ---- quality: images against those of the first options and against the photographs, at the photographs' size ---- */
+
+typedef struct quality { double psnr_exact, max_error, psnr_photo; } quality;
+
+/* Stored values within [0,1] of a photograph's view, left in color. */
+static void render_stored(bench *b, session *s, const ssdgs_photo *photo, const ssdgs_render_options *options) {
+    ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    int i;
+    check(s->context, ssdgs_render_ex(s->model, &photo->camera, &photo->light, 1, options, &image, NULL));
+    for (i = 0; i < 3 * photo->camera.width * photo->camera.height; i++) {
+        ssdgs_real x = b->color[i] > 0 ? b->color[i] : 0;
+        if (s->model->settings.transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(x);
+        b->color[i] = x < 1 ? x : 1;
+    }
+}
+
+static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count, quality *out) {
+    static const ssdgs_real black[3] = {0, 0, 0};
+    const int views = s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
+    ssdgs_real *exact[MAX_PHOTOS], *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
+    int o, v;
+    memset(out, 0, (size_t)count * sizeof *out);
+    for (o = 0; o < count; o++) {
+        double squares = 0, values = 0, error;
+        for (v = 0; v < views; v++) {
+            const ssdgs_photo *photo = b->photos + v * b->photo_count / views;
+            const size_t n = (size_t)photo->camera.width * (size_t)photo->camera.height;
+            double photo_squares = 0;
+            size_t i;
+            render_stored(b, s, photo, options + o);
+            if (!o) exact[v] = (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
+            ssdgs__photo_planes(photo, black, s->model->settings.transfer, target);
+            for (i = 0; i < 3 * n; i++) {
+                error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
+                photo_squares += error * error;
+                error = fabs((double)(b->color[i] - exact[v][i]));
+                squares += error * error;
+                out[o].max_error = error > out[o].max_error ? error : out[o].max_error;
+            }
+            values += 3 * (double)n;
+            out[o].psnr_photo += ssdgs__psnr(photo_squares / (3 * (double)n)) / views;
+        }
+        out[o].psnr_exact = ssdgs__psnr(squares / values);
+    }
+    for (v = 0; v < views; v++) free(exact[v]);
+    free(target);
+}
+
+/* ---- what is measured ---- */
+
+static const char *const presets[] = {"exact", "default", "fast"};
+enum { EXACT, DEFAULT, FAST, PRESETS };
+
+static ssdgs_render_options preset(int i) {
+    return i == EXACT ? ssdgs_render_options_exact() : i == DEFAULT ? ssdgs_render_options_default()
+                                                                    : ssdgs_render_options_fast();
+}
+
+static const char *name_of(char text[48], const session *s, const char *what) { /* NULL = nothing more to say */
+    snprintf(text, 48, "%s %d thread%s%s%.20s", ssdgs_isa_string(ssdgs_context_isa(s->context)), s->context->threads,
+             s->context->threads > 1 ? "s" : "", what ? " " : "", what ? what : "");
+    return text;
+}
+
+/* Peaks of the chip and its memory. */
+static void measure_machine(bench *b) {
+    table *t = new_table(b, "machine", "fma_gflops bf16_gflops read_gb_per_s");
+    const size_t words = (size_t)1 << (b->quick ? 25 : 27); /* 256 MiB, 1 GiB: far beyond the caches */
+    uint64_t *memory = (uint64_t *)make(words, sizeof *memory);
+    char name[48];
+    int i, n;
+    memset(memory, 1, words * sizeof *memory); /* else all its pages are one of zeros */
+    for (i = 0; i < b->isa_count * b->thread_count; i++) {
+        const int isa = b->isas[i / b->thread_count];
+        kernel kernels[3];
+        session s;
+        open_session(b, &s, isa, b->threads[i % b->thread_count], 0, NULL);
+        kernels[0] = kernels[2] = make_kernel(PEAK_RATE, s.context, isa, NULL);
+        kernels[1] = make_kernel(PEAK_RATE, s.context, s.context->bf16 ? BF16 : isa, NULL);
+        kernels[2].work = READ;
+        kernels[2].words = memory;
+        kernels[2].share = words / (size_t)s.context->threads / 8 * 8;
+        kernels[2].operations = 8.0 * (double)kernels[2].share * s.context->threads;
+        n = isa == b->best_isa ? 3 : 2;
+        time_kernels(kernels, n, b->quick ? 0.1 : 0.5);
+        add_row(t, name_of(name, &s, NULL), kernels[0].best, s.context->bf16 ? kernels[1].best : none,
+                n > 2 ? kernels[2].best : none);
+        close_session(&s);
+    }
+    n = t->row_count - b->thread_count; /* no program can gain more from a second thread; near 1 the machine was busy */
+    add_facts(b, "threads2_speedup_peak", b->thread_count > 1 ? t->rows[n + 1].value[0] / t->rows[n].value[0] : none);
+    free(memory);
+    print_table(t);
+}
+
+/* The scattering network's layers on one thread, against that thread's peak in the same seconds. */
+static void measure_layers(bench *b) {
+    table *t = new_table(b, "layers", "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak "
+                                      "bf16_peak bf16_gflops bf16_of_peak");
+    int i, bf16;
+    for (i = 0; i < b->isa_count; i++) {
+        kernel k[5];
+        const double *v;
+        session s;
+        network n;
+        open_session(b, &s, b->isas[i], 1, 0, NULL);
+        bf16 = s.context->bf16;
+        n = make_network(s.model);
+        k[0] = make_kernel(PEAK_RATE, s.context, b->isas[i], NULL);
+        k[1] = make_kernel(FORWARD, s.context, b->isas[i], &n);
+        k[2] = make_kernel(BACKWARD, s.context, b->isas[i], &n);
+        k[3] = make_kernel(PEAK_RATE, s.context, bf16 ? BF16 : b->isas[i], NULL);
+        k[4] = make_kernel(FORWARD_BF16, s.context, b->isas[i], &n);
+        time_kernels(k, bf16 ? 5 : 3, b->quick ? 0.5 : 2);
+        v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best, k[1].best / k[0].best,
+                    k[2].best / k[0].best, 3 / (1 / k[1].best + 2 / k[2].best) / k[0].best, bf16 ? k[3].best : none,
+                    bf16 ? k[4].best : none, bf16 ? k[4].best / k[3].best : none);
+        if (b->isas[i] == b->best_isa) /* of one thread, all of them */
+            add_facts(b, "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
+                      "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak", v[0], v[5], v[3], v[4], v[8]);
+        free(n.output_gradient);
+        free(n.gradient);
+        free(n.packed);
+        close_session(&s);
+    }
+    print_table(t);
+}
+
+static void measure_stages(bench *b) {
+    table *t[2];
+    char name[48];
+    int i, k, stage;
+    t[0] = new_table(b, "stages_frame", "project sort bin walk shade composite other total");
+    t[1] = new_table(b, "stages_training",
+                     "project sort bin walk shade composite composite_back shade_back project_back other total");
+    for (i = 0; i < b->isa_count * b->thread_count; i++) {
+        session s;
+        job jobs[2];
+        open_session(b, &s, b->isas[i / b->thread_count], b->threads[i % b->thread_count], 1, NULL);
+        jobs[0] = make_job(b, &s, preset(DEFAULT));
+        jobs[0].views = jobs[0].views > 4 ? 4 : jobs[0].views;
+        jobs[1] = training_job(b, jobs[0], NULL, PHASES - 1);
+        for (k = 0; k < 2; k++) { /* the frame first: steps change the model */
+            const int stages = t[k]->column_count - 2;
+            double *v = new_row(t[k], name_of(name, &s, NULL));
+            time_jobs(b, jobs + k, 1, 1);
+            v[stages] = v[stages + 1] = jobs[k].ms;
+            for (stage = 0; stage < stages; stage++) v[stages] -= v[stage] = jobs[k].stage_ms[stage];
+        }
+        ssdgs_trainer_destroy(jobs[1].trainer);
+        close_session(&s);
+    }
+    print_table(t[0]);
+    print_table(t[1]);
+}
+
+static void measure_frames(bench *b) {
+    table *t = new_table(b, "frames", "ms frames_per_s psnr_exact max_error psnr_photo loss_db shaded_fraction");
+    char name[48];
+    int i, n, p;
+    for (i = 0; i < b->isa_count; i++) {
+        ssdgs_render_options options[PRESETS];
+        session s[3];
+        job jobs[3 * PRESETS], *all = jobs + PRESETS * (b->thread_count - 1);
+        quality q[PRESETS];
+        for (n = 0; n < b->thread_count; n++) {
+            open_session(b, s + n, b->isas[i], b->threads[n], 0, NULL);
+            for (p = 0; p < PRESETS; p++) jobs[n * PRESETS + p] = make_job(b, s + n, options[p] = preset(p));
+        }
+        measure_quality(b, s + b->thread_count - 1, options, PRESETS, q);
+        time_jobs(b, jobs, b->thread_count * PRESETS, b->isas[i] == b->best_isa ? 6 : 2);
+        for (n = 0; n < b->thread_count * PRESETS; n++) {
+            p = n % PRESETS;
+            add_row(t, name_of(name, jobs[n].s, presets[p]), jobs[n].ms, 1e3 / jobs[n].ms, q[p].psnr_exact, q[p].max_error,
+                    q[p].psnr_photo, q[EXACT].psnr_photo - q[p].psnr_photo, jobs[n].shaded);
+        }
+        for (n = 0; n < b->thread_count; n++) close_session(s + n);
+        if (b->isas[i] != b->best_isa) continue;
+        add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps", 1e3 / all[EXACT].ms, 1e3 / all[DEFAULT].ms,
+                  1e3 / all[FAST].ms);
+        add_facts(b, "default_psnr_loss_db fast_psnr_loss_db shaded_fraction threads2_speedup_render",
+                  q[EXACT].psnr_photo - q[DEFAULT].psnr_photo, q[EXACT].psnr_photo - q[FAST].psnr_photo, all[DEFAULT].shaded,
+                  b->thread_count > 1 ? jobs[DEFAULT].ms / jobs[PRESETS + DEFAULT].ms : none);
+    }
+    print_table(t);
+}
+
+/* One shortcut at a time on top of exact, from weak to strong. */
+static const struct { const char *name; double values[6]; } knobs[] = {
+    {"max_error", {0.001, 0.004, 0.01, 0.02, 0.05}}, {"light_detail", {0.75, 0.5, 0.35, 0.25}}, {"bf16", {1}},
+    {"stop", {1e-3, 4e-3, 0.01, 0.03}}, {"alpha_threshold", {0.006, 0.01, 0.02, 0.04}}
+};
+enum { KNOBS = sizeof knobs / sizeof *knobs };
+
+static void measure_sweep(bench *b) {
+    table *t = new_table(b, "sweep", "ms max_error psnr_exact loss_db shaded_fraction");
+    ssdgs_render_options options[MAX_JOBS];
+    char names[MAX_JOBS][48];
+    job jobs[MAX_JOBS];
+    quality q[MAX_JOBS];
+    session s;
+    int k, i, count;
+    for (count = 0; count < PRESETS; count++) {
+        options[count] = preset(count);
+        snprintf(names[count], sizeof *names, "%s", presets[count]);
+    }
+    for (k = 0; k < KNOBS; k++)
+        for (i = 0; knobs[k].values[i] > 0; i++, count++) {
+            ssdgs_render_options *o = options + count;
+            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, NULL, &o->stop, &o->alpha_threshold};
+            *o = preset(EXACT);
+            if (fields[k]) *fields[k] = (ssdgs_real)knobs[k].values[i];
+            else o->bf16 = 1;
+            snprintf(names[count], sizeof *names, "%s %g", knobs[k].name, knobs[k].values[i]);
+        }
+    open_session(b, &s, b->best_isa, 0, 0, NULL);
+    for (i = 0; i < count; i++) {
+        jobs[i] = make_job(b, &s, options[i]);
+        jobs[i].views = jobs[i].views > 4 ? 4 : jobs[i].views;
+    }
+    measure_quality(b, &s, options, count, q);
+    time_jobs(b, jobs, count, 12);
+    for (i = 0; i < count; i++)
+        add_row(t, names[i], jobs[i].ms, q[i].max_error, q[i].psnr_exact, q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
+    close_session(&s);
+    print_table(t);
+}
+
+/* What stays as it was, or what a scene does without, should cost nothing. */
+static void measure_skipping(bench *b) {
+    static const struct { const char *name; int skipped_terms, fixed_light, fixed_camera, turned_away; } kinds[] = {
+        {"everything moves, all terms", 0, 0, 0, 0}, {"light fixed", 0, 1, 0, 0}, {"camera fixed", 0, 0, 1, 0},
+        {"light and camera fixed", 0, 1, 1, 0}, {"out of sight", 0, 0, 0, 1},
+        {"opaque: no scattering", SSDGS_SCATTERING_TERM, 0, 0, 0}, {"no shadow", SSDGS_SHADOW_TERM, 0, 0, 0},
+        {"matt: no specular", SSDGS_SPECULAR_TERM, 0, 0, 0},
+        {"no scattering, no specular", SSDGS_SCATTERING_TERM | SSDGS_SPECULAR_TERM, 0, 0, 0},
+        {"diffuse alone", SSDGS_ALL_TERMS & ~SSDGS_DIFFUSE_TERM, 0, 0, 0}
+    };
+    enum { KINDS = sizeof kinds / sizeof *kinds };
+    table *t = new_table(b, "skipping", "exact_ms default_ms fast_ms exact_of_all default_of_all fast_of_all");
+    job jobs[PRESETS * KINDS];
+    session s;
+    int i, p;
+    open_session(b, &s, b->best_isa, 0, 0, NULL);
+    for (i = 0; i < PRESETS * KINDS; i++) {
+        jobs[i] = make_job(b, &s, preset(i % PRESETS));
+        jobs[i].options.terms &= ~kinds[i / PRESETS].skipped_terms;
+        jobs[i].fixed_light = kinds[i / PRESETS].fixed_light;
+        jobs[i].fixed_camera = kinds[i / PRESETS].fixed_camera;
+        jobs[i].turned_away = kinds[i / PRESETS].turned_away;
+    }
+    time_jobs(b, jobs, PRESETS * KINDS, 8);
+    for (i = 0; i < KINDS; i++) {
+        double *v = new_row(t, kinds[i].name);
+        for (p = 0; p < PRESETS; p++) {
+            v[p] = jobs[PRESETS * i + p].ms;
+            v[PRESETS + p] = v[p] / jobs[p].ms;
+        }
+    }
+    close_session(&s);
+    print_table(t);
+}
+
+/* The session's model becomes one of `count` Gaussians on the same surfaces: copies, the smaller the more they are, each moved
+   within its original. */
+static void replicate(session *s, int count) {
+    ssdgs_model *from = s->model, *to;
+    const double times = (double)count / from->count, shrink = 0.5 * log(times);
+    size_t i;
+    int c, k;
+    check(s->context, ssdgs_model_create(s->context, &from->settings, count, &to));
+    memcpy(to->globals, from->globals, from->global_count * sizeof *to->globals);
+    for (i = 0; i < (size_t)count; i++) {
+        ssdgs_real g[SSDGS_CHANNELS], q[4], axes[9];
+        for (c = 0; c < SSDGS_CHANNELS; c++) g[c] = from->gaussians[(size_t)c * from->capacity + (size_t)((double)i / times)];
+        ssdgs__rotation_scalar(g + SSDGS_ROTATION, q, axes);
+        for (k = 0; k < 3; k++) {
+            const double shift = exp((double)g[SSDGS_LOG_SCALE + k]) * (2 * ssdgs__uniform(3, 3 * i + (size_t)k) - 1);
+            for (c = 0; c < 3; c++) g[SSDGS_POSITION + c] += (ssdgs_real)shift * axes[3 * c + k];
+            g[SSDGS_LOG_SCALE + k] -= (ssdgs_real)shrink;
+        }
+        for (c = 0; c < SSDGS_CHANNELS; c++) to->gaussians[(size_t)c * to->capacity + i] = g[c];
+    }
+    ssdgs_model_destroy(from);
+    s->model = to;
+}
+
+/* An allocator that counts; a block's size stands before it. */
+typedef struct meter { size_t live, peak; int allocations; } meter;
+
+static void *meter_allocate(void *user, size_t bytes) {
+    meter *m = (meter *)user;
+    unsigned char *memory = (unsigned char *)malloc(bytes + 64);
+    if (!memory) return NULL;
+    memcpy(memory, &bytes, sizeof bytes);
+    m->allocations++;
+    m->live += bytes;
+    m->peak = m->live > m->peak ? m->live : m->peak;
+    return memory + 64;
+}
+
+static void meter_release(void *user, void *memory) {
+    unsigned char *start = (unsigned char *)memory - 64;
+    size_t bytes;
+    memcpy(&bytes, start, sizeof bytes);
+    ((meter *)user)->live -= bytes;
+    free(start);
+}
+
+/* The session holds a model of so many Gaussians, and no more. */
+static void open_metered(const bench *b, session *s, meter *m, int gaussians) {
+    ssdgs_allocator allocator = {meter_allocate, meter_release, m};
+    memset(m, 0, sizeof *m);
+    open_session(b, s, b->best_isa, 0, 0, &allocator);
+    if (gaussians) replicate(s, gaussians);
+    m->peak = m->live;
+}
+
+/* Slope of the logarithms of column y over those of column x, by least squares. */
+static double exponent(const table *t, int first, int count, int x, int y) {
+    double sx = 0, sy = 0, sxx = 0, sxy = 0;
+    int i;
+    for (i = first; i < first + count; i++) {
+        const double u = log(t->rows[i].value[x]), v = log(t->rows[i].value[y]);
+        sx += u, sy += v, sxx += u * u, sxy += u * v;
+    }
+    return (count * sxy - sx * sy) / (count * sxx - sx * sx);
+}
+
+static void measure_scaling(bench *b) {
+    static const int sizes[] = {10000, 30000, 100000, 300000, 1000000, 3000000, 300000},
+        screens[][2] = {{800, 800}, {128, 128}, {256, 256}, {512, 512}, {1024, 1024}, {1280, 720}, {1920, 1080}};
+    enum { SIZES = 6, SCREENS = 6, MILLION = 4 };
+    table *t = new_table(b, "scaling", "gaussians pixels ms frames_per_s mib_held second_frame_allocations");
+    const int most = b->quick ? 3 : b->prefix[0] ? 5 : SIZES; /* the published network takes long */
+    const row *last = t->rows + (most - 1 < MILLION ? most - 1 : MILLION);
+    int i, k;
+    for (i = 0; i <= SIZES + SCREENS; i++) { /* sizes; both; screens at the model's own size */
+        char name[48];
+        session s;
+        meter m;
+        job j;
+        if ((i >= most && i < SIZES) || (i == SIZES && b->quick)) continue;
+        open_metered(b, &s, &m, i <= SIZES ? sizes[i] : 0);
+        j = make_job(b, &s, preset(DEFAULT));
+        j.views = 2;
+        j.width = screens[i < SIZES ? 2 : i - SIZES][0];
+        j.height = screens[i < SIZES ? 2 : i - SIZES][1];
+        for (k = 0; k < 2; k++) { /* the same frame twice; a model that changed in between, so that all is done again */
+            const int before = m.allocations;
+            ssdgs_model_get(s.model);
+            run(b, &j, 0, NULL);
+            m.allocations -= k ? before : 0;
+        }
+        snprintf(name, sizeof name, "%d at %dx%d", s.model->count, j.width, j.height);
+        k = m.allocations;
+        time_jobs(b, &j, 1, 1);
+        add_row(t, name, (double)s.model->count, (double)j.width * j.height, j.ms, 1e3 / j.ms, (double)m.peak / 1048576,
+                (double)k);
+        close_session(&s);
+    }
+    add_facts(b, "exponent_gaussians exponent_pixels render800_300k_default_fps second_frame_gaussians second_frame_allocations",
+              exponent(t, 0, most, 0, 2), exponent(t, t->row_count - SCREENS, SCREENS, 1, 2),
+              b->quick ? none : t->rows[most].value[3], last->value[0], last->value[5]);
+    add_facts(b, "bytes_per_gaussian_render",
+              1048576 * (last[0].value[4] - last[-1].value[4]) / (last[0].value[0] - last[-1].value[0]));
+    print_table(t);
+}
+
+/* Density control, every hundredth iteration, is left out: the number of Gaussians stays the model's. */
+static void measure_training(bench *b) {
+    table *t = new_table(b, "training", "iterations ms_1_thread ms_all_threads hours_all_threads");
+    const int last = b->thread_count - 1, sizes[2] = {20000, b->quick ? 40000 : 60000};
+    double hours[2] = {0, 0}, held[2];
+    session s[3];
+    job jobs[3 * PHASES], *all = jobs + PHASES * last;
+    meter m;
+    int n, p;
+    for (n = 0; n <= last; n++) {
+        open_session(b, s + n, b->best_isa, b->threads[n], 0, NULL);
+        for (p = 0; p < PHASES; p++)
+            jobs[n * PHASES + p] = training_job(b, make_job(b, s + n, preset(EXACT)), p ? jobs[n * PHASES].trainer : NULL, p);
+    }
+    time_jobs(b, jobs, b->thread_count * PHASES, 10);
+    for (p = 0; p < PHASES; p++) {
+        const double iterations = phases[p].to - phases[p].from;
+        add_row(t, phases[p].name, iterations, jobs[p].ms, all[p].ms, iterations * all[p].ms / 3.6e6);
+        hours[0] += iterations * jobs[p].ms / 3.6e6;
+        hours[1] += iterations * all[p].ms / 3.6e6;
+    }
+    add_row(t, "whole run", 6e4, hours[0] * 60, hours[1] * 60, hours[1]);
+    p = PHASES - 1;
+    add_facts(b, "train256_ms_per_iteration train256_ms_per_iteration_mean train_60k_hours_projected threads2_speedup_train",
+              all[p].ms /* of the last phase, two thirds of a run */, hours[1] * 60, hours[1],
+              last ? jobs[p].ms / jobs[PHASES + p].ms : none);
+    for (n = 0; n <= last; n++) {
+        ssdgs_trainer_destroy(jobs[n * PHASES].trainer);
+        close_session(s + n);
+    }
+    for (n = 0; n < 2; n++) {
+        job j;
+        open_metered(b, s, &m, sizes[n]);
+        j = training_job(b, make_job(b, s, preset(EXACT)), NULL, p);
+        run(b, &j, 0, NULL);
+        held[n] = (double)m.peak;
+        ssdgs_trainer_destroy(j.trainer);
+        close_session(s);
+    }
+    add_facts(b, "bytes_per_gaussian_train", (held[1] - held[0]) / (sizes[1] - sizes[0]));
+    print_table(t);
+}
+
+static void measure_model(bench *b, const char *prefix, const char *path) {
+    session s;
+    b->prefix = prefix;
+    b->model = path;
+    open_session(b, &s, b->best_isa, 1, 0, NULL);
+    printf("\n%s: %d Gaussians, scattering network of %d layers, %d wide\n", path, s.model->count,
+           s.model->settings.scattering_layers, s.model->settings.scattering_width);
+    add_facts(b, "gaussians", (double)s.model->count);
+    close_session(&s);
+    measure_layers(b);
+    measure_stages(b);
+    measure_frames(b);
+    measure_sweep(b);
+    measure_skipping(b);
+    measure_scaling(b);
+    measure_training(b);
+}
+
+/* ---- the chart: each shortcut's time against its error, from exact on ---- */
+
+static const struct { const char *ink, *mark; } looks[KNOBS] = { /* inks that read on white and on black */
+    {"#d1495b", "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"}, {"#3d85c6", "m-3.5 -3.5h7v7h-7z"}, {"#8e6bbf", "m0 -5l5 5l-5 5l-5 -5z"},
+    {"#2a9d6f", "m0 -5l5 9h-10z"}, {"#d98a1f", "m0 5l5 -9h-10z"}
+};
+enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };
+static const double least_error = 1e-4; /* the axis starts here: images that are equal, or nearly, stand on it */
+
+typedef struct chart { FILE *file; double left, fastest, slowest; } chart;
+
+static double chart_x(const chart *c, double ms) { return c->left + WIDE * log(ms / c->fastest) / log(c->slowest / c->fastest); }
+
+static double chart_y(double error) {
+    return TOP + HIGH * log(error > least_error ? error : least_error) / log(least_error);
+}
+
+static void draw_axes(const chart *c, const char *title) {
+    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}, levels[] = {1e-4, 1e-3, 1.0 / 255, 1e-2, 1e-1, 1};
+    const double bottom = TOP + HIGH;
+    double decade;
+    int i;
+    fprintf(c->file, "<text x=\"%.0f\" y=\"%d\" class=\"b\">%s</text>\n<g class=\"g\">\n", c->left, TOP - 12, title);
+    for (i = 0; i < 6; i++)
+        fprintf(c->file, "<path d=\"M%.1f %.1fh%d\"%s/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s%g</text>\n", c->left,
+                chart_y(levels[i]), WIDE, i == 2 ? " stroke-dasharray=\"4 4\"" : "", c->left - 6, chart_y(levels[i]) + 4,
+                i == 2 ? "1/" : "", i == 2 ? 255 : levels[i]);
+    for (decade = 1e-3; decade < c->slowest; decade *= 10)
+        for (i = 0; i < 10; i++) {
+            const double x = chart_x(c, decade * steps[i]);
+            if (x >= c->left && x <= c->left + WIDE)
+                fprintf(c->file, "<path d=\"M%.1f %.1fv-5\"/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%g</text>\n", x,
+                        bottom, x, bottom + 16, decade * steps[i]);
+        }
+    fprintf(c->file, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">milliseconds a frame</text></g>\n", c->left + WIDE / 2,
+            bottom + 34);
+}
+
+static void draw_sweep(chart *c, const table *t, const char *title) {
+    const double *v = t->rows[EXACT].value, x0 = v[0], y0 = v[1];
+    int r, k, i;
+    c->fastest = c->slowest = x0;
+    for (r = 0; r < t->row_count; r++) {
+        v = t->rows[r].value;
+        c->fastest = v[0] < c->fastest ? v[0] : c->fastest;
+        c->slowest = v[0] > c->slowest ? v[0] : c->slowest;
+    }
+    c->fastest /= 1.15;
+    c->slowest *= 1.15;
+    draw_axes(c, title);
+    for (r = PRESETS, k = 0; k < KNOBS; k++) {
+        fprintf(c->file, "<g fill=\"%s\"><path fill=\"none\" stroke=\"%s\" d=\"M%.1f %.1f", looks[k].ink, looks[k].ink,
+                chart_x(c, x0), chart_y(y0));
+        for (i = 0; knobs[k].values[i] > 0; i++) {
+            v = t->rows[r + i].value;
+            fprintf(c->file, "L%.1f %.1f", chart_x(c, v[0]), chart_y(v[1]));
+        }
+        fprintf(c->file, "\"/>");
+        for (i = 0; knobs[k].values[i] > 0; i++, r++) {
+            v = t->rows[r].value;
+            fprintf(c->file, "<path d=\"M%.1f %.1f%s\"/><text x=\"%.1f\" y=\"%.1f\" class=\"s\">%g</text>", chart_x(c, v[0]),
+                    chart_y(v[1]), looks[k].mark, chart_x(c, v[0]) + 7, chart_y(v[1]) + 3, knobs[k].values[i]);
+        }
+        fprintf(c->file, "</g>\n");
+    }
+    for (r = 0; r < PRESETS; r++) {
+        const double x = chart_x(c, t->rows[r].value[0]), y = chart_y(t->rows[r].value[1]);
+        fprintf(c->file, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"7\" class=\"p\"/><text x=\"%.1f\" y=\"%.1f\" class=\"b\" "
+                "text-anchor=\"%s\">%s</text>\n", x, y, r ? x - 12 : x, r ? y + 4 : y - 12, r ? "end" : "middle", presets[r]);
+    }
+}
+
+static void write_svg(const bench *b, FILE *file) {
+    chart c;
+    int i;
+    c.file = file;
+    c.left = LEFT;
+    fprintf(file, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"12\" "
+            "fill=\"#808080\">\n<style>.g path{stroke:#888;stroke-opacity:.4;fill:none}.b{font-weight:bold}.s{font-size:9px}"
+            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">largest error of any pixel against "
+            "exact; 1 is white</text>\n", 2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
+    for (i = 0; i < KNOBS; i++)
+        fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i, looks[i].mark,
+                looks[i].ink, 410 + 104 * i, knobs[i].name);
+    for (i = 0; i < b->table_count; i++) {
+        const char *key = b->tables[i].key;
+        if (strlen(key) < 5 || strcmp(key + strlen(key) - 5, "sweep")) continue;
+        draw_sweep(&c, b->tables + i, key[0] == 's' ? "default model" : "published model");
+        c.left += WIDE + LEFT;
+    }
+    fprintf(file, "</svg>\n");
+}
+
+/* ---- the program ---- */
+
+/* Calls write on a file beside the program. */
+static void write_beside(const bench *b, const char *program, const char *ending, void (*write)(const bench *, FILE *)) {
+    const size_t length = strlen(program), stem = length > 4 && !strcmp(program + length - 4, ".exe") ? length - 4 : length;
+    char *path = (char *)make(length + 16, 1);
+    FILE *file;
+    snprintf(path, length + 16, "%.*s%s", (int)stem, program, ending);
+    file = fopen(path, "wb");
+    if (!file) die(path, "cannot be written");
+    write(b, file);
+    if (ferror(file) | fclose(file)) die(path, "cannot be written");
+    printf("wrote %s\n", path);
+    free(path);
+}
+
+/* Its nearest pixels in SIDE x SIDE: enough to take times from. */
+static void scale_photo(const ssdgs_photo *from, ssdgs_photo *to) {
+    const size_t pixel = from->format == SSDGS_PIXELS_RGBA8 ? 4 : 8;
+    const int w = from->camera.width, h = from->camera.height;
+    unsigned char *pixels = (unsigned char *)make(SIDE * SIDE, pixel);
+    int x, y;
+    for (y = 0; y < SIDE; y++)
+        for (x = 0; x < SIDE; x++) {
+            int u = (int)floor((x + 0.5 - SIDE / 2) * h / SIDE + 0.5 * w), v = (int)((y + 0.5) * h / SIDE);
+            u = u < 0 ? 0 : u < w ? u : w - 1;
+            memcpy(pixels + pixel * (size_t)(y * SIDE + x),
+                   (const unsigned char *)from->pixels + pixel * ((size_t)v * (size_t)w + (size_t)u), pixel);
+        }
+    *to = *from;
+    to->camera = scaled_camera(&from->camera, SIDE, SIDE);
+    to->pixels = pixels;
+}
+
+/* The test split, and how much of it is used. */
+static void load_photos(bench *b) {
+    char error[512] = "";
+    ssdgs_photo *all;
+    int i;
+    if (olat_load(b->dataset, "transforms_test.json", 0, &b->data, error)) die(b->dataset, error);
+    all = olat_photos(&b->data);
+    if (!all || b->data.count < 2) die(b->dataset, "needs two test photographs");
+    b->photo_count = b->quick ? 4 : MAX_PHOTOS;
+    if (b->photo_count > b->data.count) b->photo_count = b->data.count;
+    b->views = b->quick ? 2 : b->photo_count < 8 ? b->photo_count : 8;
+    for (i = 0; i < b->photo_count; i++) {
+        b->photos[i] = all[i * b->data.count / b->photo_count];
+        if (b->photos[i].camera.width * b->photos[i].camera.height > MAX_PIXELS) die(b->dataset, "photographs over 1920x1080");
+        scale_photo(b->photos + i, b->scaled + i);
+    }
+    free(all);
+}
+
+/* The processor's name, the instruction sets and numbers of threads to try. */
+static void look_at_machine(bench *b) {
+    FILE *file = fopen("/proc/cpuinfo", "rb");
+    const char *name = getenv("PROCESSOR_IDENTIFIER"); /* Windows */
+    char line[256];
+    ssdgs_context *context;
+    int i, all;
+    snprintf(b->cpu, sizeof b->cpu, "%.100s", name ? name : "unknown");
+    while (file && fgets(line, sizeof line, file))
+        if (!strncmp(line, "model name", 10)) snprintf(b->cpu, sizeof b->cpu, "%.100s", line + strcspn(line, ":") + 2);
+    if (file) fclose(file);
+    b->cpu[strcspn(b->cpu, "\r\n\"\\")] = 0;
+    check(NULL, ssdgs_context_create(NULL, &context));
+    b->best_isa = (int)ssdgs_context_isa(context);
+    all = ssdgs_context_threads(context);
+    ssdgs_context_destroy(context);
+    for (i = SSDGS_ISA_SCALAR; i < SSDGS_ISA_COUNT; i++)
+        if (ssdgs__table(i) && (!b->quick || i == b->best_isa)) b->isas[b->isa_count++] = i;
+    for (i = 1; i <= 2 && i <= all; i++) b->threads[b->thread_count++] = i;
+    if (all > 2) b->threads[b->thread_count++] = all;
+}
+
+int main(int argc, char **argv) {
+    static bench b;
+    const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
+    char paths[2][1024];
+    int i, files = 0;
+    double start = now();
+    for (i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--quick")) b.quick = 1;
+        else if (!strcmp(argv[i], "--models") && i + 1 < argc) folder = argv[++i];
+        else if (argv[i][0] != '-' && files < 3) given[files++] = argv[i];
+        else files = 4;
+    }
+    if (files != 0 && files != 3) {
+        fprintf(stderr, "usage: bench [--quick] [--models DIR] [DATASET default_model.ply published_model.ply]\n");
+        return 2;
+    }
+    for (i = 0; i < 2; i++)
+        snprintf(paths[i], sizeof paths[i], "%s%s", given[0] ? given[1 + i] : folder,
+                 given[0] ? "" : i ? "/waxcow_published.ply" : "/waxcow.ply");
+    b.dataset = given[0] ? given[0] : "examples/data/waxcow";
+    b.prefix = "";
+    b.model = paths[0];
+    b.color = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *b.color);
+    load_photos(&b);
+    look_at_machine(&b);
+    printf("%s, %s, %d threads, %s; %s, %d test views\n", b.cpu, ssdgs_isa_string((ssdgs_isa)b.best_isa),
+           b.threads[b.thread_count - 1], COMPILER, b.dataset, b.photo_count);
+    measure_machine(&b);
+    measure_model(&b, "", paths[0]);
+    measure_model(&b, "published_", paths[1]);
+    b.prefix = "";
+    add_facts(&b, "bench_seconds", now() - start);
+    printf("\n");
+    for (i = 0; i < b.fact_count; i++)
+        if (b.facts[i].value > none) printf("%-46s %.7g\n", b.facts[i].key, b.facts[i].value);
+    write_beside(&b, argv[0], ".json", write_json);
+    write_beside(&b, argv[0], ".svg", write_svg);
+    for (i = 0; i < b.photo_count; i++) free((void *)(uintptr_t)b.scaled[i].pixels);
+    free(b.color);
+    olat_free(&b.data);
+    return 0;
+}
