@@ -838,6 +838,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__SUMS SSDGS_SPLAT_SUMS
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
+#define SSDGS__GLANCES 2000  /* about 0.1 ms */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take */
@@ -1205,27 +1206,58 @@ static int ssdgs__cpu_count(void) {
 }
 #endif
 
+/* Looks at a value that another thread changes under the lock, to wait a little while before going to sleep: waking up takes
+   longer than many a stage. Without such a look there is no such wait. */
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
+#define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
+#if SSDGS__X86
+#define SSDGS__PAUSE() __builtin_ia32_pause()
+#else
+#define SSDGS__PAUSE() ((void)0)
+#endif
+#elif defined(_MSC_VER)
+#define SSDGS__GLANCE(p) (*(p))
+#define SSDGS__PUBLISH(p, value) (*(p) = (value))
+#define SSDGS__PAUSE() YieldProcessor()
+#endif
+#ifdef SSDGS__GLANCE
+#define SSDGS__LINGER(pool, condition)                                        \
+    do {                                                                      \
+        int glances_ = (pool)->glances;                                       \
+        ssdgs__unlock(&(pool)->mutex);                                        \
+        while (glances_-- && (condition)) SSDGS__PAUSE();                     \
+        ssdgs__lock(&(pool)->mutex);                                          \
+    } while (0)
+#else
+#define SSDGS__GLANCE(p) (*(p))
+#define SSDGS__PUBLISH(p, value) (*(p) = (value))
+#define SSDGS__LINGER(pool, condition) ((void)0)
+#endif
+
 typedef struct ssdgs__pool {
     ssdgs__mutex mutex;
     ssdgs__condition start, done;
     ssdgs__thread *threads;
-    int thread_count, stop;
-    unsigned generation;
+    int thread_count, stop, glances;
+    volatile unsigned generation;
+    volatile int running;
     ssdgs__task task;
     void *data;
-    int count, next, running;
+    int count, next;
 } ssdgs__pool;
 
 /* Takes tasks until none is left; called with the mutex held. */
 static void ssdgs__pool_work(ssdgs__pool *pool) {
-    pool->running++;
+    SSDGS__PUBLISH(&pool->running, pool->running + 1);
     while (pool->next < pool->count) {
         const int index = pool->next++;
         ssdgs__unlock(&pool->mutex);
         pool->task(pool->data, index);
         ssdgs__lock(&pool->mutex);
     }
-    if (--pool->running == 0) ssdgs__wake(&pool->done);
+    SSDGS__PUBLISH(&pool->running, pool->running - 1);
+    if (pool->running == 0) ssdgs__wake(&pool->done);
 }
 
 SSDGS__THREAD_FUNCTION(ssdgs__pool_thread) {
@@ -1233,6 +1265,7 @@ SSDGS__THREAD_FUNCTION(ssdgs__pool_thread) {
     unsigned seen = 0;
     ssdgs__lock(&pool->mutex);
     for (;;) {
+        if (!pool->stop && pool->generation == seen) SSDGS__LINGER(pool, SSDGS__GLANCE(&pool->generation) == seen);
         while (!pool->stop && pool->generation == seen) ssdgs__wait(&pool->start, &pool->mutex);
         if (pool->stop) break;
         seen = pool->generation;
@@ -1249,9 +1282,10 @@ static void ssdgs__pool_run(void *user, int count, ssdgs__task task, void *data)
     pool->data = data;
     pool->count = count;
     pool->next = 0;
-    pool->generation++;
+    SSDGS__PUBLISH(&pool->generation, pool->generation + 1);
     ssdgs__wake(&pool->start);
     ssdgs__pool_work(pool);
+    if (pool->running) SSDGS__LINGER(pool, SSDGS__GLANCE(&pool->running) != 0);
     while (pool->running) ssdgs__wait(&pool->done, &pool->mutex);
     ssdgs__unlock(&pool->mutex);
 }
@@ -1261,6 +1295,7 @@ static void ssdgs__pool_destroy(const ssdgs_allocator *allocator, ssdgs__pool *p
     if (!pool) return;
     ssdgs__lock(&pool->mutex);
     pool->stop = 1;
+    SSDGS__PUBLISH(&pool->generation, pool->generation + 1); /* no worker lingers on */
     ssdgs__wake(&pool->start);
     ssdgs__unlock(&pool->mutex);
     for (i = 0; i < pool->thread_count; i++) ssdgs__thread_join(pool->threads[i]);
@@ -1287,6 +1322,7 @@ static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int thr
         ssdgs__release_to(allocator, pool);
         return NULL;
     }
+    pool->glances = threads <= ssdgs__cpu_count() ? SSDGS__GLANCES : 0;
     while (pool->thread_count < threads - 1) {
         if (!ssdgs__thread_create(&pool->threads[pool->thread_count], ssdgs__pool_thread, pool)) break;
         pool->thread_count++;
