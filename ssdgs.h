@@ -616,7 +616,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 #define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, unused */
 
 typedef struct ssdgs_tile_entry {
-    uint32_t instance, gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
+    uint32_t gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
 } ssdgs_tile_entry;
 
 enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
@@ -644,13 +644,14 @@ typedef struct ssdgs_splat_view {
     size_t instances;           /* without the gaps */
     uint32_t *first_instance;   /* (visible) per rank in order */
     uint32_t *instance_count;   /* (visible) */
+    uint32_t *instance_place;   /* (instance_room) in tile_list */
     uint32_t *tile_start;       /* (tiles + 1) places in tile_list */
     ssdgs_tile_entry *tile_list; /* (instances) per tile, nearest first */
-    /* SSDGS_STAGE_WALK */
-    uint16_t *tile_seen;        /* (instances) camera: which micro-tiles blend it */
-    unsigned char *instance_seen; /* (instance_room) camera: SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
+    /* SSDGS_STAGE_WALK, camera */
+    uint16_t *tile_seen;        /* (instances) which micro-tiles blend it */
+    unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
-    ssdgs_real *instance_sums;  /* (instance_room, SSDGS_SPLAT_SUMS) */
+    ssdgs_real *tile_sums;      /* (instances, SSDGS_SPLAT_SUMS) */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -1722,7 +1723,7 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, first, count, tile, mask, start, list, tile_seen, seen, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, first, count, tile, mask, place, start, list, seen, needed, sums, histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -2381,7 +2382,7 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
     for (rank = begin; rank < end; rank++)
         for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++) {
             const uint32_t at = place[tile[i]]++;
-            v->tile_list[at].instance = i;
+            v->instance_place[i] = at;
             v->tile_list[at].gaussian = v->order[rank];
             v->tile_list[at].mask = mask[i];
         }
@@ -2409,6 +2410,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
         SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
+        SSDGS__RESERVE(m->place, v->instance_place, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->tile, tile, uint32_t, v->instance_room + 1);
         SSDGS__RESERVE(m->mask, mask, uint16_t, v->instance_room + 1);
         SSDGS__RESERVE(m->list, v->tile_list, ssdgs_tile_entry, v->instance_room + 1);
@@ -2457,8 +2459,9 @@ static void ssdgs__walk_task(void *data, int index) {
     for (; v->kept || index >= v->tiles_x * v->tiles_y; v++) index -= v->kept ? 0 : v->tiles_x * v->tiles_y;
     tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
-    if (v->light < 0) frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index], v->instance_seen);
-    else frame->context->k->walk_light(&tile, v->instance_sums);
+    if (v->light < 0) frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index],
+                                                              v->tile_needed ? v->tile_needed + v->tile_start[index] : NULL);
+    else frame->context->k->walk_light(&tile, v->tile_sums + (size_t)v->tile_start[index] * 4);
 }
 
 typedef struct ssdgs__gather_job {
@@ -2478,7 +2481,7 @@ static void ssdgs__gather_light_task(void *data, int index) {
     for (rank = begin; rank < end; rank++) {
         ssdgs_real *sum = job->sums + (size_t)v->order[rank] * 4;
         for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
-            for (i = 0; i < 4; i++) sum[i] += v->instance_sums[(size_t)instance * 4 + (size_t)i];
+            for (i = 0; i < 4; i++) sum[i] += v->tile_sums[(size_t)v->instance_place[instance] * 4 + (size_t)i];
     }
 }
 
@@ -2503,10 +2506,13 @@ static void ssdgs__gather_camera_task(void *data, int index) {
     uint32_t instance;
     ssdgs__bin_range(v, index, &begin, &end);
     for (rank = begin; rank < end; rank++) {
-        unsigned seen = 0;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
-            seen |= v->instance_seen[instance];
-        job->frame->seen[v->order[rank]] = (unsigned char)(seen & SSDGS_SEEN ? SSDGS_SEEN : seen);
+        unsigned seen = 0, needed = 0;
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
+            const uint32_t place = v->instance_place[instance];
+            seen |= v->tile_seen[place];
+            needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
+        }
+        job->frame->seen[v->order[rank]] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_GLIMPSED : 0);
     }
 }
 
@@ -2521,9 +2527,10 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         if (v->kept) continue;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
-            SSDGS__RESERVE(m->seen, v->instance_seen, unsigned char, v->instance_room + 1);
-            SSDGS__RESERVE(m->tile_seen, v->tile_seen, uint16_t, v->instances + 1);
-        } else SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * 4 + 4);
+            SSDGS__RESERVE(m->seen, v->tile_seen, uint16_t, v->instances + 1);
+            v->tile_needed = NULL;
+            if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
+        } else SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
     }
     SSDGS__RESERVE(frame->memory->light_sums, job.sums, ssdgs_real, n * 4 + 4);
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
@@ -3226,7 +3233,7 @@ static void ssdgs__composite_backward_task(void *data, int index) {
             }
             p[48] = total;
         }
-    frame->context->k->composite_backward(&tile, frame->color, pixels, v->instance_sums);
+    frame->context->k->composite_backward(&tile, frame->color, pixels, v->tile_sums + (size_t)v->tile_start[index] * SSDGS__SUMS);
 }
 
 static void ssdgs__splat_gradient_task(void *data, int index) {
@@ -3241,8 +3248,10 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         const ssdgs_real *r = v->record + 8 * g, a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
         ssdgs_real sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
         memset(sum, 0, sizeof sum);
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
-            for (i = 0; v->instance_seen[instance] && i < SSDGS__SUMS; i++) sum[i] += v->instance_sums[(size_t)instance * SSDGS__SUMS + (size_t)i];
+        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
+            const uint32_t place = v->instance_place[instance];
+            for (i = 0; v->tile_seen[place] && i < SSDGS__SUMS; i++) sum[i] += v->tile_sums[(size_t)place * SSDGS__SUMS + (size_t)i];
+        }
         /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
         d[0] = a * sum[1] + b * sum[2];
         d[1] = b * sum[1] + c * sum[2];
@@ -3260,7 +3269,7 @@ static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
     ssdgs_splat_view *v = frame->views;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
     const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
-    SSDGS__RESERVE(m->sums, v->instance_sums, ssdgs_real, v->instance_room * SSDGS__SUMS + SSDGS__SUMS);
+    SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * SSDGS__SUMS + SSDGS__SUMS);
     memset(frame->splat_gradient, 0, n * SSDGS__SPLAT * sizeof(ssdgs_real));
     memset(frame->color_gradient, 0, n * 4 * sizeof(ssdgs_real));
     memset(frame->view_gradient, 0, sizeof frame->view_gradient);
@@ -6383,27 +6392,26 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
     }
 }
 
-/* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it (blends, in the tile's order), and per
-   instance whether it must be shaded. With max_error > 0 a pixel passes over small weights as long as their sum stays within
+/* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it, and with max_error > 0 whether it must
+   be shaded. A pixel passes over small weights as long as their sum stays within
    max_error, so what no pixel needs adds up to no more than that in any. */
-SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *seen, const int thrifty) {
+SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed, const int thrifty) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     const V budget = VSET(tile->max_error), small = VSET(tile->max_error * SSDGS__SHARE);
     R transmittance[16][16], passed_over[16][16];
     F(batch) batch;
     uint32_t from = 0;
-    int micro, v, n, i;
+    int micro, v;
     unsigned live = 0xFFFF;
     memset(blends, 0, tile->count * sizeof *blends);
+    if (thrifty) memset(needed, 0, tile->count);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
             passed_over[micro][v] = 0;
         }
     while (from < tile->count && live) {
-        unsigned char needed[SSDGS__BATCH];
-        n = F(batch_gather)(&batch, tile, &from);
-        for (i = 0; i < n; i++) needed[i] = 0;
+        F(batch_gather)(&batch, tile, &from);
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = live >> micro & 1u ? batch.entries[micro] : 0;
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], over[SSDGS__NV];
@@ -6416,6 +6424,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
             }
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
+                const uint32_t place = batch.place[index];
                 int any = 0, must = 0;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha;
@@ -6431,8 +6440,8 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                     }
                     t[v] = VFNMA(alpha, t[v], t[v]);
                 }
-                blends[batch.place[index]] = (uint16_t)(blends[batch.place[index]] | (unsigned)(any != 0) << micro);
-                if (thrifty) needed[index] = (unsigned char)(needed[index] | (must != 0));
+                blends[place] = (uint16_t)(blends[place] | (unsigned)(any != 0) << micro);
+                if (thrifty) needed[place] = (unsigned char)(needed[place] | (must != 0));
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
@@ -6441,19 +6450,15 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
             }
             if (!alive) live &= ~(1u << micro);
         }
-        for (i = 0; i < n; i++)
-            seen[tile->list[batch.place[i]].instance] = (unsigned char)(!blends[batch.place[i]] ? 0 : !thrifty || needed[i] ? SSDGS_SEEN
-                                                                                                         : SSDGS_GLIMPSED);
     }
-    for (; from < tile->count; from++) seen[tile->list[from].instance] = 0;
 }
 
-SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *seen) {
-    if (tile->max_error > 0) F(walk_camera_lanes)(tile, blends, seen, 1);
-    else F(walk_camera_lanes)(tile, blends, seen, 0);
+SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed) {
+    if (needed) F(walk_camera_lanes)(tile, blends, needed, 1);
+    else F(walk_camera_lanes)(tile, blends, needed, 0);
 }
 
-/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per instance, sums (n, 4) of rho v, rho, rho x cue, solid
+/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho x cue, solid
    angle x blend weight. An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes
    part in it once its own distance is reached; both at once where nothing lies between. */
 SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
@@ -6483,7 +6488,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             F(batch_add)(&batch, n, tile, (uint32_t)(entry - tile->list), entry->mask);
             batch.record[n][6] = tile->depth[entry->gaussian] - tile->depth_origin;
             if (code & SSDGS__SAMPLE) /* its first appearance */
-                memset(sums + (size_t)entry->instance * 4, 0, 4 * sizeof(R));
+                memset(sums + (size_t)batch.place[n] * 4, 0, 4 * sizeof(R));
             sampled += code & SSDGS__SAMPLE ? 1u : 0u;
             applied += code & SSDGS__APPLY ? 1u : 0u;
             codes[n] = (unsigned char)code;
@@ -6536,7 +6541,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             }
         }
         for (i = 0; i < n; i++)
-            F(sum4)(sums + (size_t)tile->list[batch.place[i]].instance * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
+            F(sum4)(sums + (size_t)batch.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
                     VLOAD(lanes[i][3]));
     }
 }
@@ -6594,7 +6599,7 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
     }
 }
 
-/* pixels: [micro-tile][3 colour gradients, their dot product with the final colour][16 lanes]. Per instance, sums (n, 12) of
+/* pixels: [micro-tile][3 colour gradients, their dot product with the final colour][16 lanes]. Per entry, sums (n, 12) of
    g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w, 0, w dC. Walks front to back again: what lies
    behind an entry is the final colour less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, const R *pixels, R *sums) {
@@ -6612,7 +6617,7 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
         n = F(batch_gather)(&batch, tile, &from);
         for (i = 0; i < n; i++) {
             memcpy(local[i], color + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
-            memset(sums + (size_t)tile->list[batch.place[i]].instance * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
+            memset(sums + (size_t)batch.place[i] * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
         }
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
@@ -6628,7 +6633,7 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
-                R *out = sums + (size_t)tile->list[batch.place[index]].instance * SSDGS__SUMS;
+                R *out = sums + (size_t)batch.place[index] * SSDGS__SUMS;
                 V sum[12];
                 for (i = 0; i < 12; i++) sum[i] = zero;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
