@@ -840,6 +840,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
 #define SSDGS__GLANCES 2000  /* about 0.1 ms */
+#define SSDGS__BAND 16       /* image rows of a task */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take */
@@ -3329,18 +3330,40 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     return SSDGS_OK;
 }
 
+typedef struct ssdgs__rows_job {
+    const ssdgs_frame *frame;
+    const ssdgs_real *planes;
+    ssdgs_real *out, background[3];
+    int channels, stride;
+} ssdgs__rows_job;
+
+static void ssdgs__rows_task(void *data, int index) {
+    const ssdgs__rows_job *job = (const ssdgs__rows_job *)data;
+    const ssdgs_real *transmittance = job->frame->transmittance;
+    const int w = job->frame->camera.width, h = job->frame->camera.height, n = job->channels;
+    const int end = (index + 1) * SSDGS__BAND < h ? (index + 1) * SSDGS__BAND : h;
+    const size_t plane = (size_t)w * (size_t)h;
+    int x, y, c;
+    for (y = index * SSDGS__BAND; y < end; y++)
+        for (c = 0; c < n; c++) {
+            const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w, background = job->background[c];
+            ssdgs_real *out = job->out + (size_t)y * (size_t)job->stride * (size_t)n + c;
+            for (x = 0; x < w; x++) out[x * n] = from[x] + transmittance[(size_t)y * (size_t)w + (size_t)x] * background;
+        }
+}
+
 /* Planes to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. */
 static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride,
                               const ssdgs_real *background, ssdgs_real *out) {
-    const int w = frame->camera.width, h = frame->camera.height;
-    const size_t plane = (size_t)w * (size_t)h;
-    size_t at = 0;
-    int x, y, c;
-    for (y = 0; y < h; y++)
-        for (x = 0; x < w; x++, at++)
-            for (c = 0; c < channels; c++)
-                out[((size_t)y * (size_t)stride + (size_t)x) * (size_t)channels + (size_t)c] =
-                    planes[plane * (size_t)c + at] + (background ? frame->transmittance[at] * background[c] : 0);
+    ssdgs__rows_job job;
+    int c;
+    job.frame = frame;
+    job.planes = planes;
+    job.out = out;
+    job.channels = channels;
+    job.stride = stride;
+    for (c = 0; c < 3; c++) job.background[c] = background ? background[c] : 0;
+    ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task, &job);
 }
 
 SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
@@ -3351,7 +3374,7 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
     ssdgs_real *planes;
     size_t pixels, i;
     double done = 0, all = 0;
-    int stride, c, x, y;
+    int stride, c, x, y, finite = 1;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!model || !camera || !image) return SSDGS_ERR_ARGUMENT;
     context = model->context;
@@ -3399,7 +3422,9 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         }
         stats->network_work = all > 0 ? done / all : 0;
         stats->instances = frame.views[0].instances;
-        for (i = 0; i < (size_t)model->count; i++)
+        for (c = 0; c < SSDGS_DIFFUSE; c++) finite = finite && context->k->finite(model->gaussians + (size_t)c * model->capacity,
+                                                                                  (size_t)model->count);
+        for (i = 0; i < (size_t)model->count && !finite; i++)
             for (c = 0; c < SSDGS_DIFFUSE; c++)
                 if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i])) {
                     stats->rejected++;
@@ -3440,7 +3465,6 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
 
 typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
 
-#define SSDGS__BAND 16 /* rows of a loss task */
 
 typedef struct ssdgs__loss_job {
     const ssdgs__kernels *k;
