@@ -4736,8 +4736,10 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
 
 /* ---- one photograph ---- */
 
-/* Stored values of a photograph on the background, as planes. Alpha is composited in linear light, or as stored. */
-static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], int transfer, ssdgs_real *planes) {
+/* Stored values of pixels begin .. end of a photograph on the background, as planes. Alpha is composited in linear light, or
+   as stored. */
+static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], int transfer, size_t begin, size_t end,
+                                ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     const ssdgs_real unit = photo->format == SSDGS_PIXELS_RGBA8 ? (ssdgs_real)(1.0 / 255) : (ssdgs_real)(1.0 / 65535);
     ssdgs_real linear_background[3];
@@ -4745,7 +4747,7 @@ static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real backg
     int c;
     for (c = 0; c < 3; c++) linear_background[c] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c])
         : background[c];
-    for (i = 0; i < pixels; i++) {
+    for (i = begin; i < end; i++) {
         ssdgs_real v[4];
         for (c = 0; c < 4; c++)
             v[c] = unit * (ssdgs_real)(photo->format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photo->pixels)[4 * i + (size_t)c]
@@ -4819,6 +4821,47 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
     }
 }
 
+#define SSDGS__PIXELS 1024 /* of an exposure task */
+
+typedef struct ssdgs__exposure_job {
+    ssdgs_frame *frame;
+    const ssdgs_photo *photo;
+    const ssdgs_real *background; /* stored values */
+    ssdgs_real *image, *slope, *target; /* planes of stored values; d stored / d linear */
+} ssdgs__exposure_job;
+
+/* The rendered image as stored values, beside the photograph on the same background. */
+static void ssdgs__exposure_task(void *data, int index) {
+    const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
+    const ssdgs_frame *frame = job->frame;
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height, begin = (size_t)index * SSDGS__PIXELS;
+    const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
+    const int srgb = frame->settings.transfer == SSDGS_TRANSFER_SRGB;
+    ssdgs_real image[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    size_t i;
+    int c;
+    ssdgs__photo_planes(job->photo, job->background, frame->settings.transfer, begin, begin + n, job->target);
+    for (c = 0; c < 3; c++) {
+        const size_t at = pixels * (size_t)c + begin;
+        for (i = 0; i < n; i++)
+            image[i] = frame->pixels[at + i] + frame->transmittance[begin + i] * frame->options.background[c];
+        for (i = n; i < n + 16; i++) image[i] = 0;
+        if (srgb) {
+            frame->context->k->srgb_encode(image, slope, image, n);
+            memcpy(job->slope + at, slope, n * sizeof *slope);
+        }
+        memcpy(job->image + at, image, n * sizeof *image);
+    }
+}
+
+static void ssdgs__exposure_backward_task(void *data, int index) {
+    const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
+    const size_t n = 3 * (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
+    const size_t begin = (size_t)index * 3 * SSDGS__PIXELS, end = begin + 3 * SSDGS__PIXELS < n ? begin + 3 * SSDGS__PIXELS : n;
+    size_t i;
+    for (i = begin; i < end; i++) job->frame->pixel_gradient[i] *= job->slope[i];
+}
+
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
                                           const ssdgs_camera *camera,
@@ -4828,29 +4871,26 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const int srgb = model->settings.transfer == SSDGS_TRANSFER_SRGB;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options = ssdgs_render_options_exact();
-    ssdgs_real *image, *slope, *target;
+    const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
+    ssdgs__exposure_job job;
     ssdgs_result result;
-    size_t i;
     int c;
     options.terms = terms;
     for (c = 0; c < 3; c++) options.background[c] = srgb ? ssdgs_srgb_decode(background[c]) : background[c];
     result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    SSDGS__RESERVE(frame->memory->image, image, ssdgs_real, pixels * 6 + 64);
-    SSDGS__RESERVE(frame->memory->target, target, ssdgs_real, pixels * 3);
-    slope = image + pixels * 3 + 32;
-    ssdgs__photo_planes(photo, background, model->settings.transfer, target);
-    for (c = 0; c < 3; c++)
-        for (i = 0; i < pixels; i++)
-            image[pixels * (size_t)c + i] = frame->pixels[pixels * (size_t)c + i] + frame->transmittance[i] *
-                options.background[c];
-    if (srgb) context->k->srgb_encode(image, slope, image, pixels * 3);
-    result = ssdgs__loss(context, &frame->memory->loss, image, target, camera->width, camera->height, dssim,
+    SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 6);
+    SSDGS__RESERVE(frame->memory->target, job.target, ssdgs_real, pixels * 3);
+    job.frame = frame;
+    job.photo = photo;
+    job.background = background;
+    job.slope = job.image + pixels * 3;
+    ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
+    result = ssdgs__loss(context, &frame->memory->loss, job.image, job.target, camera->width, camera->height, dssim,
                          frame->pixel_gradient, values);
     if (result) return result;
-    if (srgb)
-        for (i = 0; i < pixels * 3; i++) frame->pixel_gradient[i] *= slope[i];
+    if (srgb) ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
 
@@ -5523,7 +5563,7 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
         ? ssdgs_srgb_decode(background[c]) : background[c];
     result = ssdgs_render_ex(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
-        ssdgs__photo_planes(photo, background, model->settings.transfer, planes);
+        ssdgs__photo_planes(photo, background, model->settings.transfer, 0, pixels, planes);
         for (i = 0; i < pixels; i++)
             for (c = 0; c < 3; c++) {
                 ssdgs_real *x = rendered + 3 * i + c;

@@ -432,7 +432,7 @@ static void time_jobs(bench *b, job *jobs, int count, double seconds) {
     for (round = 0; round < 2 || (round < 40 && now() < end); round++)
         for (i = 0; i < count; i++) {
             job *j = jobs + i;
-            ssdgs_render_stats stats = {0, 0, 0, 0, 0, 0};
+            ssdgs_render_stats stats;
             run(b, j, j->views - 1, NULL); /* what is fixed must have been so in the frame before */
             for (v = 0; v < j->views; v++) {
                 double took[SSDGS_STAGE_COUNT + 1], start;
@@ -508,7 +508,7 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
             size_t i;
             render_stored(b, s, photo, options + o);
             if (!o) exact[v] = (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
-            ssdgs__photo_planes(photo, black, s->model->settings.transfer, target);
+            ssdgs__photo_planes(photo, black, s->model->settings.transfer, 0, n, target);
             for (i = 0; i < 3 * n; i++) {
                 error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
                 photo_squares += error * error;
