@@ -667,6 +667,7 @@ typedef struct ssdgs_frame {
     int terms;                  /* to render, after settings and options */
     int components;             /* 1: per-Gaussian components are wanted */
     int training;               /* 1: network activations are kept for the backward */
+    int frozen[2];              /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
@@ -843,7 +844,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BAND 16       /* image rows of a task */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__ALPHA_MAX 0.999
-#define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take */
+#define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04       /* Schlick */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
@@ -2023,11 +2024,15 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void) {
 
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
     ssdgs_render_options o = ssdgs_render_options_exact();
+    o.max_error = (ssdgs_real)(1.0 / 16);
     return o;
 }
 
 SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
     ssdgs_render_options o = ssdgs_render_options_default();
+    o.max_error = (ssdgs_real)(1.0 / 8);
+    o.light_detail = (ssdgs_real)0.6;
+    o.alpha_threshold = (ssdgs_real)(1.0 / 200);
     return o;
 }
 
@@ -2745,8 +2750,8 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
     }
 }
 
-/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights. Neurons that are 0 in
-   the whole block have no part in it. */
+/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights unless that is NULL.
+   Neurons that are 0 in the whole block have no part in it. */
 static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
                                            const ssdgs_real *inputs, const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
                                            ssdgs_real *transposed, ssdgs__row_lists *lists, ssdgs_real *dweights) {
@@ -2765,22 +2770,25 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         ssdgs_real *swap = d;
         ssdgs__product p;
         memset(&p, 0, sizeof p);
-        k->transpose(layer_in, sizes[layer], padded, transposed);
-        p.out = dweights + at; /* dW += d x^T; the columns beyond a row add 0 to the next */
-        p.out_stride = in;
-        p.a = d;
-        p.a_row = SSDGS__BLOCK;
-        p.a_k = 1;
-        p.b = transposed;
-        p.b_stride = padded;
-        p.rows = live_out;
-        p.row_list = outs;
-        p.columns = (int)padded;
-        p.depth = SSDGS__BLOCK;
-        p.depth_list = lists->all;
-        p.accumulate = 1;
-        k->dense(&p);
-        k->row_sums(dweights + at + in * out, d, outs, live_out);
+        p.b = d;
+        if (dweights) {
+            k->transpose(layer_in, sizes[layer], padded, transposed);
+            p.out = dweights + at; /* dW += d x^T; the columns beyond a row add 0 to the next */
+            p.out_stride = in;
+            p.a = d;
+            p.a_row = SSDGS__BLOCK;
+            p.a_k = 1;
+            p.b = transposed;
+            p.b_stride = padded;
+            p.rows = live_out;
+            p.row_list = outs;
+            p.columns = (int)padded;
+            p.depth = SSDGS__BLOCK;
+            p.depth_list = lists->all;
+            p.accumulate = 1;
+            k->dense(&p);
+            k->row_sums(dweights + at + in * out, d, outs, live_out);
+        }
         p.out = spare; /* dx = W^T d */
         p.out_stride = p.b_stride = SSDGS__BLOCK;
         p.columns = SSDGS__BLOCK;
@@ -3095,14 +3103,16 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
                                               part + l->scattering_at, dnet, dnet2,
-                                              scratch + l->transposed, lists, slot_gradient + first[SSDGS__SCATTERING_NET]);
+                                              scratch + l->transposed, lists,
+                                              frame->frozen[0] ? NULL : slot_gradient + first[SSDGS__SCATTERING_NET]);
             ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
-                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists, slot_gradient + first[SSDGS__SHADOW_NET]);
+                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists,
+                                              frame->frozen[1] ? NULL : slot_gradient + first[SSDGS__SHADOW_NET]);
             ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
@@ -4865,8 +4875,8 @@ static void ssdgs__exposure_backward_task(void *data, int index) {
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
                                           const ssdgs_camera *camera,
-                                          const ssdgs_light *light, const ssdgs_real background[3], int terms, ssdgs_real dssim,
-                                          ssdgs__loss_values *values) {
+                                          const ssdgs_light *light, const ssdgs_real background[3], int terms,
+                                          const int frozen[2], ssdgs_real dssim, ssdgs__loss_values *values) {
     ssdgs_context *context = model->context;
     const int srgb = model->settings.transfer == SSDGS_TRANSFER_SRGB;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
@@ -4891,6 +4901,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
                          frame->pixel_gradient, values);
     if (result) return result;
     if (srgb) ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
+    memcpy(frame->frozen, frozen, sizeof frame->frozen);
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
 
@@ -5454,7 +5465,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs__correction *correction;
     ssdgs_real background[3];
     double t, gradient[9], until;
-    int learns[SSDGS__GROUPS], terms, photo, j;
+    int learns[SSDGS__GROUPS], frozen[2], terms, photo, j;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
     o = &trainer->options;
@@ -5467,8 +5478,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
                                                          3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, o->dssim,
-                                   &values);
+    for (j = 0; j < 2; j++) frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
+    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, frozen,
+                                   o->dssim, &values);
     if (result) return result;
     result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
@@ -5579,6 +5591,7 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
 
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3],
                                           int iterations) {
+    static const int frozen[2] = {1, 1};
     ssdgs__correction correction;
     ssdgs__loss_values values;
     ssdgs_camera camera;
@@ -5591,8 +5604,8 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     for (i = 0; i < iterations; i++) {
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
-        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, (ssdgs_real)0.2,
-                                       &values);
+        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, frozen,
+                                       (ssdgs_real)0.2, &values);
         if (result) return result;
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
@@ -6743,19 +6756,21 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
    run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
 SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int vectors, const uint16_t *row, int column) {
     V sum[6][SSDGS__TV];
-    const R *a[6];
-    int i, v, k;
+    const R *a[6], *columns = p->b + column;
+    const uint16_t *depth = p->depth_list, *const end = depth + p->depth;
+    const size_t a_k = p->a_k, b_stride = p->b_stride;
+    int i, v;
     SSDGS__UNROLL for (i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
         SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
     }
-    for (k = 0; k < p->depth; k++) {
-        const size_t at = p->depth_list[k];
-        const R *b = p->b + at * p->b_stride + column;
+    for (; depth < end; depth++) {
+        const size_t at = *depth * a_k;
+        const R *b = columns + *depth * b_stride;
         V lanes[SSDGS__TV];
         SSDGS__UNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
         SSDGS__UNROLL for (i = 0; i < rows; i++) {
-            const V weight = VSET(a[i][at * p->a_k]);
+            const V weight = VSET(a[i][at]);
             SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
         }
     }
