@@ -1578,13 +1578,15 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     return s;
 }
 
+#define SSDGS__RANGE_OF(what, s, field, low, high)                                                                        \
+    if (!((s)->field >= (low) && (s)->field <= (high)) || !ssdgs__finite((ssdgs_real)(s)->field))                         \
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field,                  \
+                           (double)(s)->field, (double)(low), (double)(high))
+
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
     if (s->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
             "settings: not made by ssdgs_settings_default()");
-#define SSDGS__RANGE(field, low, high)                                                                                    \
-    if (!(s->field >= (low) && s->field <= (high)) || !ssdgs__finite((ssdgs_real)s->field))                               \
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s = %g is not within %g .. %g", #field, (double)s->field, \
-                           (double)(low), (double)(high))
+#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("settings", s, field, low, high)
     SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
     SSDGS__RANGE(baked, 0, 1);
     SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
@@ -1931,7 +1933,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         size = 2 * radius / exp(b->log_scale);
         map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
     }
-    map = (int)(map * detail + 15) / 16 * 16;
+    map = (int)((map * detail < 8192 ? map * detail : 8192) + 15) / 16 * 16;
     for (face = 0; face < faces; face++) {
         ssdgs_splat_view *v = views + face;
         double direction[3], eye[3], f;
@@ -2036,6 +2038,16 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
     return o;
 }
 
+static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ssdgs_render_options *o) {
+    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+            "render options: not made by ssdgs_render_options_default()");
+    SSDGS__RANGE_OF("render options", o, stop, 0, 1);
+    SSDGS__RANGE_OF("render options", o, alpha_threshold, 0, 1);
+    SSDGS__RANGE_OF("render options", o, max_error, 0, 1);
+    SSDGS__RANGE_OF("render options", o, light_detail, (ssdgs_real)0.01, 8);
+    return SSDGS_OK;
+}
+
 /* Whether the lights' maps serve these terms. */
 static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
     return (terms & SSDGS_SHADOW_TERM) || ((terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
@@ -2089,11 +2101,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     m = context->frame;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
-    if (frame->options.version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
-            "render options: not made by ssdgs_render_options_default()");
-    result = ssdgs__camera_check(context, camera);
-    if (result) return result;
-    result = ssdgs__lights_check(context, lights, light_count);
+    result = ssdgs__render_options_check(context, &frame->options);
+    if (!result) result = ssdgs__camera_check(context, camera);
+    if (!result) result = ssdgs__lights_check(context, lights, light_count);
     if (result) return result;
     for (i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,

@@ -1,0 +1,290 @@
+/* What is skipped changes nothing, or no more than it says: kept frames, dead neurons, frozen networks, max_error, presets. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+enum { SIDE = 96, PIXELS = SIDE * SIDE, COUNT = 3000 };
+static const ssdgs_real target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+static ssdgs_real image[2][PIXELS * 3];
+
+static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
+
+/* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to say. */
+static ssdgs_model *make_model(ssdgs_context *context) {
+    ssdgs_model *model = NULL;
+    ssdgs_model_view v;
+    size_t i, c;
+    if (!CHECK(!ssdgs_model_create(context, NULL, COUNT, &model))) exit(1);
+    v = ssdgs_model_get(model);
+    for (i = 0; i < COUNT; i++) {
+        const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
+        const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z, -r * sin(turn), r * cos(turn), 0};
+        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
+        for (c = 0; c < 4; c++)
+            v.gaussians[(SSDGS_ROTATION + c) * v.stride + i] = v.gaussians[(SSDGS_FRAME + c) * v.stride + i] = (ssdgs_real)raw[3 + c];
+        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + i] = (ssdgs_real)(c < 2 ? -3.6 : -6);
+        v.gaussians[SSDGS_OPACITY * v.stride + i] = (ssdgs_real)(3 * draw(50 * i) - 1);
+        for (c = SSDGS_DIFFUSE; c < SSDGS_FRAME; c++) v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
+        for (c = SSDGS_ASG_WEIGHT; c < SSDGS_CHANNELS; c++) v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
+    }
+    for (i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * draw(1000000 + i) - 0.1);
+    return model;
+}
+
+static ssdgs_camera camera_at(double angle) {
+    const ssdgs_real eye[3] = {(ssdgs_real)(2 * cos(angle)), (ssdgs_real)(2 * sin(angle)), (ssdgs_real)0.7};
+    return ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
+}
+
+static ssdgs_light light_at(double angle) {
+    ssdgs_light light;
+    int c;
+    memset(&light, 0, sizeof light);
+    light.position[0] = (ssdgs_real)(2 * cos(angle));
+    light.position[1] = (ssdgs_real)(2 * sin(angle));
+    light.position[2] = 1;
+    for (c = 0; c < 3; c++) light.intensity[c] = (ssdgs_real)(3 + c);
+    return light;
+}
+
+static void render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
+                   const ssdgs_render_options *options, ssdgs_real *color, ssdgs_render_stats *stats) {
+    ssdgs_image out;
+    memset(&out, 0, sizeof out);
+    out.color = color;
+    CHECK(!ssdgs_render_ex(model, camera, lights, count, options, &out, stats));
+}
+
+/* The frame from a context that has kept frames has the bits of one that has not. */
+static void check_same(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
+                       const ssdgs_render_options *options, int camera_kept, int lights_kept, const char *name) {
+    ssdgs_render_stats stats;
+    render(model, camera, lights, count, options, image[0], &stats);
+    if (!test_check(stats.camera_kept == camera_kept && stats.lights_kept == lights_kept, __FILE__, __LINE__, name))
+        printf("    camera kept %d, lights kept %d\n", stats.camera_kept, stats.lights_kept);
+    (void)ssdgs_model_get(model); /* forget */
+    render(model, camera, lights, count, options, image[1], &stats);
+    CHECK(!stats.camera_kept && !stats.lights_kept && stats.shadows_kept == 0);
+    test_check(!memcmp(image[0], image[1], sizeof image[0]), __FILE__, __LINE__, name);
+}
+
+static void test_kept(void) {
+    ssdgs_context *context = NULL;
+    ssdgs_model *model, *other;
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_camera a = camera_at(0), b = camera_at(1);
+    ssdgs_light lights[2], moved = light_at(2);
+    ssdgs_render_stats stats;
+    ssdgs_model_view view;
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
+    model = make_model(context);
+    other = make_model(context);
+    lights[0] = light_at(1);
+    lights[1] = light_at(4);
+#define FIRST() render(model, &a, lights, 2, &options, image[0], NULL)
+    FIRST();
+    check_same(model, &a, lights, 2, &options, 1, 1, "nothing moved");
+    FIRST();
+    check_same(model, &b, lights, 2, &options, 0, 1, "the camera moved");
+    FIRST();
+    check_same(model, &a, &moved, 1, &options, 1, 0, "another light");
+    FIRST();
+    moved = lights[0], lights[0].intensity[1] *= 2;
+    check_same(model, &a, lights, 2, &options, 1, 1, "a brighter light");
+    lights[0] = moved;
+    lights[1].kind = SSDGS_LIGHT_DIRECTIONAL, lights[1].position[0] = lights[1].position[1] = 0;
+    check_same(model, &a, lights, 2, &options, 1, 0, "another kind of light");
+    FIRST();
+    FIRST(); /* the shadow network's outputs are kept from here on */
+    render(model, &b, lights, 2, &options, image[0], NULL);
+    render(model, &b, lights, 2, &options, image[0], &stats);
+    CHECK(stats.shadows_kept >= 2 * stats.shaded); /* whole blocks */
+    check_same(model, &a, lights, 2, &options, 0, 1, "kept shadows, back again");
+    FIRST();
+    options.max_error = 0;
+    check_same(model, &a, lights, 2, &options, 0, 1, "another max_error");
+    FIRST();
+    options.light_detail = (ssdgs_real)0.5;
+    check_same(model, &a, lights, 2, &options, 1, 0, "another light_detail");
+    FIRST();
+    options.alpha_threshold = (ssdgs_real)0.02;
+    check_same(model, &a, lights, 2, &options, 0, 0, "another alpha_threshold");
+    options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    FIRST();
+    options.terms = SSDGS_ALL_TERMS;
+    check_same(model, &a, lights, 2, &options, 1, 0, "the depth cue is wanted now");
+    FIRST();
+    options.terms = SSDGS_DIFFUSE_TERM;
+    check_same(model, &a, lights, 2, &options, 1, 0, "no shadow");
+    options.terms = SSDGS_ALL_TERMS;
+    FIRST();
+    render(other, &a, lights, 2, &options, image[1], NULL);
+    check_same(model, &a, lights, 2, &options, 0, 0, "another model between");
+    FIRST();
+    view = ssdgs_model_get(model);
+    view.gaussians[SSDGS_POSITION * view.stride] += (ssdgs_real)0.2;
+    check_same(model, &a, lights, 2, &options, 0, 0, "the model changed");
+    ssdgs_model_destroy(other);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was left. */
+static void test_max_error(void) {
+    static const double bounds[3] = {1.0 / 64, 1.0 / 16, 1.0 / 4};
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    ssdgs_light light = light_at(1);
+    ssdgs_camera camera = camera_at(0);
+    int isa, b, i, last = COUNT;
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs_model *model;
+        memset(&desc, 0, sizeof desc);
+        desc.isa = (ssdgs_isa)isa;
+        if (!ssdgs__table(isa)) continue;
+        if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+        model = make_model(context);
+        for (b = 0, last = COUNT; b < 3; b++) {
+            ssdgs_render_options options = ssdgs_render_options_exact();
+            ssdgs_frame frame;
+            double most = 0;
+            int glimpsed = 0;
+            options.max_error = (ssdgs_real)bounds[b];
+            CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0));
+            CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
+            for (i = 0; i < COUNT; i++) {
+                frame.color[4 * i] = frame.seen[i] == SSDGS_GLIMPSED;
+                glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+            }
+            CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
+            for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
+            CHECK(most > 0 && most <= bounds[b] * (1 + 1e-5));
+            CHECK(glimpsed > 0 && frame.shaded_count < last);
+            last = frame.shaded_count;
+        }
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
+/* The presets against the exact image, and the numbers that describe a frame. */
+static void test_presets(void) {
+    ssdgs_context *context = NULL;
+    ssdgs_model *model;
+    ssdgs_light light = light_at(0.5);
+    ssdgs_camera camera = camera_at(0);
+    ssdgs_render_options options[3];
+    ssdgs_render_stats stats[3];
+    ssdgs_image out;
+    int o, i;
+    memset(&out, 0, sizeof out);
+    options[0] = ssdgs_render_options_exact();
+    options[1] = ssdgs_render_options_default();
+    options[2] = ssdgs_render_options_fast();
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
+    model = make_model(context);
+    for (o = 0; o < 3; o++) {
+        double squares = 0;
+        render(model, &camera, &light, 1, options + o, image[o > 0], stats + o);
+        for (i = 0; o && i < PIXELS * 3; i++) squares += pow((double)(image[1][i] - image[0][i]), 2);
+        if (o) printf("%s against exact: %.1f dB\n", o == 1 ? "default" : "fast", ssdgs__psnr(squares / (PIXELS * 3)));
+        if (o) CHECK(ssdgs__psnr(squares / (PIXELS * 3)) > (o == 1 ? 50 : 35));
+        CHECK(stats[o].gaussians == COUNT && stats[o].light_views == 1 && stats[o].rejected == 0);
+        CHECK(stats[o].network_work > 0.3 && stats[o].network_work <= 1);
+    }
+    CHECK(stats[0].glimpsed == 0 && stats[1].glimpsed > 0);
+    CHECK(stats[0].shaded >= stats[1].shaded + stats[1].glimpsed - 1 && stats[2].shaded < stats[1].shaded);
+    options[0].max_error = 2;
+    CHECK(ssdgs_render_ex(model, &camera, &light, 1, options, &out, NULL) == SSDGS_ERR_ARGUMENT);
+    options[0] = ssdgs_render_options_exact();
+    options[0].light_detail = 0;
+    CHECK(ssdgs_render_ex(model, &camera, &light, 1, options, &out, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+static int all_rows(const ssdgs_real *rows, int count, uint16_t *list) {
+    int i;
+    (void)rows;
+    for (i = 0; i < count; i++) list[i] = (uint16_t)i;
+    return count;
+}
+
+/* A network half of whose neurons are dead in the block gives the bits of one in which nothing is left out, both ways. */
+static void test_dead_neurons(void) {
+    enum { IN = 20, WIDE = 37, OUT = 3, WEIGHTS = (IN + 1) * WIDE + (WIDE + 1) * WIDE + (WIDE + 1) * OUT };
+    static const int sizes[4] = {IN, WIDE, WIDE, OUT};
+    static ssdgs_real weights[WEIGHTS], inputs[IN * SSDGS__BLOCK], outputs[2][(2 * WIDE + OUT) * SSDGS__BLOCK];
+    static ssdgs_real gradient[2][WEIGHTS + 64], d[2][64 * SSDGS__BLOCK], spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
+    int isa, i, part;
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        const ssdgs__kernels *table = ssdgs__table(isa);
+        ssdgs__row_lists lists;
+        ssdgs__kernels k;
+        ssdgs_real *dinputs[2];
+        if (!table) continue;
+        for (i = 0; i < WEIGHTS; i++) weights[i] = (ssdgs_real)(draw((uint64_t)i) - 0.5);
+        for (i = 0; i < IN * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
+        for (i = 0; i < WIDE; i += 2) weights[IN * WIDE + i] = weights[(IN + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
+        for (part = 0; part < 2; part++) {
+            k = *table;
+            if (part) k.live_rows = all_rows;
+            ssdgs__row_lists_fill(&lists);
+            memset(gradient[part], 0, sizeof gradient[part]);
+            ssdgs__network_forward(&k, sizes, 3, weights, NULL, NULL, &lists, inputs, outputs[part]);
+            CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
+            for (i = 0; i < OUT * SSDGS__BLOCK; i++) d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
+            dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part], spare, transposed, &lists,
+                                                    gradient[part]);
+            if (dinputs[part] == spare) memcpy(d[part], spare, sizeof spare);
+        }
+        CHECK(!memcmp(outputs[0], outputs[1], sizeof outputs[0]));
+        CHECK(!memcmp(gradient[0], gradient[1], WEIGHTS * sizeof gradient[0][0]));
+        CHECK(!memcmp(d[0], d[1], IN * SSDGS__BLOCK * sizeof d[0][0]));
+        CHECK(gradient[0][IN * WIDE + 1] != 0 && gradient[0][IN * WIDE] == 0);
+    }
+}
+
+/* Frozen networks get no gradient, and take none from anybody else. */
+static void test_frozen(void) {
+    ssdgs_context *context = NULL;
+    ssdgs_model *model;
+    ssdgs_light light = light_at(1);
+    ssdgs_camera camera = camera_at(0);
+    ssdgs_real *planes = NULL;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], n, i;
+    int part, g;
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
+    model = make_model(context);
+    ssdgs__global_groups(&model->settings, first);
+    n = model->capacity * SSDGS_CHANNELS;
+    for (part = 0; part < 4; part++) {
+        ssdgs_frame frame;
+        CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1));
+        CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE));
+        for (i = 0; i < PIXELS * 3; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
+        frame.frozen[0] = part & 1;
+        frame.frozen[1] = part >> 1;
+        CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
+        for (g = 0; g < 2; g++) {
+            double sum = 0;
+            for (i = first[g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET]; i < first[(g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET) + 1]; i++)
+                sum += fabs((double)frame.global_gradient[i]);
+            CHECK(frame.frozen[g] ? sum == 0 : sum > 0);
+        }
+        if (!part) planes = (ssdgs_real *)memcpy(malloc(n * sizeof *planes), frame.gradient, n * sizeof *planes);
+        else CHECK(!memcmp(planes, frame.gradient, n * sizeof *planes));
+    }
+    free(planes);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+int main(void) {
+    test_kept();
+    test_max_error();
+    test_presets();
+    test_dead_neurons();
+    test_frozen();
+    TEST_END();
+}
