@@ -140,6 +140,18 @@ THREADS
   done. The progress callback runs on the caller's thread between two steps; it may save or render. Hooks and the log
   run there too.
 
+SPEED
+  ssdgs_render_options_exact()    the method as written; training and ssdgs_evaluate() use it
+  ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was measured
+  ssdgs_render_options_fast()     max_error 1/8, light_detail 0.6, alpha_threshold 1/200: less than 0.1 dB
+  max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in any pixel, and
+  they are blended in the colour of a neighbour instead. `make bench` shows what each of these costs and gains.
+  Left out without any change of a bit: what no pixel blends; neurons that are 0 for 64 neighbouring Gaussians; terms and
+  networks not in use, gradients of those that rest; components and planes nobody asked for. And what the last frame on
+  the context found, where model, options and camera, or lights, are the same: a camera at rest needs no projection, order
+  and tiles, lights at rest no maps and no shadow network. Writing through ssdgs_model_get() needs a new call of it each
+  time, which is how the library knows. ssdgs_render_stats tells what was left out.
+
 SIMD
   The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit ARM), and for
   scalar code (anything else, tcc included); a context picks the best that CPU and system have. desc.isa asks for one,
@@ -149,9 +161,9 @@ SIMD
 
 GPU HOOK
   desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and writes
-  ssdgs_frame, whose members say which stage fills them. What PROJECT, SORT and BIN write in ssdgs_splat_view, and the
-  instance_ arrays of WALK and COMPOSITE_BACKWARD, has no memory before them: a hook points the members at its own,
-  valid until the library's call returns; PROJECT also sets tiles_x and tiles_y. The rest is there. In training SHADE
+  ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no memory before them:
+  a hook points the members at its own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y.
+  The rest is there. With any hook set no frame keeps results of the last. In training SHADE
   and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs
   the CPU's version. Components of an image are composited by the CPU from the tile lists, so they need BIN's results in
   host memory. A result other than SSDGS_OK ends the frame.
@@ -726,9 +738,12 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
+#if __clang_major__ >= 12
+#pragma float_control(precise, on, push)
+#endif
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=off", "no-fast-math")
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
 #endif
@@ -5810,6 +5825,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #endif /* SSDGS_NO_TRAINER */
 
 #if defined(__clang__)
+#if __clang_major__ >= 12
+#pragma float_control(pop)
+#endif
 #pragma STDC FP_CONTRACT DEFAULT
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC pop_options
