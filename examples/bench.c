@@ -666,13 +666,13 @@ static void measure_frames(bench *b) {
 
 /* One shortcut at a time on top of exact, from weak to strong. */
 static const struct { const char *name; double values[6]; } knobs[] = {
-    {"max_error", {0.001, 0.004, 0.01, 0.02, 0.05}}, {"light_detail", {0.75, 0.5, 0.35, 0.25}}, {"bf16", {1}},
-    {"stop", {1e-3, 4e-3, 0.01, 0.03}}, {"alpha_threshold", {0.006, 0.01, 0.02, 0.04}}
+    {"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}}, {"light_detail", {0.8, 0.6, 0.5, 0.35}}, {"bf16", {1}},
+    {"stop", {1e-3, 4e-3, 0.01, 0.03}}, {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}
 };
 enum { KNOBS = sizeof knobs / sizeof *knobs };
 
 static void measure_sweep(bench *b) {
-    table *t = new_table(b, "sweep", "ms max_error psnr_exact loss_db shaded_fraction");
+    table *t = new_table(b, "sweep", "ms rms_error max_error loss_db shaded_fraction");
     ssdgs_render_options options[MAX_JOBS];
     char names[MAX_JOBS][48];
     job jobs[MAX_JOBS];
@@ -700,7 +700,7 @@ static void measure_sweep(bench *b) {
     measure_quality(b, &s, options, count, q);
     time_jobs(b, jobs, count, 12);
     for (i = 0; i < count; i++)
-        add_row(t, names[i], jobs[i].ms, q[i].max_error, q[i].psnr_exact, q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
+        add_row(t, names[i], jobs[i].ms, pow(10, -q[i].psnr_exact / 20), q[i].max_error, q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
     close_session(&s);
     print_table(t);
 }
@@ -914,18 +914,18 @@ static const struct { const char *ink, *mark; } looks[KNOBS] = { /* inks that re
     {"#2a9d6f", "m0 -5l5 9h-10z"}, {"#d98a1f", "m0 5l5 -9h-10z"}
 };
 enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };
-static const double least_error = 1e-4; /* the axis starts here: images that are equal, or nearly, stand on it */
+static const double least_error = 1e-5, largest_error = 0.1; /* images that are equal, or nearly, stand on the axis */
 
 typedef struct chart { FILE *file; double left, fastest, slowest; } chart;
 
 static double chart_x(const chart *c, double ms) { return c->left + WIDE * log(ms / c->fastest) / log(c->slowest / c->fastest); }
 
 static double chart_y(double error) {
-    return TOP + HIGH * log(error > least_error ? error : least_error) / log(least_error);
+    return TOP + HIGH * log((error > least_error ? error : least_error) / largest_error) / log(least_error / largest_error);
 }
 
 static void draw_axes(const chart *c, const char *title) {
-    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}, levels[] = {1e-4, 1e-3, 1.0 / 255, 1e-2, 1e-1, 1};
+    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}, levels[] = {1e-5, 1e-4, 1.0 / 255, 1e-3, 1e-2, 1e-1};
     const double bottom = TOP + HIGH;
     double decade;
     int i;
@@ -986,7 +986,7 @@ static void write_svg(const bench *b, FILE *file) {
     c.left = LEFT;
     fprintf(file, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"12\" "
             "fill=\"#808080\">\n<style>.g path{stroke:#888;stroke-opacity:.4;fill:none}.b{font-weight:bold}.s{font-size:9px}"
-            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">largest error of any pixel against "
+            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">root mean square error against "
             "exact; 1 is white</text>\n", 2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
     for (i = 0; i < KNOBS; i++)
         fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i, looks[i].mark,
