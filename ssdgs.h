@@ -3379,12 +3379,20 @@ static void ssdgs__rows_task(void *data, int index) {
     const int end = (index + 1) * SSDGS__BAND < h ? (index + 1) * SSDGS__BAND : h;
     const size_t plane = (size_t)w * (size_t)h;
     int x, y, c;
-    for (y = index * SSDGS__BAND; y < end; y++)
-        for (c = 0; c < n; c++) {
+    for (y = index * SSDGS__BAND; y < end; y++) {
+        const ssdgs_real *t = transmittance + (size_t)y * (size_t)w, *red = job->planes + (size_t)y * (size_t)w;
+        ssdgs_real *rgb = job->out + (size_t)y * (size_t)job->stride * 3;
+        for (x = 0; n == 3 && x < w; x++, rgb += 3) {
+            rgb[0] = red[x] + t[x] * job->background[0];
+            rgb[1] = red[plane + (size_t)x] + t[x] * job->background[1];
+            rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
+        }
+        for (c = 0; n != 3 && c < n; c++) {
             const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w, background = job->background[c];
             ssdgs_real *out = job->out + (size_t)y * (size_t)job->stride * (size_t)n + c;
-            for (x = 0; x < w; x++) out[x * n] = from[x] + transmittance[(size_t)y * (size_t)w + (size_t)x] * background;
+            for (x = 0; x < w; x++) out[x * n] = from[x] + t[x] * background;
         }
+    }
 }
 
 /* Planes to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. */
@@ -6401,23 +6409,25 @@ SSDGS__FN int F(bin)(const R *record, R log2_threshold, const int *box, int tile
     const V a = VSET(record[2] * margin), b = VSET(record[3]), c = VSET(record[4] * margin), zero = VSET(0), side = VSET(3);
     const V best_x = VSET(-record[3] / (2 * record[2])), best_y = VSET(-record[3] / (2 * record[4]));
     const V least = VSET(log2_threshold - record[5] - (R)1e-3);
-    int count = 0, tx, ty, v;
-    for (ty = box[1]; ty <= box[3]; ty++)
-        for (tx = box[0]; tx <= box[2]; tx++) {
-            unsigned touched = 0;
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
-                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
-                V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
-                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
-                V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
-                V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
-                touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
-            }
-            tile[count] = (uint32_t)(ty * tiles_x + tx);
-            mask[count] = (uint16_t)touched;
-            count += touched != 0;
+    const int wide = box[2] - box[0] + 1;
+    int left = wide * (box[3] - box[1] + 1), tx = box[0], ty = box[1], count = 0, v;
+    for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
+        unsigned touched = 0;
+        SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
+            V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
+            V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
+            V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
+            V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
+            V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
+            touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
         }
+        tile[count] = (uint32_t)(ty * tiles_x + tx);
+        mask[count] = (uint16_t)touched;
+        count += touched != 0;
+        ty += tx == box[2];
+        tx = tx == box[2] ? box[0] : tx + 1;
+    }
     return count;
 }
 
@@ -6782,19 +6792,21 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
    out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and the depths listed;
    a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes
    run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
-SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int vectors, const uint16_t *row, int column) {
+typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth: multiplied out, the inner loop has ports to spare for none */
+
+SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const F(offsets) *depth, const int rows, const int vectors,
+                             const uint16_t *row, int column) {
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
-    const uint16_t *depth = p->depth_list, *const end = depth + p->depth;
-    const size_t a_k = p->a_k, b_stride = p->b_stride;
+    const F(offsets) *const end = depth + p->depth;
     int i, v;
     SSDGS__UNROLL for (i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
         SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
     }
     for (; depth < end; depth++) {
-        const size_t at = *depth * a_k;
-        const R *b = columns + *depth * b_stride;
+        const size_t at = depth->a;
+        const R *b = columns + depth->b;
         V lanes[SSDGS__TV];
         SSDGS__UNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
         SSDGS__UNROLL for (i = 0; i < rows; i++) {
@@ -6812,25 +6824,30 @@ SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const int rows, const int 
 }
 
 /* All rows over some columns, in tiles of about equal height. */
-SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const int vectors, int column) {
+SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) *depth, const int vectors, int column) {
     int left = (p->rows + SSDGS__TR - 1) / SSDGS__TR, row = 0;
     for (; left; left--) {
         const int rows = (p->rows - row + left - 1) / left;
         const uint16_t *list = p->row_list + row;
-        if (rows == 6) F(dense_tile)(p, 6, vectors, list, column);
-        else if (rows == 5) F(dense_tile)(p, 5, vectors, list, column);
-        else if (rows == 4) F(dense_tile)(p, 4, vectors, list, column);
-        else if (rows == 3) F(dense_tile)(p, 3, vectors, list, column);
-        else if (rows == 2) F(dense_tile)(p, 2, vectors, list, column);
-        else F(dense_tile)(p, 1, vectors, list, column);
+        if (rows == 6) F(dense_tile)(p, depth, 6, vectors, list, column);
+        else if (rows == 5) F(dense_tile)(p, depth, 5, vectors, list, column);
+        else if (rows == 4) F(dense_tile)(p, depth, 4, vectors, list, column);
+        else if (rows == 3) F(dense_tile)(p, depth, 3, vectors, list, column);
+        else if (rows == 2) F(dense_tile)(p, depth, 2, vectors, list, column);
+        else F(dense_tile)(p, depth, 1, vectors, list, column);
         row += rows;
     }
 }
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
-    int column = 0;
-    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) F(dense_columns)(p, SSDGS__TV, column);
-    for (; column < p->columns; column += SSDGS__VW) F(dense_columns)(p, 1, column);
+    F(offsets) depth[1024];
+    int column = 0, k;
+    for (k = 0; k < p->depth; k++) {
+        depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);
+        depth[k].b = (uint32_t)(p->depth_list[k] * p->b_stride);
+    }
+    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) F(dense_columns)(p, depth, SSDGS__TV, column);
+    for (; column < p->columns; column += SSDGS__VW) F(dense_columns)(p, depth, 1, column);
 }
 
 /* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns how many. */

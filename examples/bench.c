@@ -228,13 +228,20 @@ typedef struct network {
     double operations; /* of a block's forward; the backward's are twice as many */
 } network;
 
+/* In the library's own memory, aligned as a frame's is. */
+static ssdgs_real *take(ssdgs_context *context, size_t count) {
+    ssdgs_real *memory = (ssdgs_real *)ssdgs__allocate(context, count * sizeof *memory);
+    if (!memory) die("memory", "not enough");
+    return memory;
+}
+
 static network make_network(ssdgs_model *model) {
     network n;
     size_t widest = 16, i, at = 0;
     int l;
     memset(&n, 0, sizeof n);
     n.layers = ssdgs__network_sizes(&model->settings, 0, n.sizes);
-    n.weights = (ssdgs_real *)make(ssdgs__network_count(&model->settings, 0) + 16, sizeof(ssdgs_real));
+    n.weights = take(model->context, ssdgs__network_count(&model->settings, 0) + 16);
     n.lists = (ssdgs__row_lists *)make(1, sizeof *n.lists);
     ssdgs__row_lists_fill(n.lists);
     for (l = 0; l <= n.layers; l++) {
@@ -246,13 +253,13 @@ static network make_network(ssdgs_model *model) {
         }
         widest = (size_t)n.sizes[l] + 16 > widest ? (size_t)n.sizes[l] + 16 : widest;
     }
-    n.output_gradient = (ssdgs_real *)make(widest * SSDGS__BLOCK * (5 + (size_t)n.layers), sizeof(ssdgs_real));
+    n.output_gradient = take(model->context, widest * SSDGS__BLOCK * (5 + (size_t)n.layers));
     n.d = n.output_gradient + widest * SSDGS__BLOCK;
     n.spare = n.d + widest * SSDGS__BLOCK;
     n.transposed = n.spare + widest * SSDGS__BLOCK;
     n.inputs = n.transposed + widest * SSDGS__BLOCK;
     n.outputs = n.inputs + widest * SSDGS__BLOCK;
-    n.gradient = (ssdgs_real *)make(ssdgs__network_count(&model->settings, 0) + 128, sizeof(ssdgs_real));
+    n.gradient = take(model->context, ssdgs__network_count(&model->settings, 0) + 128);
     n.packed = (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
     n.pairs = ssdgs__pack_weights(n.sizes, n.layers, n.weights, n.packed);
     for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
@@ -597,9 +604,11 @@ static void measure_layers(bench *b) {
         if (b->isas[i] == b->best_isa) /* of one thread, all of them */
             add_facts(b, "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
                       "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak", v[0], v[5], v[3], v[4], v[8]);
-        free(n.output_gradient);
-        free(n.gradient);
+        ssdgs__release(s.context, n.weights);
+        ssdgs__release(s.context, n.output_gradient);
+        ssdgs__release(s.context, n.gradient);
         free(n.packed);
+        free(n.lists);
         close_session(&s);
     }
     print_table(t);
