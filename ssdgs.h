@@ -1742,7 +1742,7 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, first, count, tile, mask, place, start, list, seen, needed, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, box, first, count, tile, mask, place, start, list, seen, needed, sums, histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -2311,7 +2311,7 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
 }
 
 /* Tiles the record's bounding box touches: first and last column and row. */
-static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, int box[4]) {
+static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, uint16_t box[4]) {
     const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1}, high[2] = {record[0] + record[6] + 1,
         record[1] + record[7] + 1};
     const int tiles[2] = {v->tiles_x, v->tiles_y};
@@ -2319,8 +2319,8 @@ static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record,
     for (a = 0; a < 2; a++) {
         const ssdgs_real last = (ssdgs_real)(16 * tiles[a] - 1);
         const ssdgs_real from = low[a] < last ? low[a] : last, to = high[a] < last ? high[a] : last;
-        box[a] = (int)((unsigned)(int)(from > 0 ? from : 0) / 16);
-        box[2 + a] = (int)((unsigned)(int)(to > 0 ? to : 0) / 16);
+        box[a] = (uint16_t)((unsigned)(int)(from > 0 ? from : 0) / 16);
+        box[2 + a] = (uint16_t)((unsigned)(int)(to > 0 ? to : 0) / 16);
     }
 }
 
@@ -2335,13 +2335,15 @@ static void ssdgs__bin_room_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs_splat_view *v = frame->views + view;
+    uint16_t *boxes = (uint16_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->box.memory;
     uint64_t room = 0;
-    int begin, end, rank, box[4];
+    int begin, end, rank, box[4], i;
     if (v->kept) return;
     ssdgs__bin_range(v, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
         if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
-        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, box);
+        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, boxes + 4 * (size_t)rank);
+        for (i = 0; i < 4; i++) box[i] = boxes[4 * (size_t)rank + (size_t)i];
         room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
     }
     ((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->chunk_room[chunk] = room;
@@ -2361,6 +2363,7 @@ static void ssdgs__bin_task(void *data, int index) {
     ssdgs_splat_view *v = frame->views + view;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk), *tile = (uint32_t *)m->tile.memory;
     uint16_t *mask = (uint16_t *)m->mask.memory;
+    const uint16_t *boxes = (const uint16_t *)m->box.memory;
     uint32_t at = (uint32_t)m->chunk_room[chunk];
     const ssdgs_real threshold = ssdgs__log2_threshold(frame);
     int begin, end, rank, box[4], count, i;
@@ -2370,7 +2373,7 @@ static void ssdgs__bin_task(void *data, int index) {
     for (rank = begin; rank < end; rank++) {
         const ssdgs_real *record = v->record + (size_t)v->order[rank] * 8;
         if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
-        ssdgs__tile_box(v, record, box);
+        for (i = 0; i < 4; i++) box[i] = boxes[4 * (size_t)rank + (size_t)i];
         count = frame->context->k->bin(record, threshold, box, v->tiles_x, tile + at, mask + at);
         v->first_instance[rank] = at;
         v->instance_count[rank] = (uint32_t)count;
@@ -2422,6 +2425,12 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     int i, chunk;
+    for (i = 0; i < frame->view_count; i++) {
+        uint16_t *box;
+        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t,
+                       4 * (size_t)frame->views[i].visible + 4);
+        (void)box;
+    }
     ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_room_task, frame);
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
@@ -6048,6 +6057,17 @@ SSDGS__FI void F(sum4)(R *out, V a, V b, V c, V d) {
 #endif
 }
 
+#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+/* Four rows of four values become columns. */
+SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_stride) {
+    __m128 r[4];
+    int i;
+    SSDGS__UNROLL for (i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
+    _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+    SSDGS__UNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
+}
+#endif
+
 /* ==== >>vmath  elementary functions on V ==== */
 
 #ifdef SSDGS_REAL64
@@ -6272,7 +6292,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         F(projection) p;
         V inverse_det, opacity, log2_opacity, reach, x, y, ex, ey, d, field[8];
         VM drawn;
-        R lane[SSDGS__VW];
+        R lane[SSDGS__VW], fields[8][SSDGS__VW];
         int f, l;
         F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
         inverse_det = VDIV(VSET(1), p.det);
@@ -6301,10 +6321,14 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         field[5] = log2_opacity;
         field[6] = ex;
         field[7] = ey;
-        for (f = 0; f < 8; f++) {
-            VSTORE(lane, field[f]);
-            for (l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = lane[l];
-        }
+        for (f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
+#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+        for (f = 0; f < 8; f += 4)
+            for (l = 0; l < SSDGS__VW; l += 4) F(transpose4)(fields[f] + l, SSDGS__VW, record + (i + (size_t)l) * 8 + f, 8);
+#else
+        for (f = 0; f < 8; f++)
+            for (l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = fields[f][l];
+#endif
     }
 }
 
@@ -6867,13 +6891,7 @@ SSDGS__FN void F(transpose)(const R *rows, int count, size_t stride, R *out) {
     size_t i = 0, s;
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
     for (; i + 4 <= (size_t)count; i += 4)
-        for (s = 0; s < SSDGS__BLOCK; s += 4) {
-            __m128 r[4];
-            int l;
-            SSDGS__UNROLL for (l = 0; l < 4; l++) r[l] = _mm_loadu_ps(rows + (i + (size_t)l) * SSDGS__BLOCK + s);
-            _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-            SSDGS__UNROLL for (l = 0; l < 4; l++) _mm_storeu_ps(out + (s + (size_t)l) * stride + i, r[l]);
-        }
+        for (s = 0; s < SSDGS__BLOCK; s += 4) F(transpose4)(rows + i * SSDGS__BLOCK + s, SSDGS__BLOCK, out + s * stride + i, stride);
 #endif
     for (; i < stride; i++)
         for (s = 0; s < SSDGS__BLOCK; s++) out[s * stride + i] = i < (size_t)count ? rows[i * SSDGS__BLOCK + s] : 0;
