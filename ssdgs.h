@@ -6571,7 +6571,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
-                    if (thrifty) { /* once the budget is spent everything is needed */
+                    if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget needs everything */
                         const V w = VMUL(alpha, t[v]);
                         const VM light = VGE(small, w);
                         over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
