@@ -145,7 +145,8 @@ SPEED
   ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was measured
   ssdgs_render_options_fast()     max_error 1/8, light_detail 0.6, alpha_threshold 1/200: less than 0.1 dB
   max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in any pixel, and
-  they are blended in the colour of a neighbour instead. `make bench` shows what each of these costs and gains.
+  they are blended in the colour of the Gaussian before them instead, a neighbour in the Morton order that training
+  leaves. `make bench` shows what each of these costs and gains.
   Left out without any change of a bit: what no pixel blends; neurons that are 0 for 64 neighbouring Gaussians; terms and
   networks not in use, gradients of those that rest; components and planes nobody asked for. And what the last frame on
   the context found, where model, options and camera, or lights, are the same: a camera at rest needs no projection, order
@@ -214,7 +215,7 @@ CONTENTS, search for the tag
   >>threads         a pool per context
   >>cpu             which tables this machine can run
   >>model           Gaussians, ASG bases, networks, settings
-  >>frame           memory of a frame, its views, the lights' cameras
+  >>frame           memory of a frame, its views, the lights' cameras, what is kept from the last
   >>project         records, order, instances, tile lists
   >>shadow          visibility and depth cue from the lights, which Gaussians the camera sees
   >>shade           geometry, networks and colour of the Gaussians seen
@@ -229,7 +230,7 @@ CONTENTS, search for the tag
   >>kernels         vector macros, one body for every instruction set
   >>vmath           elementary functions
   >>project_kernel  EWA projection
-  >>bin_kernel      exact ellipse spans
+  >>bin_kernel      which parts of a tile an ellipse touches
   >>walk_kernels    transmittance walks of camera and lights
   >>composite_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>dipole_kernel, >>colour_kernel, >>image_kernels
 
@@ -488,7 +489,8 @@ typedef struct ssdgs_image {
 typedef struct ssdgs_render_options {
     int version;                  /* stamped by ssdgs_render_options_default */
     int terms;                    /* of the model's terms, those to render */
-    int bf16;                     /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour */
+    int bf16;                     /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour. Leaves no dead neurons
+                                     out: slower than 0 on Intel's CPUs, see `make bench` on others */
     int antialias;                /* 1: opacity compensated for the 0.3 px^2 blur (Mip-Splatting) */
     ssdgs_real background[3];     /* linear; transfer none: stored values */
     ssdgs_real stop;              /* a pixel is done when its transmittance falls below; 0 = never */
@@ -615,7 +617,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 #endif
 
-/* Renders a photograph's camera and light and compares. image (h,w,3, stored values) may be NULL. background: stored values. */
+/* Renders a photograph's camera and light, with the exact options, and compares. image (h,w,3, stored values) may be NULL.
+   background: stored values. */
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
                                       ssdgs_real *image, ssdgs_metrics *metrics);
 /* Fits photo's camera and light position to its pixels by `iterations` steps of Adam, the model fixed. */
@@ -2082,7 +2085,8 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
     kept->bounds_ready = kept->bounds_ready && known;
     kept->camera_ready = kept->camera_ready && known && a->width == b->width && a->height == b->height &&
         now->antialias == old->antialias && !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
-        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) && !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
+        !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
     known = known && kept->lights_ready && frame->light_count == kept->light_count &&
         !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
         ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
@@ -2131,6 +2135,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->camera = *camera;
     frame->lights = lights;
     frame->light_count = model->settings.baked ? 0 : light_count;
+    if (model->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     frame->terms = model->settings.terms & frame->options.terms;
     frame->components = components;
     frame->training = training;
@@ -6816,7 +6821,7 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
    out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and the depths listed;
    a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes
    run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
-typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth: multiplied out, the inner loop has ports to spare for none */
+typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth, multiplied out before the inner loop */
 
 SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const F(offsets) *depth, const int rows, const int vectors,
                              const uint16_t *row, int column) {
