@@ -5977,7 +5977,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VAND(m, n) ((__mmask16)((m) & (n)))
 #define VBITS(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) _mm512_roundscale_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
+#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvtps_epi32(a))
 #define VLDEXP(x, n) _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
 #define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 
