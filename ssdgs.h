@@ -6078,29 +6078,13 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 #ifdef SSDGS_REAL64
 SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
 SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
-SSDGS__FI V F(exp2_walk)(V x) { return F(exp2)(x); }
 SSDGS__FI V F(log)(V x) { return log(x); }
 SSDGS__FI void F(sincos)(V x, V *s, V *c) { *s = sin(x); *c = cos(x); }
 SSDGS__FI V F(atan2_upper)(V y, V x) { return atan2(y, x); }
 SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
-/* 2^x for |x| <= 126, 1 ulp: degree 6 on [-1/2, 1/2]. */
+/* 2^x for x < 126, saturating below -126: degree 5 on [-1/2, 1/2], 2.2e-7 relative. */
 SSDGS__FI V F(exp2)(V x) {
-    V whole, f, p;
-    x = VMAX(VSET(-126), VMIN(VSET(126), x));
-    whole = VROUND(x);
-    f = VSUB(x, whole);
-    p = VFMA(f, VSET(1.54614449e-4), VSET(1.3400428e-3));
-    p = VFMA(p, f, VSET(9.61805694e-3));
-    p = VFMA(p, f, VSET(5.55032715e-2));
-    p = VFMA(p, f, VSET(2.40226507e-1));
-    p = VFMA(p, f, VSET(6.93147182e-1));
-    p = VFMA(p, f, VSET(1));
-    return VLDEXP(p, whole);
-}
-
-/* The same for -126 <= x < 1 or so, degree 5: 2.2e-7, for the many of a walk. */
-SSDGS__FI V F(exp2_walk)(V x) {
     V whole, f, p;
     x = VMAX(VSET(-126), x);
     whole = VROUND(x);
@@ -6197,7 +6181,6 @@ SSDGS__FI V F(atan2_upper)(V y, V x) {
 #endif
 
 #define VEXP(x) F(exp)(x)
-#define VEXP2(x) F(exp2)(x)
 #define VLOG(x) F(log)(x)
 
 SSDGS__FI V F(sigmoid)(V x) { return VDIV(VSET(1), VADD(VSET(1), VEXP(VNEG(x)))); }
@@ -6521,7 +6504,7 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
     *dy = VSUB(py, VSET(record[1]));
     p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy, VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
     *drawn = VGE(p, log2_threshold);
-    *raw = F(exp2_walk)(p);
+    *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
 }
 
@@ -7601,7 +7584,6 @@ static const ssdgs__kernels F(kernels) = {
 #undef VLDEXP
 #undef VEXPONENT
 #undef VEXP
-#undef VEXP2
 #undef VLOG
 #undef VNEG
 #undef VABS
