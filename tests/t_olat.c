@@ -39,7 +39,7 @@ static void meter_free(void *memory) {
 #undef calloc
 #undef free
 
-#define FOLDER "build/t_olat"
+#define FOLDER "build/t_olat_files"
 
 static char error[512];
 
@@ -732,7 +732,7 @@ static void test_datasets(void) {
     CHECK(loads(TOP "{" LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
         set.frames[0].camera.width == 256 && set.frames[0].camera.height == 256);
     olat_free(&set);
-    CHECK(loads(TOP "{\"file_path\":\"../t_olat/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
+    CHECK(loads(TOP "{\"file_path\":\"../t_olat_files/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
     olat_free(&set);
     CHECK(live == 0);
 
