@@ -89,6 +89,10 @@ static void test_kept(void) {
     FIRST();
     check_same(model, &a, &moved, 1, &options, 1, 0, "another light");
     FIRST();
+    moved = lights[0], lights[0] = light_at(3);
+    check_same(model, &a, lights, 2, &options, 1, 0, "a light moved");
+    lights[0] = moved;
+    FIRST();
     moved = lights[0], lights[0].intensity[1] *= 2;
     check_same(model, &a, lights, 2, &options, 1, 1, "a brighter light");
     lights[0] = moved;
@@ -165,6 +169,39 @@ static void test_max_error(void) {
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
     }
+}
+
+/* Faint layers behind each other weigh little each and much together: the budget ends what is passed over. */
+static void test_spent_budget(void) {
+    enum { LAYERS = 200 };
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_camera camera = camera_at(0);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_frame frame;
+    ssdgs_model_view v;
+    double most = 0;
+    int i, c, glimpsed = 0;
+    options.max_error = (ssdgs_real)0.5;
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_model_create(context, NULL, LAYERS, &model))) exit(1);
+    v = ssdgs_model_get(model);
+    for (i = 0; i < LAYERS; i++) {
+        v.gaussians[SSDGS_POSITION * v.stride + (size_t)i] = (ssdgs_real)(0.001 * i);
+        v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.6;
+        for (c = 0; c < 3; c++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
+    }
+    CHECK(!ssdgs__frame_begin(&frame, model, &camera, NULL, 0, &options, 0, 0));
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
+    for (i = 0; i < LAYERS; i++) {
+        frame.color[4 * i] = frame.seen[i] == SSDGS_GLIMPSED;
+        glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+    }
+    CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
+    for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
+    CHECK(most > 0.3 && most <= 0.5 * (1 + 1e-5));
+    CHECK(glimpsed > 0 && frame.shaded_count > LAYERS / 4);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
 }
 
 /* The presets against the exact image, and the numbers that describe a frame. */
@@ -283,6 +320,7 @@ static void test_frozen(void) {
 int main(void) {
     test_kept();
     test_max_error();
+    test_spent_budget();
     test_presets();
     test_dead_neurons();
     test_frozen();
