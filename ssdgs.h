@@ -891,7 +891,7 @@ typedef struct ssdgs__tile {
 
 typedef struct ssdgs__product {
     ssdgs_real *out;
-    const ssdgs_real *a, *b, *bias;
+    const ssdgs_real *a, *b, *bias, *mask; /* bias (rows), mask as out: results where it is not positive become 0 */
     size_t out_stride, a_row, a_k, b_stride;
     const uint16_t *row_list, *depth_list; /* (rows), (depth) */
     int rows, columns, depth, accumulate, relu;
@@ -916,8 +916,7 @@ typedef struct ssdgs__kernels {
     int (*live_rows)(const ssdgs_real *, int, uint16_t *);
     void (*transpose)(const ssdgs_real *, int, size_t, ssdgs_real *);
     void (*dense_bf16)(const ssdgs__product *, const uint32_t *, uint32_t *); /* NULL where there is none */
-    void (*relu_backward)(ssdgs_real *, const ssdgs_real *, const uint16_t *, int);
-    void (*row_sums)(ssdgs_real *, const ssdgs_real *, const uint16_t *, int);
+    void (*row_sums)(ssdgs_real *, size_t, const ssdgs_real *, const uint16_t *, int);
     void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
@@ -2789,31 +2788,66 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
     }
 }
 
-/* d holds dL/d(outputs) and ends as dL/d(inputs), in d or spare: that one is returned. Adds to dweights unless that is NULL.
-   Neurons that are 0 in the whole block have no part in it. */
+/* A layer's gradient in a slot, made for adding block after block: per output, the weights' with zeros up to a multiple of 16,
+   then 16 partial sums of the bias's. */
+static size_t ssdgs__padded(int inputs) { return ((size_t)inputs + 15) / 16 * 16; }
+
+static size_t ssdgs__slot_gradient_size(const int *sizes, int layers) {
+    size_t size = 0;
+    int i;
+    for (i = 0; i < layers; i++) size += (size_t)sizes[i + 1] * (ssdgs__padded(sizes[i]) + 16);
+    return size;
+}
+
+/* The slots' gradients of a network, stride apart, summed up in the order of its parameters: each row with number % parts ==
+   part. */
+static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slots, size_t stride, int count, int part, int parts,
+                             ssdgs_real *gradient) {
+    int layer, row, slot, lane;
+    for (layer = 0; layer < layers; layer++) {
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = ssdgs__padded(sizes[layer]);
+        for (row = part; row < sizes[layer + 1]; row += parts) {
+            const ssdgs_real *from = slots + (size_t)row * (padded + 16);
+            ssdgs_real *to = gradient + (size_t)row * in, bias = 0;
+            size_t i;
+            for (slot = 0; slot < count; slot++, from += stride) {
+                for (i = 0; i < in; i++) to[i] = slot ? to[i] + from[i] : from[i];
+                for (lane = 0; lane < 16; lane++) bias += from[padded + (size_t)lane];
+            }
+            gradient[in * out + (size_t)row] = bias;
+        }
+        slots += out * (padded + 16);
+        gradient += (in + 1) * out;
+    }
+}
+
+/* d holds dL/d(outputs) and ends as dL/d(inputs), the first `asked` rows of it, in d or spare: that one is returned. Adds to the
+   slot's gradient unless that is NULL. Neurons that are 0 in the whole block have no part in it. */
 static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
                                            const ssdgs_real *inputs, const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
-                                           ssdgs_real *transposed, ssdgs__row_lists *lists, ssdgs_real *dweights) {
+                                           ssdgs_real *transposed, ssdgs__row_lists *lists, int asked,
+                                           ssdgs_real *slot_gradient) {
     const ssdgs_real *layer_in = outputs;
-    size_t at = 0;
     int layer, live_out = sizes[layers];
     const uint16_t *outs = lists->all;
-    for (layer = 0; layer < layers - 1; layer++) {
-        if (layer) layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
-        at += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
+    for (layer = 0; layer < layers; layer++) {
+        if (layer && layer < layers - 1) layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
+        weights += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
     }
+    if (slot_gradient) slot_gradient += ssdgs__slot_gradient_size(sizes, layers);
     for (layer = layers - 1; layer >= 0; layer--) {
-        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = (in + 15) / 16 * 16;
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = ssdgs__padded(sizes[layer]);
         uint16_t *list = outs == lists->in ? lists->out : lists->in;
-        const int live_in = layer ? k->live_rows(layer_in, sizes[layer], list) : sizes[layer];
+        const int live_in = layer ? k->live_rows(layer_in, sizes[layer], list) : asked;
         ssdgs_real *swap = d;
         ssdgs__product p;
         memset(&p, 0, sizeof p);
-        p.b = d;
-        if (dweights) {
+        weights -= (in + 1) * out;
+        if (slot_gradient) {
+            slot_gradient -= out * (padded + 16);
             k->transpose(layer_in, sizes[layer], padded, transposed);
-            p.out = dweights + at; /* dW += d x^T; the columns beyond a row add 0 to the next */
-            p.out_stride = in;
+            p.out = slot_gradient; /* dW += d x^T */
+            p.out_stride = padded + 16;
             p.a = d;
             p.a_row = SSDGS__BLOCK;
             p.a_k = 1;
@@ -2826,12 +2860,12 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
             p.depth_list = lists->all;
             p.accumulate = 1;
             k->dense(&p);
-            k->row_sums(dweights + at + in * out, d, outs, live_out);
+            k->row_sums(slot_gradient + padded, padded + 16, d, outs, live_out);
         }
         p.out = spare; /* dx = W^T d */
         p.out_stride = p.b_stride = SSDGS__BLOCK;
         p.columns = SSDGS__BLOCK;
-        p.a = weights + at;
+        p.a = weights;
         p.a_row = 1;
         p.a_k = in;
         p.b = d;
@@ -2840,12 +2874,9 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         p.depth = live_out;
         p.depth_list = outs;
         p.accumulate = 0;
+        p.mask = layer ? layer_in : NULL;
         k->dense(&p);
-        if (layer) {
-            k->relu_backward(spare, layer_in, list, live_in);
-            layer_in = layer > 1 ? layer_in - (size_t)sizes[layer - 1] * SSDGS__BLOCK : inputs;
-            at -= (size_t)(sizes[layer - 1] + 1) * in;
-        }
+        if (layer) layer_in = layer > 1 ? layer_in - (size_t)sizes[layer - 1] * SSDGS__BLOCK : inputs;
         live_out = live_in;
         outs = list;
         d = spare;
@@ -2881,6 +2912,13 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
     if (!shadow && frame->settings.depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
 #undef SSDGS__INPUT
     return n;
+}
+
+/* How many of the scattering network's inputs pass a gradient on: all before the depth cue, which is held fixed. */
+static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layout *l) {
+    ssdgs__input in[6];
+    const int n = ssdgs__inputs(frame, l, 0, in);
+    return in[n - 1].from == l->cue ? in[n - 1].row : l->scattering[0];
 }
 
 static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *gauss,
@@ -2919,7 +2957,7 @@ typedef struct ssdgs__shade_job {
     ssdgs_frame *frame;
     ssdgs__block_layout layout;
     int blocks;
-    size_t slot_stride;
+    size_t slot_stride, slot_shadow; /* slots: the scattering network's gradient, then the shadow network's */
     ssdgs__lighting *lightings; /* per light */
     ssdgs_real *shadow_logit;   /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
@@ -3119,9 +3157,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], at[SSDGS__BLOCK];
+    size_t at[SSDGS__BLOCK];
     int light, s, c;
-    ssdgs__global_groups(&frame->settings, first);
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
     for (s = 0; s < SSDGS__BLOCK; s++) {
         const int live = block * SSDGS__BLOCK + s < frame->shaded_count;
@@ -3142,16 +3179,16 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
                                               part + l->scattering_at, dnet, dnet2,
-                                              scratch + l->transposed, lists,
-                                              frame->frozen[0] ? NULL : slot_gradient + first[SSDGS__SCATTERING_NET]);
+                                              scratch + l->transposed, lists, ssdgs__inputs_asked(frame, l),
+                                              frame->frozen[0] ? NULL : slot_gradient);
             ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
-                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists,
-                                              frame->frozen[1] ? NULL : slot_gradient + first[SSDGS__SHADOW_NET]);
+                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists, l->shadow[0],
+                                              frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
             ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
@@ -3174,18 +3211,16 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
         ssdgs__shade_backward_block(job, block, &lists, slot);
 }
 
-#define SSDGS__REDUCE 4096 /* shared parameters summed by one task */
-
-static void ssdgs__reduce_task(void *data, int index) {
+static void ssdgs__sum_slots_task(void *data, int part) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
-    const size_t begin = (size_t)index * SSDGS__REDUCE, n = job->frame->model->global_count, end = begin + SSDGS__REDUCE < n
-        ? begin + SSDGS__REDUCE : n;
-    ssdgs_real *out = job->frame->global_gradient;
-    size_t i;
-    int slot;
-    memcpy(out + begin, job->slots + begin, (end - begin) * sizeof *out);
-    for (slot = 1; slot < SSDGS__SLOTS; slot++)
-        for (i = begin; i < end; i++) out[i] += job->slots[job->slot_stride * (size_t)slot + i];
+    const ssdgs__block_layout *l = &job->layout;
+    ssdgs_frame *frame = job->frame;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    ssdgs__global_groups(&frame->settings, first);
+    ssdgs__sum_slots(l->scattering, l->scattering_layers, job->slots, job->slot_stride, SSDGS__SLOTS, part, SSDGS__SLOTS,
+                     frame->global_gradient + first[SSDGS__SCATTERING_NET]);
+    ssdgs__sum_slots(l->shadow, l->shadow_layers, job->slots + job->slot_shadow, job->slot_stride, SSDGS__SLOTS, part,
+                     SSDGS__SLOTS, frame->global_gradient + first[SSDGS__SHADOW_NET]);
 }
 
 /* Overwrites gradient, global_gradient and light_gradient; adds the eye's part to view_gradient. */
@@ -3198,13 +3233,15 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     int slot, light, j, c, lane;
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
-    job.slot_stride = (frame->model->global_count + 79) / 64 * 64;
+    job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
+    job.slot_stride = job.slot_shadow + ssdgs__slot_gradient_size(job.layout.shadow, job.layout.shadow_layers);
     job.activations = (ssdgs_real *)frame->memory->activations.memory;
-    SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
     SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
     memset(frame->gradient, 0, n * sizeof(ssdgs_real));
+    memset(frame->global_gradient, 0, frame->model->global_count * sizeof(ssdgs_real));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_backward_task, &job);
-    ssdgs__parallel(context, (int)((frame->model->global_count + SSDGS__REDUCE - 1) / SSDGS__REDUCE), ssdgs__reduce_task, &job);
+    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__sum_slots_task, &job);
     memset(sums, 0, sizeof sums);
     memset(frame->light_gradient, 0, sizeof frame->light_gradient);
     for (slot = 0; slot < SSDGS__SLOTS; slot++)
@@ -6062,16 +6099,18 @@ SSDGS__FI void F(sum4)(R *out, V a, V b, V c, V d) {
 #endif
 }
 
-#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
 /* Four rows of four values become columns. */
 SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_stride) {
-    __m128 r[4];
     int i;
+#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+    __m128 r[4];
     SSDGS__UNROLL for (i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
     SSDGS__UNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
-}
+#else
+    for (i = 0; i < 16; i++) out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] = in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
 #endif
+}
 
 /* ==== >>vmath  elementary functions on V ==== */
 
@@ -6811,6 +6850,7 @@ SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const F(offsets) *depth, c
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
     const F(offsets) *const end = depth + p->depth;
+    size_t out[6];
     int i, v;
     SSDGS__UNROLL for (i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
@@ -6826,13 +6866,24 @@ SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const F(offsets) *depth, c
             SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
         }
     }
-    SSDGS__UNROLL for (i = 0; i < rows; i++)
-        SSDGS__UNROLL for (v = 0; v < vectors; v++) {
-            R *o = p->out + (size_t)row[i] * p->out_stride + column + v * SSDGS__VW;
-            if (p->accumulate) sum[i][v] = VADD(sum[i][v], VLOAD(o));
-            if (p->relu) sum[i][v] = VMAX(sum[i][v], VSET(0));
-            VSTORE(o, sum[i][v]);
-        }
+    SSDGS__UNROLL for (i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
+    if (p->accumulate) {
+        SSDGS__UNROLL for (i = 0; i < rows; i++)
+            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
+    }
+    if (p->relu) {
+        SSDGS__UNROLL for (i = 0; i < rows; i++)
+            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VMAX(sum[i][v], VSET(0));
+    }
+    if (p->mask) {
+        SSDGS__UNROLL for (i = 0; i < rows; i++)
+            SSDGS__UNROLL for (v = 0; v < vectors; v++)
+                sum[i][v] = VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
+    }
+    SSDGS__UNROLL for (i = 0; i < rows; i++) {
+        R *const to = p->out + out[i];
+        SSDGS__UNROLL for (v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
+    }
 }
 
 /* All rows over some columns, in tiles of about equal height. */
@@ -6853,13 +6904,19 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) *depth
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
     F(offsets) depth[1024];
-    int column = 0, k;
+    int left = (p->columns / SSDGS__VW + SSDGS__TV - 1) / SSDGS__TV, column = 0, k;
     for (k = 0; k < p->depth; k++) {
         depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);
         depth[k].b = (uint32_t)(p->depth_list[k] * p->b_stride);
     }
-    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW) F(dense_columns)(p, depth, SSDGS__TV, column);
-    for (; column < p->columns; column += SSDGS__VW) F(dense_columns)(p, depth, 1, column);
+    for (; left; left--) { /* tiles of about equal width */
+        const int vectors = ((p->columns - column) / SSDGS__VW + left - 1) / left;
+        if (vectors == SSDGS__TV) F(dense_columns)(p, depth, SSDGS__TV, column);
+        else if (SSDGS__TV > 3 && vectors == 3) F(dense_columns)(p, depth, 3, column);
+        else if (SSDGS__TV > 2 && vectors == 2) F(dense_columns)(p, depth, 2, column);
+        else F(dense_columns)(p, depth, 1, column);
+        column += vectors * SSDGS__VW;
+    }
 }
 
 /* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns how many. */
@@ -6874,15 +6931,19 @@ SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
     return n;
 }
 
-/* (count, BLOCK) -> (BLOCK, stride), columns from count to stride 0. */
+/* (count, BLOCK) -> (BLOCK, stride), columns from count to stride 0; stride is a multiple of 4. */
 SSDGS__FN void F(transpose)(const R *rows, int count, size_t stride, R *out) {
-    size_t i = 0, s;
-#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
-    for (; i + 4 <= (size_t)count; i += 4)
-        for (s = 0; s < SSDGS__BLOCK; s += 4) F(transpose4)(rows + i * SSDGS__BLOCK + s, SSDGS__BLOCK, out + s * stride + i, stride);
-#endif
-    for (; i < stride; i++)
-        for (s = 0; s < SSDGS__BLOCK; s++) out[s * stride + i] = i < (size_t)count ? rows[i * SSDGS__BLOCK + s] : 0;
+    const R *end = rows + count * SSDGS__BLOCK;
+    R last[4 * SSDGS__BLOCK];
+    size_t i, s;
+    for (i = 0; i < stride; i += 4, rows += 4 * SSDGS__BLOCK) {
+        const R *from = rows;
+        if (end < rows + 4 * SSDGS__BLOCK) {
+            for (s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
+            from = last;
+        }
+        for (s = 0; s < SSDGS__BLOCK; s += 4) F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
+    }
 }
 
 #if SSDGS__ISA == SSDGS__ISA_AVX512 && SSDGS__BF16
@@ -6936,23 +6997,17 @@ SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weigh
 #define SSDGS__DENSE_BF16 NULL
 #endif
 
-/* d(ReLU): the listed rows of gradient (rows, SSDGS__BLOCK) are zeroed where the layer's output is not positive. */
-SSDGS__FN void F(relu_backward)(R *gradient, const R *output, const uint16_t *list, int count) {
-    int i, s;
+/* sums (16 of every stride, per row) += each listed row of rows (., SSDGS__BLOCK) by sixteenths. */
+SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t *list, int count) {
+    int i, j, s;
     for (i = 0; i < count; i++)
-        for (s = list[i] * SSDGS__BLOCK; s < (list[i] + 1) * SSDGS__BLOCK; s += SSDGS__VW)
-            VSTORE(gradient + s, VSEL(VLT(VSET(0), VLOAD(output + s)), VLOAD(gradient + s), VSET(0)));
-}
-
-/* sums[row] += the sum of each listed row of rows (., SSDGS__BLOCK). */
-SSDGS__FN void F(row_sums)(R *sums, const R *rows, const uint16_t *list, int count) {
-    int i, s;
-    for (i = 0; i < count; i++) {
-        const R *row = rows + list[i] * SSDGS__BLOCK;
-        V sum = VLOAD(row);
-        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) sum = VADD(sum, VLOAD(row + s));
-        sums[list[i]] += F(sum)(sum);
-    }
+        for (j = 0; j < 16; j += SSDGS__VW) {
+            const R *row = rows + list[i] * SSDGS__BLOCK + j;
+            R *out = sums + list[i] * stride + j;
+            V sum = VLOAD(row);
+            for (s = 16; s < SSDGS__BLOCK; s += 16) sum = VADD(sum, VLOAD(row + s));
+            VSTORE(out, VADD(VLOAD(out), sum));
+        }
 }
 
 /* ==== >>encode_kernel  enc_L(v) = (v, sin v, .., sin 2^(L-1) v, cos v, .., cos 2^(L-1) v), each per component ====
@@ -7550,7 +7605,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(relu_backward), F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
+    F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
         F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
 };

@@ -259,7 +259,7 @@ static network make_network(ssdgs_model *model) {
     n.transposed = n.spare + widest * SSDGS__BLOCK;
     n.inputs = n.transposed + widest * SSDGS__BLOCK;
     n.outputs = n.inputs + widest * SSDGS__BLOCK;
-    n.gradient = take(model->context, ssdgs__network_count(&model->settings, 0) + 128);
+    n.gradient = take(model->context, ssdgs__slot_gradient_size(n.sizes, n.layers));
     n.packed = (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
     n.pairs = ssdgs__pack_weights(n.sizes, n.layers, n.weights, n.packed);
     for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
@@ -299,7 +299,7 @@ static void kernel_task(void *data, int task) {
         case BACKWARD:
             memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
             ssdgs__network_backward(k, n->sizes, n->layers, n->weights, n->inputs, n->outputs, n->d, n->spare,
-                                    n->transposed, n->lists, n->gradient);
+                                    n->transposed, n->lists, n->sizes[0], n->gradient);
             break;
         default:
             for (i = 0; i < job->share; i += 8) {

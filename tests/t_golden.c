@@ -392,7 +392,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     ssdgs__row_lists lists;
     ssdgs__block_layout l;
     ssdgs__lighting k;
-    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
+    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *slot, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
     const char *prefix = shadow && residual ? "res_" : "";
     char key[64];
     double *out;
@@ -474,11 +474,13 @@ static void test_network(const char *name, int shadow, int residual, int default
         transposed = reals((size_t)(l.widest + 16) * BLOCK);
         dvisibility = reals(BLOCK);
         dother = reals((size_t)(l.widest + 1) * BLOCK);
-        dweights = reals(count + 64);
+        dweights = reals(count);
+        slot = reals(ssdgs__slot_gradient_size(sizes, layers));
         context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, dgauss, drows, shadow ? dnet : dother,
                                     shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, dweights);
+        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, sizes[0], slot);
+        ssdgs__sum_slots(sizes, layers, slot, 0, 1, 0, 1, dweights);
         ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
     }
     snprintf(key, sizeof key, "%sgrad_weights", prefix);
@@ -508,6 +510,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     free(dvisibility);
     free(dother);
     free(dweights);
+    free(slot);
     gold_close(&file);
 }
 
