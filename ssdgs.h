@@ -99,8 +99,9 @@ CONVENTIONS
             ssdgs_trainer_create() gives an empty model the light_scale that makes E 1 on average at the centre of the
             bounds; it stays in the model.
   colour    transfer says how stored values, in photographs and image files, relate to the colours that are blended:
-            SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and alpha blends linear light;
-            SSDGS_TRANSFER_NONE: they are the same. ssdgs_render() never encodes: linear light out (or stored values),
+            SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and Gaussians blend linear light;
+            SSDGS_TRANSFER_NONE: they are the same. A photograph's alpha blends stored values, as image programs do it, and
+            ssdgs_compose() does the same to a rendering. ssdgs_render() never encodes: linear light out (or stored values),
             not clamped; render options give `background` likewise. ssdgs_to_bytes() encodes. Training options,
             ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value; ssdgs_evaluate() and
             ssdgs_compare() deal in stored values.
@@ -533,6 +534,10 @@ SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear);
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 /* Clamps, encodes by the model's transfer and rounds (count) values to bytes. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
+/* Stored values (pixels,3) of a rendering without background, color (pixels,3) and alpha (pixels), laid over one of stored
+   values: alpha encode(color / alpha) + (1 - alpha) background. stored may be color. */
+SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
+                             const ssdgs_real background[3], ssdgs_real *stored);
 
 typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
 
@@ -700,7 +705,7 @@ typedef struct ssdgs_frame {
     ssdgs_real *pixels;         /* (3, h, w) without background */
     ssdgs_real *transmittance;  /* (h, w) */
     /* backward */
-    ssdgs_real *pixel_gradient; /* (3, h, w) dL/d(pixels + transmittance x background) */
+    ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
     ssdgs_real *splat_gradient; /* (n, SSDGS_SPLAT_GRADIENTS) */
     ssdgs_real *color_gradient; /* (n, 4) */
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
@@ -2196,7 +2201,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     SSDGS__RESERVE(m->pixels, frame->pixels, ssdgs_real, pixels * 3);
     SSDGS__RESERVE(m->transmittance, frame->transmittance, ssdgs_real, pixels);
     if (training) {
-        SSDGS__RESERVE(m->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 3);
+        SSDGS__RESERVE(m->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 4);
         SSDGS__RESERVE(m->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
         SSDGS__RESERVE(m->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
         SSDGS__RESERVE(m->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
@@ -3311,14 +3316,13 @@ static void ssdgs__composite_backward_task(void *data, int index) {
             const int x = tile.x + 4 * (micro & 3) + (lane & 3), y = tile.y + 4 * (micro >> 2) + (lane >> 2);
             const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
             ssdgs_real *p = pixels + micro * 64 + lane, total = 0;
+            for (c = 0; c < 4; c++) p[16 * c] = 0;
+            if (x >= v->width || y >= v->height) continue;
             for (c = 0; c < 3; c++) {
-                const int inside = x < v->width && y < v->height;
-                const ssdgs_real d = inside ? frame->pixel_gradient[plane * (size_t)c + at] : 0;
-                p[16 * c] = d;
-                if (inside) total += d *
-                    (frame->pixels[plane * (size_t)c + at] + frame->transmittance[at] * frame->options.background[c]);
+                p[16 * c] = frame->pixel_gradient[plane * (size_t)c + at];
+                total += p[16 * c] * frame->pixels[plane * (size_t)c + at];
             }
-            p[48] = total;
+            p[48] = total + frame->transmittance[at] * frame->pixel_gradient[plane * 3 + at];
         }
     frame->context->k->composite_backward(&tile, frame->color, pixels, v->tile_sums + (size_t)v->tile_start[index] * SSDGS__SUMS);
 }
@@ -3555,6 +3559,19 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
         if (transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(x);
         bytes[i] = (unsigned char)(x * 255 + (ssdgs_real)0.5);
     }
+}
+
+#define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which colours are not divided by it */
+
+SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
+                             const ssdgs_real background[3], ssdgs_real *stored) {
+    size_t i, c;
+    for (i = 0; i < pixels; i++)
+        for (c = 0; c < 3; c++) {
+            const ssdgs_real straight = color[3 * i + c] / (alpha[i] > SSDGS__THIN ? alpha[i] : SSDGS__THIN);
+            const ssdgs_real value = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_encode(straight) : straight;
+            stored[3 * i + c] = alpha[i] * value + (1 - alpha[i]) * background[c];
+        }
 }
 
 typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
@@ -4830,30 +4847,19 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
 
 /* ---- one photograph ---- */
 
-/* Stored values of pixels begin .. end of a photograph on the background, as planes. Alpha is composited in linear light, or
-   as stored. */
-static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], int transfer, size_t begin, size_t end,
+/* Stored values of pixels begin .. end of a photograph on the background, as planes. */
+static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin, size_t end,
                                 ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     const ssdgs_real unit = photo->format == SSDGS_PIXELS_RGBA8 ? (ssdgs_real)(1.0 / 255) : (ssdgs_real)(1.0 / 65535);
-    ssdgs_real linear_background[3];
     size_t i;
     int c;
-    for (c = 0; c < 3; c++) linear_background[c] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(background[c])
-        : background[c];
     for (i = begin; i < end; i++) {
         ssdgs_real v[4];
         for (c = 0; c < 4; c++)
             v[c] = unit * (ssdgs_real)(photo->format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photo->pixels)[4 * i + (size_t)c]
                                                                          : ((const uint16_t *)photo->pixels)[4 * i + (size_t)c]);
-        for (c = 0; c < 3; c++) {
-            ssdgs_real x = v[c];
-            if (v[3] <= 0) x = background[c];
-            else if (v[3] < 1 && transfer == SSDGS_TRANSFER_SRGB) x =
-                ssdgs_srgb_encode(v[3] * ssdgs_srgb_decode(x) + (1 - v[3]) * linear_background[c]);
-            else if (v[3] < 1) x = v[3] * x + (1 - v[3]) * background[c];
-            planes[pixels * (size_t)c + i] = x;
-        }
+        for (c = 0; c < 3; c++) planes[pixels * (size_t)c + i] = v[3] * v[c] + (1 - v[3]) * background[c];
     }
 }
 
@@ -4921,39 +4927,48 @@ typedef struct ssdgs__exposure_job {
     ssdgs_frame *frame;
     const ssdgs_photo *photo;
     const ssdgs_real *background; /* stored values */
-    ssdgs_real *image, *slope, *target; /* planes of stored values; d stored / d linear */
+    ssdgs_real *image, *slope, *lift, *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
 } ssdgs__exposure_job;
 
-/* The rendered image as stored values, beside the photograph on the same background. */
+/* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 - T),
+   image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u encode'(u). */
 static void ssdgs__exposure_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
     const ssdgs_frame *frame = job->frame;
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height, begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
-    const int srgb = frame->settings.transfer == SSDGS_TRANSFER_SRGB;
-    ssdgs_real image[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    const ssdgs_real *t = frame->transmittance + begin;
+    ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
     size_t i;
     int c;
-    ssdgs__photo_planes(job->photo, job->background, frame->settings.transfer, begin, begin + n, job->target);
+    ssdgs__photo_planes(job->photo, job->background, begin, begin + n, job->target);
     for (c = 0; c < 3; c++) {
         const size_t at = pixels * (size_t)c + begin;
-        for (i = 0; i < n; i++)
-            image[i] = frame->pixels[at + i] + frame->transmittance[begin + i] * frame->options.background[c];
-        for (i = n; i < n + 16; i++) image[i] = 0;
-        if (srgb) {
-            frame->context->k->srgb_encode(image, slope, image, n);
-            memcpy(job->slope + at, slope, n * sizeof *slope);
+        for (i = 0; i < n; i++) straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
+        for (i = n; i < n + 16; i++) straight[i] = 0;
+        if (frame->settings.transfer == SSDGS_TRANSFER_SRGB) frame->context->k->srgb_encode(stored, slope, straight, n);
+        for (i = 0; i < n; i++) {
+            const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
+            const ssdgs_real s = linear ? straight[i] : stored[i], d = linear ? 1 : slope[i];
+            job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
+            job->slope[at + i] = d;
+            job->lift[at + i] = job->background[c] - s + d * straight[i];
         }
-        memcpy(job->image + at, image, n * sizeof *image);
     }
 }
 
 static void ssdgs__exposure_backward_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
-    const size_t n = 3 * (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
-    const size_t begin = (size_t)index * 3 * SSDGS__PIXELS, end = begin + 3 * SSDGS__PIXELS < n ? begin + 3 * SSDGS__PIXELS : n;
-    size_t i;
-    for (i = begin; i < end; i++) job->frame->pixel_gradient[i] *= job->slope[i];
+    const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height, begin = (size_t)index * SSDGS__PIXELS;
+    const size_t end = begin + SSDGS__PIXELS < pixels ? begin + SSDGS__PIXELS : pixels;
+    ssdgs_real *gradient = job->frame->pixel_gradient, *transmittance_gradient = gradient + 3 * pixels;
+    size_t i, c;
+    for (i = begin; i < end; i++) transmittance_gradient[i] = 0;
+    for (c = 0; c < 3; c++)
+        for (i = begin; i < end; i++) {
+            transmittance_gradient[i] += gradient[pixels * c + i] * job->lift[pixels * c + i];
+            gradient[pixels * c + i] *= job->slope[pixels * c + i];
+        }
 }
 
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
@@ -4962,29 +4977,27 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
                                           const ssdgs_light *light, const ssdgs_real background[3], int terms,
                                           const int frozen[2], ssdgs_real dssim, ssdgs__loss_values *values) {
     ssdgs_context *context = model->context;
-    const int srgb = model->settings.transfer == SSDGS_TRANSFER_SRGB;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options = ssdgs_render_options_exact();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     ssdgs__exposure_job job;
     ssdgs_result result;
-    int c;
     options.terms = terms;
-    for (c = 0; c < 3; c++) options.background[c] = srgb ? ssdgs_srgb_decode(background[c]) : background[c];
     result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 6);
+    SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 9);
     SSDGS__RESERVE(frame->memory->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
     job.photo = photo;
     job.background = background;
     job.slope = job.image + pixels * 3;
+    job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
     result = ssdgs__loss(context, &frame->memory->loss, job.image, job.target, camera->width, camera->height, dssim,
                          frame->pixel_gradient, values);
     if (result) return result;
-    if (srgb) ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
+    ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
     memcpy(frame->frozen, frozen, sizeof frame->frozen);
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
@@ -5655,17 +5668,13 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     planes = rendered + 6 * pixels;
     memset(&out, 0, sizeof out);
     out.color = rendered;
-    for (c = 0; c < 3; c++) options.background[c] = model->settings.transfer == SSDGS_TRANSFER_SRGB
-        ? ssdgs_srgb_decode(background[c]) : background[c];
+    out.alpha = planes;
     result = ssdgs_render_ex(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
-        ssdgs__photo_planes(photo, background, model->settings.transfer, 0, pixels, planes);
+        ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
+        ssdgs__photo_planes(photo, background, 0, pixels, planes);
         for (i = 0; i < pixels; i++)
-            for (c = 0; c < 3; c++) {
-                ssdgs_real *x = rendered + 3 * i + c;
-                target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
-                if (model->settings.transfer == SSDGS_TRANSFER_SRGB) *x = ssdgs_srgb_encode(*x > 0 ? *x : 0);
-            }
+            for (c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
         if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);
         result = ssdgs_compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
     }
@@ -6765,9 +6774,9 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
     }
 }
 
-/* pixels: [micro-tile][3 colour gradients, their dot product with the final colour][16 lanes]. Per entry, sums (n, 12) of
+/* pixels: [micro-tile][3 colour gradients, their sum with the pixel's colours and transmittance][16 lanes]. Per entry, sums (n, 12) of
    g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w, 0, w dC. Walks front to back again: what lies
-   behind an entry is the final colour less what has been passed, so alpha and T are the forward's, bit for bit. */
+   behind an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, const R *pixels, R *sums) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
     F(batch) batch;

@@ -63,7 +63,7 @@ typedef struct bench {
     olat_dataset data;                    /* the test split */
     ssdgs_photo photos[MAX_PHOTOS], scaled[MAX_PHOTOS]; /* some of it, and to SIDE x SIDE */
     int photo_count, views;               /* for quality, for times */
-    ssdgs_real *color;                    /* (MAX_PIXELS, 3) */
+    ssdgs_real *color, *alpha;            /* (MAX_PIXELS, 3), (MAX_PIXELS) */
     char cpu[128];
     table tables[MAX_TABLES];
     struct { char key[64]; double value; } facts[MAX_FACTS];
@@ -488,20 +488,19 @@ static job training_job(const bench *b, job j, ssdgs_trainer *trainer, int phase
 
 typedef struct quality { double psnr_exact, max_error, psnr_photo; } quality;
 
+static const ssdgs_real black[3] = {0, 0, 0};
+
 /* Stored values within [0,1] of a photograph's view, left in color. */
 static void render_stored(bench *b, session *s, const ssdgs_photo *photo, const ssdgs_render_options *options) {
-    ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    int i;
+    ssdgs_image image = {0, b->color, b->alpha, NULL, NULL, NULL, NULL, NULL, NULL};
+    const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    size_t i;
     check(s->context, ssdgs_render_ex(s->model, &photo->camera, &photo->light, 1, options, &image, NULL));
-    for (i = 0; i < 3 * photo->camera.width * photo->camera.height; i++) {
-        ssdgs_real x = b->color[i] > 0 ? b->color[i] : 0;
-        if (s->model->settings.transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(x);
-        b->color[i] = x < 1 ? x : 1;
-    }
+    ssdgs_compose(b->color, b->alpha, pixels, s->model->settings.transfer, black, b->color);
+    for (i = 0; i < 3 * pixels; i++) b->color[i] = b->color[i] < 0 ? 0 : b->color[i] > 1 ? 1 : b->color[i];
 }
 
 static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count, quality *out) {
-    static const ssdgs_real black[3] = {0, 0, 0};
     const int views = s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
     ssdgs_real *exact[MAX_PHOTOS], *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
     int o, v;
@@ -515,7 +514,7 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
             size_t i;
             render_stored(b, s, photo, options + o);
             if (!o) exact[v] = (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
-            ssdgs__photo_planes(photo, black, s->model->settings.transfer, 0, n, target);
+            ssdgs__photo_planes(photo, black, 0, n, target);
             for (i = 0; i < 3 * n; i++) {
                 error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
                 photo_squares += error * error;
@@ -1106,7 +1105,8 @@ int main(int argc, char **argv) {
     b.dataset = given[0] ? given[0] : "examples/data/waxcow";
     b.prefix = "";
     b.model = paths[0];
-    b.color = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *b.color);
+    b.color = (ssdgs_real *)make(4 * MAX_PIXELS, sizeof *b.color);
+    b.alpha = b.color + 3 * MAX_PIXELS;
     load_photos(&b);
     look_at_machine(&b);
     printf("%s, %s, %d threads, %s; %s, %d test views\n", b.cpu, ssdgs_isa_string((ssdgs_isa)b.best_isa),

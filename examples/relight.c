@@ -315,9 +315,8 @@ static int make_planes(job *j)
 static ssdgs_result render(job *j, int index, int components)
 {
     const olat_frame *frame = &j->data.frames[index];
-    size_t i, count = (size_t)frame->camera.width * (size_t)frame->camera.height * 3;
+    size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     int transfer = ssdgs_model_settings(j->model)->transfer;
-    ssdgs_render_options options = ssdgs_render_options_default();
     ssdgs_image planes = j->planes;
     ssdgs_result result;
     if (frame->has_image) {
@@ -332,18 +331,16 @@ static ssdgs_result render(job *j, int index, int components)
     if (!components) {
         memset(&planes, 0, sizeof planes);
         planes.color = j->planes.color;
+        planes.alpha = j->planes.alpha;
     }
-    memcpy(options.background, j->background, sizeof options.background); /* 0 and 1 are the same in linear light */
-    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, NULL);
-    for (i = 0; !result && !frame->has_image && i < count; i++)
-        j->image[i] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_encode(planes.color[i]) : planes.color[i];
+    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, NULL, &planes, NULL);
+    if (!result && !frame->has_image) ssdgs_compose(planes.color, planes.alpha, pixels, transfer, j->background, j->image);
     return result;
 }
 
-/* The photograph over the background, composited as the model's transfer says. */
+/* The photograph over the background. */
 static void show_photo(const job *j, const olat_frame *frame, ssdgs_real *out, size_t pixels)
 {
-    int linear = ssdgs_model_settings(j->model)->transfer == SSDGS_TRANSFER_SRGB;
     size_t i, k;
     for (i = 0; i < pixels * 3; i++) out[i] = 0;
     for (i = 0; frame->has_image && i < pixels; i++) {
@@ -351,10 +348,7 @@ static void show_photo(const job *j, const olat_frame *frame, ssdgs_real *out, s
         for (k = 0; k < 4; k++)
             v[k] = frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)((const uint16_t *)frame->pixels)[4 * i + k] / 65535
                                                         : (ssdgs_real)((const unsigned char *)frame->pixels)[4 * i + k] / 255;
-        for (k = 0; k < 3; k++) {
-            out[3 * i + k] = v[3] * (linear ? ssdgs_srgb_decode(v[k]) : v[k]) + (1 - v[3]) * j->background[k];
-            if (linear) out[3 * i + k] = ssdgs_srgb_encode(out[3 * i + k]);
-        }
+        for (k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * j->background[k];
     }
 }
 

@@ -16,11 +16,12 @@
 
 enum {
     OUTPUT, ITERATIONS, BACKGROUND, PRESET, TRANSFER, SCHEDULE, TERMS, SEED, THREADS, MAX_GAUSSIANS, POINTS, CHECKPOINT_EVERY,
-    ISA, TRAIN_JSON, RESUME, REFINE, OPTION_COUNT /* the flags, RESUME and on, take no value */
+    ISA, TRAIN_JSON, SET, RESUME, REFINE, OPTION_COUNT /* the flags, RESUME and on, take no value */
 };
 static const char *const option_names[OPTION_COUNT] = {
     "-o", "--iterations", "--background", "--preset", "--transfer", "--schedule", "--terms", "--seed", "--threads",
-    "--max-gaussians", "--points", "--checkpoint-every", "--isa", "--train-json", "--resume", "--refine"
+    "--max-gaussians", "--points", "--checkpoint-every", "--isa", "--train-json", "--set",
+    "--resume", "--refine"
 };
 
 static int usage(const char *problem, const char *what)
@@ -29,8 +30,53 @@ static int usage(const char *problem, const char *what)
             "usage: train DATASET -o MODEL.ply [--iterations N] [--background black|white] [--preset default|published]\n"
             "             [--transfer srgb|none] [--schedule progressive|joint|swapped|merged] [--resume] [--refine]\n"
             "             [--terms diffuse,specular,shadow,scattering] [--max-gaussians N] [--points N] [--seed N]\n"
-            "             [--checkpoint-every N] [--train-json FILE] [--threads N] [--isa NAME]\n", problem, what);
+            "             [--checkpoint-every N] [--train-json FILE] [--threads N] [--isa NAME]\n"
+            "             [--set NAME=VALUE[,VALUE...]]: any number or rate of ssdgs_settings or ssdgs_train_options\n",
+            problem, what);
     return 2;
+}
+
+/* What --set can set, by the names of ssdgs.h: so many ints or reals. */
+typedef struct field { const char *name; int in_options, reals, count; size_t at; } field;
+#define SETTING(reals, count, name) {#name, 0, reals, count, offsetof(ssdgs_settings, name)}
+#define OPTION(reals, count, name) {#name, 1, reals, count, offsetof(ssdgs_train_options, name)}
+static const field fields[] = {
+    SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue),
+    SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
+    SETTING(0, 1, scattering_width), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
+    SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, eta),
+    OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
+    OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim),
+    OPTION(1, 3, bounds_min), OPTION(1, 3, bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size),
+    OPTION(1, 1, prune_opacity), OPTION(1, 2, position), OPTION(1, 2, opacity), OPTION(1, 2, scale), OPTION(1, 2, rotation),
+    OPTION(1, 2, color), {"asg_rate", 1, 1, 2, offsetof(ssdgs_train_options, asg)}, OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
+    OPTION(1, 2, scattering), OPTION(1, 2, camera_rate), OPTION(1, 2, light_rate)
+};
+
+/* NAME=VALUE[,VALUE...]; 0 when it is not understood. */
+static int set_field(ssdgs_settings *settings, ssdgs_train_options *options, const char *text)
+{
+    size_t length = strcspn(text, "="), i;
+    for (i = 0; i < sizeof fields / sizeof *fields; i++) {
+        const field *f = fields + i;
+        unsigned char *to = (f->in_options ? (unsigned char *)options : (unsigned char *)settings) + f->at;
+        const char *p = text + length;
+        int n;
+        if (strlen(f->name) != length || strncmp(text, f->name, length)) continue;
+        for (n = 0; n < f->count && *p; n++) {
+            char *end;
+            double value = strtod(p + 1, &end);
+            ssdgs_real real = (ssdgs_real)value;
+            int whole = value > -2e9 && value < 2e9 ? (int)value : 0;
+            if (end == p + 1 || (*end && *end != ',')) return 0;
+            if (!f->reals && (value < whole || value > whole)) return 0;
+            if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
+            else memcpy(to, &whole, sizeof whole);
+            p = end;
+        }
+        return n == f->count && !*p;
+    }
+    return 0;
 }
 
 /* The place of word[0 .. length) in a list like "black|white", or -1. */
@@ -153,7 +199,7 @@ typedef struct job {
 static int parse(job *j, int argc, char **argv)
 {
     const char **given = j->given, *terms;
-    int i, option, white = 0, preset = 0, seed = 1, isa = 0;
+    int i, option, sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
     for (i = 1; i < argc; i++) {
         if (argv[i][0] != '-') {
             if (j->dataset) return usage("a second dataset:", argv[i]);
@@ -164,6 +210,7 @@ static int parse(job *j, int argc, char **argv)
         if (option == OPTION_COUNT) return usage("no such option:", argv[i]);
         if (option < RESUME && i + 1 == argc) return usage("a value is missing after", argv[i]);
         given[option] = option < RESUME ? argv[++i] : "";
+        if (option == SET) argv[sets++] = argv[i]; /* for later: they change what a preset has set */
     }
     if (!j->dataset || !given[OUTPUT]) return usage("needs a DATASET and", "-o MODEL.ply");
 
@@ -193,6 +240,8 @@ static int parse(job *j, int argc, char **argv)
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
     j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
+    for (i = 0; i < sets; i++)
+        if (!set_field(&j->settings, &j->options, argv[i])) return usage("cannot set", argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
     return 0;
 }
@@ -203,13 +252,13 @@ static int fail(const char *message)
     return 1;
 }
 
-/* Prints the means over the test photographs, each one's pose and light first fitted by so many steps. */
-static ssdgs_result evaluate(job *j, int fit_steps, const char *label)
+/* Prints the means over every step-th of the photographs, each one's pose and light first fitted by so many steps. */
+static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps, const char *label)
 {
     ssdgs_metrics m, mean = {0, 0, 0};
-    int i, count = j->test_set.count;
+    int i, count = (all + step - 1) / step;
     for (i = 0; i < count; i++) {
-        ssdgs_photo photo = j->test_photos[i];
+        ssdgs_photo photo = photos[i * step];
         ssdgs_result result = fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
         if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, NULL, &m);
         if (result) return result;
@@ -217,7 +266,7 @@ static ssdgs_result evaluate(job *j, int fit_steps, const char *label)
         mean.ssim += m.ssim / count;
         mean.flip += m.flip / count;
     }
-    printf("test%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, mean.psnr, mean.ssim, mean.flip, count);
+    printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, mean.psnr, mean.ssim, mean.flip, count);
     return SSDGS_OK;
 }
 
@@ -300,7 +349,10 @@ static int train(job *j)
     if (!has_test) return 0;
     j->test_photos = olat_photos(&j->test_set);
     if (!j->test_photos) return fail("out of memory");
-    if (evaluate(j, 0, "") || (j->given[REFINE] && evaluate(j, 200, " (each photograph's pose and light fitted to it)")))
+    if (evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test") ||
+        (j->given[REFINE] && evaluate(j, j->test_photos, j->test_set.count, 1, 200,
+                                      "test (each photograph's pose and light fitted to it)")) ||
+        evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training"))
         return fail(ssdgs_error_message(j->context));
     return 0;
 }

@@ -16,7 +16,8 @@ static const any_function functions[] = {
     ADDRESS(ssdgs_trainer_destroy), ADDRESS(ssdgs_trainer_step), ADDRESS(ssdgs_trainer_run),
     ADDRESS(ssdgs_trainer_refined), ADDRESS(ssdgs_train_memory), ADDRESS(ssdgs_trainer_save),
     ADDRESS(ssdgs_trainer_load), ADDRESS(ssdgs_compare), ADDRESS(ssdgs_evaluate), ADDRESS(ssdgs_refine_photo),
-    ADDRESS(ssdgs_stage_cpu), ADDRESS(ssdgs_render_options_exact), ADDRESS(ssdgs_render_options_fast)
+    ADDRESS(ssdgs_stage_cpu), ADDRESS(ssdgs_render_options_exact), ADDRESS(ssdgs_render_options_fast),
+    ADDRESS(ssdgs_compose)
 };
 
 int main(void)

@@ -301,7 +301,7 @@ static void test_frozen(void) {
         ssdgs_frame frame;
         CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE));
-        for (i = 0; i < PIXELS * 3; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
+        for (i = 0; i < PIXELS * 4; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
         frame.frozen[0] = part & 1;
         frame.frozen[1] = part >> 1;
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));

@@ -72,6 +72,16 @@ static ssdgs_camera gold_camera(void) {
     return c;
 }
 
+/* dL/d(transmittance) of an image with the background behind it. */
+static void through_background(ssdgs_frame *frame) {
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    size_t i, c;
+    for (i = 0; i < pixels; i++) {
+        frame->pixel_gradient[3 * pixels + i] = 0;
+        for (c = 0; c < 3; c++) frame->pixel_gradient[3 * pixels + i] += frame->pixel_gradient[c * pixels + i] * frame->options.background[c];
+    }
+}
+
 static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
     ssdgs_model *model = NULL;
     ssdgs_model_view view;
@@ -131,6 +141,7 @@ static void test_raster(void) {
     check_image("image", image, value_bound());
     CHECK_NEAR(frame.transmittance, gold(&file, "transmittance", NULL), pixels, value_bound(), 0, "raster: transmittance");
     gold_planes("grad_image", frame.pixel_gradient);
+    through_background(&frame);
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD));
     memset(frame.gradient, 0, frame.gaussians.stride * SSDGS_CHANNELS * sizeof(ssdgs_real));
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_PROJECT_BACKWARD));
@@ -651,6 +662,7 @@ static void test_full(const char *name, int defaults) {
     loss[0] = values.loss;
     CHECK_NEAR(loss, gold(&file, "loss", NULL), 1, value_bound(), 0, "full: loss");
     for (i = 0; i < 3 * pixels && defaults; i++) frame.pixel_gradient[i] *= slope[i];
+    through_background(&frame);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
 #define GRADIENT(golden, plane) check_planes(golden, frame.gradient + (size_t)(plane) * stride, stride, gradient_bound())
     GRADIENT("grad_mean", SSDGS_POSITION);

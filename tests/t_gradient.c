@@ -56,6 +56,7 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
             const double weight = sin(0.37 * (double)i + 1.3 * (double)c);
             sum += weight * (frame->pixels[pixels * c + i] + frame->transmittance[i] * s->options.background[c]);
             frame->pixel_gradient[pixels * c + i] = weight;
+            frame->pixel_gradient[pixels * 3 + i] = (c ? frame->pixel_gradient[pixels * 3 + i] : 0) + weight * s->options.background[c];
         }
     if (backward && ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
     return sum;
@@ -245,12 +246,74 @@ static void test_shared_sums(void) {
     ssdgs_model_destroy(model);
 }
 
+/* A photograph with transparency on a background: the gradient goes through the blending of stored values. */
+static void test_photo(int transfer) {
+    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
+    static const int frozen[2] = {1, 1};
+    static unsigned char pixels[SIDE * SIDE * 4];
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    ssdgs__loss_values values;
+    ssdgs_photo photo;
+    ssdgs_frame frame;
+    tally t = {0, 0, 0, 0};
+    ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
+    size_t i, stride;
+    int side;
+    settings.transfer = transfer;
+    memset(&photo, 0, sizeof photo);
+    photo.camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    photo.light.position[0] = photo.light.position[1] = -2;
+    photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = 9;
+    photo.pixels = pixels;
+    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)(255.9 * draw(7000 + i));
+    if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
+    fill(model);
+    stride = model->capacity;
+    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, &values)) exit(1);
+    for (i = 0; i < SSDGS_CHANNELS * COUNT; i++) gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
+    for (i = 0; i < COUNT * SSDGS_SPECULAR; i += 5) { /* geometry, opacity, diffuse colour */
+        ssdgs_real *value = model->gaussians + i / COUNT * stride + i % COUNT, start = *value;
+        double loss[2], slope;
+        for (side = 0; side < 2; side++) {
+            *value = start + (side ? 1e-6 : -1e-6);
+            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, &values)) exit(1);
+            loss[side] = values.loss;
+        }
+        *value = start;
+        slope = (loss[1] - loss[0]) / 2e-6;
+        t.tried++;
+        t.norm += slope * slope;
+        t.error += (slope - gradient[i]) * (slope - gradient[i]);
+    }
+    if (!CHECK(t.error < 1e-6 * t.norm && t.norm > 0)) printf("    transfer %d: relative error %.3g\n", transfer, sqrt(t.error / t.norm));
+    ssdgs_model_destroy(model);
+}
+
+/* What a rendering looks like on a background is what a photograph of the same colour and alpha looks like. */
+static void test_compose(void) {
+    static const ssdgs_real background[3] = {0.7, 0.2, 0.5}, stored[3] = {0.9, 0.4, 0.02};
+    ssdgs_real color[6], alpha[2] = {0.25, 0}, out[6];
+    int transfer, c;
+    for (transfer = 0; transfer < 2; transfer++) {
+        for (c = 0; c < 3; c++) {
+            color[c] = alpha[0] * (transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(stored[c]) : stored[c]);
+            color[3 + c] = 0;
+        }
+        ssdgs_compose(color, alpha, 2, transfer, background, out);
+        for (c = 0; c < 3; c++) CHECK(fabs(out[c] - (0.25 * stored[c] + 0.75 * background[c])) < 1e-9 && fabs(out[3 + c] - background[c]) < 1e-15);
+    }
+}
+
 int main(void) {
     scene base, s;
     int i;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
     test_shared_sums();
+    test_photo(SSDGS_TRANSFER_SRGB);
+    test_photo(SSDGS_TRANSFER_NONE);
+    test_compose();
     memset(&base, 0, sizeof base);
     base.name = "default";
     base.settings = ssdgs_settings_default();
