@@ -323,7 +323,7 @@ typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0,        /* Gaussians -> records and depths of every view */
     SSDGS_STAGE_SORT,               /* -> order, nearest first */
     SSDGS_STAGE_BIN,                /* -> instances and tile lists */
-    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue (lights) */
+    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
     SSDGS_STAGE_SHADE,              /* -> color and the components asked for */
     SSDGS_STAGE_COMPOSITE,          /* -> image, transmittance */
     SSDGS_STAGE_COMPOSITE_BACKWARD, /* image_gradient -> splat_gradient, color_gradient */
@@ -394,6 +394,7 @@ typedef struct ssdgs_settings {
     int asg;                  /* ssdgs_asg */
     int per_channel_optics;   /* 1: sigma_s, sigma_a for each colour channel */
     int depth_cue;            /* 1: the scattering network sees the depth cue; positions are in length units */
+    int transport;            /* 1: it also sees the light that true dipole transport brings from where it really enters */
     int residual_shadow;      /* 1: the shadow network corrects the logit of the visibility; positions in length units */
     int shadow_on_scattering; /* 1: eq. 14, the ablation */
     int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
@@ -402,7 +403,8 @@ typedef struct ssdgs_settings {
     int shadow_width;
     int light_blur;           /* ssdgs_blur of the light pass */
     int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide */
-    ssdgs_real light_bias;    /* world units: what lies nearer to the light by less than this does not shadow */
+    ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
+                                 layer of Gaussians that would shadow each other at random */
     ssdgs_real eta;           /* index of refraction, 1 .. 2.5 */
     ssdgs_real centre[3];     /* origin of the networks' positions */
     ssdgs_real length_unit;   /* world units in one network unit */
@@ -647,6 +649,7 @@ typedef struct ssdgs_splat_view {
     int width, height;          /* px */
     int tiles_x, tiles_y;       /* of 16x16 px */
     int orthographic;
+    ssdgs_real distance;        /* of a point light seen as a parallel one, else 1 */
     int by_distance;            /* order by distance, not by depth */
     int kept;                   /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
     int compensate;             /* opacity compensated for the blur */
@@ -694,8 +697,8 @@ typedef struct ssdgs_frame {
     unsigned char *seen;        /* (n) SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
     ssdgs_real *visibility;     /* (lights, n) eq. 7 */
     ssdgs_real *depth_cue;      /* (lights, n) world units */
-    ssdgs_real *flux;           /* (lights, n) sr per unit intensity intercepted; NULL, so not computed, unless the caller of the
-                                   stages points it at memory */
+    ssdgs_real *flux;           /* (lights, n) intercepted, sr per unit intensity, directional: area; NULL, so not computed, unless
+                                   settings.transport asks or the caller of the stages points it at memory */
     /* SSDGS_STAGE_SHADE */
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
@@ -866,6 +869,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__GLANCES 2000  /* about 0.1 ms */
 #define SSDGS__BAND 16       /* image rows of a task */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
+#define SSDGS__LENGTHS 5        /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04       /* Schlick */
@@ -891,7 +895,7 @@ typedef struct ssdgs__tile {
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
-    int cue, flux; /* whether the light pass finds them */
+    int cue, flux, orthographic; /* whether the light pass finds them */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -917,6 +921,7 @@ typedef struct ssdgs__kernels {
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
     void (*composite_backward)(const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
+    void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*dense)(const ssdgs__product *);
     int (*live_rows)(const ssdgs_real *, int, uint16_t *);
     void (*transpose)(const ssdgs_real *, int, size_t, ssdgs_real *);
@@ -1547,7 +1552,8 @@ static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
 static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
     const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
     int i;
-    sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT : 27 * 3 + 3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0);
+    sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT : 27 * 3 + 3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0) +
+        (settings->transport ? SSDGS__LENGTHS : 0);
     for (i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
     if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
     return layers;
@@ -1583,6 +1589,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.shadow_layers = 4;
     s.shadow_width = 32;
     s.light_blur = SSDGS_BLUR_FLOOR;
+    s.light_bias = (ssdgs_real)0.06;
     s.eta = (ssdgs_real)1.3;
     s.length_unit = (ssdgs_real)0.5;
     s.light_scale = 1;
@@ -1596,6 +1603,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     s.scattering_layers = 6;
     s.scattering_width = 256;
     s.light_blur = SSDGS_BLUR_ADD;
+    s.light_bias = 0;
     s.length_unit = 1;
     return s;
 }
@@ -1616,6 +1624,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(asg, 0, SSDGS_ASG_ANGULAR);
     SSDGS__RANGE(per_channel_optics, 0, 1);
     SSDGS__RANGE(depth_cue, 0, 1);
+    SSDGS__RANGE(transport, 0, 1);
     SSDGS__RANGE(residual_shadow, 0, 1);
     SSDGS__RANGE(shadow_on_scattering, 0, 1);
     SSDGS__RANGE(scattering_layers, 2, SSDGS_MAX_LAYERS);
@@ -1770,7 +1779,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, light_sums, shaded, color, component[5], pixels, transmittance;
-    ssdgs__buffer lightings, packed, activations, scratch, slots, lane_slots, view_slots;
+    ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, kept_lights, shadow_logit, shadow_known;
     int view_room;
@@ -1977,6 +1986,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
             v->by_distance = 1;
         } else {
             v->orthographic = distance > 1000 * radius;
+            v->distance = v->orthographic && light->kind == SSDGS_LIGHT_POINT ? (ssdgs_real)distance : 1;
             for (i = 0; i < 3; i++) {
                 direction[i] = to_scene[i];
                 eye[i] = v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
@@ -2072,7 +2082,8 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
 
 /* Whether the lights' maps serve these terms. */
 static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
-    return (terms & SSDGS_SHADOW_TERM) || ((terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue);
+    return (terms & SSDGS_SHADOW_TERM) ||
+        ((terms & SSDGS_SCATTERING_TERM) && (frame->settings.depth_cue || frame->settings.transport));
 }
 
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every time, and what
@@ -2189,6 +2200,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    if (frame->settings.transport && (frame->terms & SSDGS_SCATTERING_TERM))
+        SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
     if (components) {
@@ -2491,13 +2504,14 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.log2_threshold = ssdgs__log2_threshold(frame);
     t.stop = frame->options.stop;
     t.max_error = frame->options.max_error;
-    t.bias = frame->settings.light_bias;
+    t.bias = frame->settings.light_bias * frame->settings.length_unit;
     t.depth_origin = v->visible ? v->depth[v->order[0]] : 0;
     t.cx = v->cx;
     t.cy = v->cy;
-    t.inverse_focal = 1 / v->fx;
+    t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
     t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
     t.flux = frame->flux != NULL;
+    t.orthographic = v->orthographic;
     return t;
 }
 
@@ -2607,7 +2621,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
    geometry, the cues and the layers' outputs. Scratch, one per slot: the networks' inputs, cheaper made again than kept. */
 typedef struct ssdgs__block_layout {
     int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers, widest;
-    size_t rows, visibility, cue, shadow_at, scattering_at, light_size; /* within a light's part */
+    size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                          /* within the block */
     size_t inputs, pairs, outs;                                          /* scratch of both directions */
     size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dvisibility, scratch; /* and of the backward */
@@ -2634,7 +2648,8 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     }
     l.visibility = SSDGS__ROWS * b;
     l.cue = l.visibility + b;
-    l.shadow_at = l.cue + b;
+    l.transport = l.cue + b;
+    l.shadow_at = l.transport + (frame->settings.transport ? SSDGS__LENGTHS * b : 0);
     l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
     l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
     l.lights = b * SSDGS_CHANNELS;
@@ -2898,7 +2913,7 @@ typedef struct ssdgs__input {
     int of_gaussian;
 } ssdgs__input;
 
-static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, ssdgs__input inputs[6]) {
+static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, ssdgs__input inputs[7]) {
     const size_t b = SSDGS__BLOCK;
     const int scaled = shadow ? frame->settings.residual_shadow : frame->settings.depth_cue;
     const ssdgs_real inverse_unit = 1 / frame->settings.length_unit;
@@ -2915,20 +2930,24 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
     else SSDGS__INPUT(3, -1, 1, b * SSDGS__NORMAL, 0);
     SSDGS__INPUT(SSDGS_MATERIAL_COUNT, -1, 1, b * SSDGS_MATERIAL, 1);
     if (!shadow && frame->settings.depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
+    if (!shadow && frame->settings.transport) SSDGS__INPUT(SSDGS__LENGTHS, -1, 1, l->transport, 0);
 #undef SSDGS__INPUT
     return n;
 }
 
-/* How many of the scattering network's inputs pass a gradient on: all before the depth cue, which is held fixed. */
+/* How many of the scattering network's inputs pass a gradient on: all before the light pass's cues, which are held fixed. */
 static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layout *l) {
-    ssdgs__input in[6];
+    ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, 0, in);
-    return in[n - 1].from == l->cue ? in[n - 1].row : l->scattering[0];
+    int i;
+    for (i = 0; i < n; i++)
+        if (!in[i].of_gaussian && in[i].from >= l->cue) return in[i].row;
+    return l->scattering[0];
 }
 
 static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *gauss,
                                  const ssdgs_real *part, ssdgs_real *activations) {
-    ssdgs__input in[6];
+    ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
     int i;
     for (i = 0; i < n; i++) {
@@ -2940,22 +2959,111 @@ static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_la
     }
 }
 
-/* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the depth cue is held fixed. */
+/* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the light pass's cues are held fixed. */
 static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
                                           const ssdgs_real *activations,
                                           const ssdgs_real *dinputs, ssdgs_real *dgauss, ssdgs_real *drows,
                                               ssdgs_real *dvisibility) {
-    ssdgs__input in[6];
+    ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
     int i, s;
     for (i = 0; i < n; i++) {
         const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
         ssdgs_real *to = in[i].of_gaussian ? dgauss + in[i].from : in[i].from == l->visibility ? dvisibility : drows + in[i].from;
-        if (in[i].from == l->cue) continue;
+        if (!in[i].of_gaussian && in[i].from >= l->cue) continue;
         if (in[i].levels >= 0) frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
                 in[i].levels);
         else for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
     }
+}
+
+/* Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. */
+typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
+
+#define SSDGS__LEVELS 12
+#define SSDGS__SOURCES 512
+#define SSDGS__SOFT 0.02        /* in length units; distances are sqrt(r^2 + soft^2) */
+#define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
+
+/* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
+static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
+    int levels = 0;
+    first[0] = 0;
+    do {
+        n = (n + 7) / 8;
+        first[levels + 1] = first[levels] + n;
+    } while (++levels < SSDGS__LEVELS && n > 1);
+    return levels;
+}
+
+typedef struct ssdgs__node_job { const ssdgs_frame *frame; ssdgs__node *nodes; size_t count; } ssdgs__node_job;
+
+/* Grows a node by one of its parts, whose flux is not 0. */
+static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
+    int c;
+    node->flux += flux;
+    for (c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
+}
+
+static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real radius) {
+    ssdgs_real distance2 = 0;
+    int c;
+    for (c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
+    radius += SSDGS__SQRT(distance2);
+    node->radius = radius > node->radius ? radius : node->radius;
+}
+
+/* The lowest nodes of a chunk of Gaussians, all lights. */
+static void ssdgs__node_task(void *data, int chunk) {
+    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
+    const ssdgs_model_view *g = &job->frame->gaussians;
+    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
+    int light, pass;
+    size_t at, i;
+    for (light = 0; light < job->frame->light_count; light++)
+        for (at = begin / 8; 8 * at < end; at++) {
+            ssdgs__node *node = job->nodes + job->count * (size_t)light + at;
+            memset(node, 0, sizeof *node);
+            for (pass = 0; pass < 2; pass++)
+                for (i = 8 * at; i < 8 * at + 8 && i < end; i++) {
+                    const ssdgs_real x[3] = {plane[i], plane[g->stride + i], plane[2 * g->stride + i]};
+                    const ssdgs_real flux = job->frame->flux[n * (size_t)light + i];
+                    if (!(flux > 0)) continue;
+                    if (pass) ssdgs__node_reach(node, x, 0);
+                    else ssdgs__node_add(node, x, flux);
+                }
+        }
+}
+
+static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, size_t *count) {
+    ssdgs_context *context = frame->context;
+    size_t first[SSDGS__LEVELS + 1], i;
+    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
+    ssdgs__node_job job;
+    int light, level, pass;
+    *count = first[levels];
+    SSDGS__RESERVE(frame->memory->nodes, job.nodes, ssdgs__node, *count * (size_t)frame->light_count + 1);
+    job.frame = frame;
+    job.count = *count;
+    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
+    for (light = 0; light < frame->light_count; light++)
+        for (level = 1; level < levels; level++) {
+            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1], *node = below + (first[level] - first[level - 1]);
+            ssdgs__node *const end = node;
+            for (; below < end; node++) {
+                memset(node, 0, sizeof *node);
+                for (pass = 0; pass < 2; pass++)
+                    for (i = 0; i < 8 && below + i < end; i++) {
+                        if (!(below[i].flux > 0)) continue;
+                        if (pass) ssdgs__node_reach(node, below[i].x, below[i].radius);
+                        else ssdgs__node_add(node, below[i].x, below[i].flux);
+                    }
+                below += below + 8 < end ? 8 : end - below;
+            }
+        }
+    *nodes = job.nodes;
+    return SSDGS_OK;
 }
 
 typedef struct ssdgs__shade_job {
@@ -2967,6 +3075,9 @@ typedef struct ssdgs__shade_job {
     ssdgs_real *shadow_logit;   /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
     uint64_t *counts;           /* per slot: multiplications done, those of all neurons, shadows kept */
+    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters, or NULL */
+    size_t node_count;
+    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
     uint32_t *packed[2];        /* bf16 weights of the scattering and the shadow network, or NULL */
     ssdgs_real *activations, *scratch, *slots, *lane_slots;
 } ssdgs__shade_job;
@@ -2997,7 +3108,67 @@ static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const siz
     }
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory,
+/* True dipole transport to a block's Gaussians: cue_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance,
+   in units of the irradiance that they have themselves. The profiles integrate to 1 over a plane. What is far, or small, counts
+   as one point. */
+static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int slot, const ssdgs_real *x,
+                                   const ssdgs_real *irradiance, ssdgs_real *cues) {
+    const ssdgs_frame *frame = job->frame;
+    const size_t n = (size_t)frame->gaussians.count;
+    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
+    const ssdgs_real *flux = frame->flux + n * (size_t)light, *position = frame->gaussians.gaussians + SSDGS_POSITION;
+    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
+    ssdgs_real *sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4, scale[2], middle[3], reach = 0;
+    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS];
+    const int levels = ssdgs__levels(n, first);
+    int depth = 0, level_of[8 * SSDGS__LEVELS], k, s, c, m = 0;
+    scale[0] = soft * soft;
+    scale[1] = -1 / ((ssdgs_real)0.04 * (1 << (SSDGS__LENGTHS - 1)) * unit);
+    for (c = 0; c < 3; c++) {
+        ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
+        for (s = 1; s < SSDGS__BLOCK; s++) {
+            const ssdgs_real at = x[c * SSDGS__BLOCK + s];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
+        }
+        middle[c] = (low + high) / 2;
+        reach += (high - low) * (high - low) / 4;
+    }
+    reach = SSDGS__SQRT(reach);
+    memset(cues, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *cues);
+    for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
+        const size_t at = stack[--depth];
+        const int level = level_of[depth];
+        const ssdgs__node *node = nodes + first[level] + at;
+        ssdgs_real distance2 = 0, room;
+        size_t i;
+        if (!(node->flux > 0)) continue;
+        for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
+        room = node->radius * SSDGS__FAR + reach;
+        if (distance2 > room * room) {
+            for (c = 0; c < 3; c++) sources[4 * m + c] = node->x[c];
+            sources[4 * m++ + 3] = node->flux;
+        } else if (level) {
+            for (i = 8 * at; i < 8 * at + 8 && first[level - 1] + i < first[level]; i++) stack[depth] = i, level_of[depth++] = level - 1;
+        } else {
+            for (i = 8 * at; i < 8 * at + 8 && i < n; i++) {
+                if (!(flux[i] > 0)) continue;
+                for (c = 0; c < 3; c++) sources[4 * m + c] = position[(size_t)c * frame->gaussians.stride + i];
+                sources[4 * m++ + 3] = flux[i];
+            }
+        }
+        if (m > SSDGS__SOURCES - 8) {
+            frame->context->k->transport(sources, m, x, scale, cues);
+            m = 0;
+        }
+    }
+    frame->context->k->transport(sources, m, x, scale, cues);
+    for (k = 0; k < SSDGS__LENGTHS; k++)
+        for (s = 0; s < SSDGS__BLOCK; s++)
+            cues[k * SSDGS__BLOCK + s] *= (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (1 << k) * unit * irradiance[s]);
+}
+
+static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot, ssdgs_real *memory,
                                ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
@@ -3033,6 +3204,8 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             } else lists->shadows_kept += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
+            if (job->nodes) ssdgs__transport_block(job, light, slot, gauss + SSDGS_POSITION * SSDGS__BLOCK,
+                                                   part + l->rows + SSDGS__IRRADIANCE * SSDGS__BLOCK, part + l->transport);
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
             ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0], pairs,
                                    lists, inputs, part + l->scattering_at);
@@ -3093,7 +3266,7 @@ static void ssdgs__shade_task(void *data, int slot) {
     int block;
     ssdgs__row_lists_fill(&lists);
     for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
-        ssdgs__shade_block(job, block, &lists, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
+        ssdgs__shade_block(job, block, &lists, slot, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
     if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
     job->counts[3 * slot] = lists.multiplied;
@@ -3148,6 +3321,11 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         kept->shadows_ready = lights_kept;
     }
     job.counts = kept->counts;
+    if (frame->flux && frame->settings.transport && frame->light_count) {
+        SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
+        result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
+        if (result) return result;
+    }
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
     return SSDGS_OK;
 }
@@ -3945,7 +4123,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the fil
     SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT, SSDGS_MATERIAL)
     SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2)
     SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked) SSDGS__I(transfer) SSDGS__I(dipole) SSDGS__I(asg)
-    SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
+    SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
     SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
     SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias) SSDGS__R("eta", 0, eta)
     SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
@@ -5386,7 +5564,8 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     return SSDGS_OK;
 }
 
-/* Random points in the bounds; their size is the mean distance to the three nearest that such points have. */
+/* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
+   away from the centre. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
@@ -5400,13 +5579,25 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     for (c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
     trainer->start_size = 1.1576 * 0.62035 * pow(volume / n, 1.0 / 3);
     for (i = 0; i < n; i++) {
-        ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
+        ssdgs_real *g = model->gaussians + i;
+        const size_t stride = model->capacity;
+        double away[3], length = 0;
+        ssdgs__gaussian_reset(model->gaussians, stride, (size_t)i);
         for (c = 0; c < 3; c++) {
             const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)),
                 size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
-            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
-                (ssdgs_real)((double)o->bounds_min[c] + u * size);
-            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(trainer->start_size);
+            g[(size_t)(SSDGS_POSITION + c) * stride] = (ssdgs_real)((double)o->bounds_min[c] + u * size);
+            g[(size_t)(SSDGS_LOG_SCALE + c) * stride] = (ssdgs_real)log(trainer->start_size);
+            away[c] = (u - 0.5) * size;
+            length += away[c] * away[c];
+        }
+        length = sqrt(length);
+        if (away[2] > -0.999 * length) { /* the rotation that takes z there: (1 + z, z cross there) */
+            g[SSDGS_FRAME * stride] = (ssdgs_real)(length + away[2]);
+            g[(SSDGS_FRAME + 1) * stride] = (ssdgs_real)-away[1];
+            g[(SSDGS_FRAME + 2) * stride] = (ssdgs_real)away[0];
+            length = sqrt(2 * length * (length + away[2]));
+            for (c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
         }
     }
     model->count = n;
@@ -6680,7 +6871,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 if (flux) {
                     V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
                     w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
-                    cosine2 = VDIV(one, VFMA(u, u, VFMA(w, w, one)));
+                    cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
                     omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
                 }
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
@@ -6845,6 +7036,30 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                 VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
             }
         }
+    }
+}
+
+/* ==== >>transport_kernel ====
+   sources (count, 4): x, y, z, flux; x (3, BLOCK); scale: soft^2, -1 / longest length. Adds flux exp(-r / l_k) / r to sums
+   (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l, its squares for the others. */
+SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
+    int s, i, k;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        const V px = VLOAD(x + s), py = VLOAD(x + SSDGS__BLOCK + s), pz = VLOAD(x + 2 * SSDGS__BLOCK + s);
+        const V soft = VSET(scale[0]), longest = VSET(scale[1]);
+        V sum[SSDGS__LENGTHS];
+        SSDGS__UNROLL for (k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
+        for (i = 0; i < count; i++) {
+            const R *source = sources + 4 * i;
+            const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])), dz = VSUB(pz, VSET(source[2]));
+            const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))), weight = VDIV(VSET(source[3]), r);
+            V e = VEXP(VMUL(r, longest));
+            SSDGS__UNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
+                sum[k] = VFMA(weight, e, sum[k]);
+                e = VMUL(e, e);
+            }
+        }
+        SSDGS__UNROLL for (k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
     }
 }
 
@@ -7614,7 +7829,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
+    F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
         F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
 };

@@ -41,7 +41,7 @@ typedef struct field { const char *name; int in_options, reals, count; size_t at
 #define SETTING(reals, count, name) {#name, 0, reals, count, offsetof(ssdgs_settings, name)}
 #define OPTION(reals, count, name) {#name, 1, reals, count, offsetof(ssdgs_train_options, name)}
 static const field fields[] = {
-    SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue),
+    SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue), SETTING(0, 1, transport),
     SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
     SETTING(0, 1, scattering_width), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
     SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, eta),

@@ -175,7 +175,7 @@ static void test_light_pass(const char *name) {
     size_t n;
     int i;
     if (!gold_open(&file, name)) return;
-    settings.light_bias = (ssdgs_real)gold(&file, "bias", NULL)[0];
+    settings.light_bias = (ssdgs_real)gold(&file, "bias", NULL)[0] / settings.length_unit;
     settings.light_blur = SSDGS_BLUR_ADD;
     model = gold_geometry(&settings);
     camera = gold_camera();

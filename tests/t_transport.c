@@ -1,0 +1,161 @@
+/* True dipole transport: the tree against every pair, closed forms, conservation; built again in double (real64). */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+#define SIDE 64
+static ssdgs_context *context;
+
+static double draw(uint64_t counter) { return ssdgs__uniform(91, counter); }
+
+/* A frame through the light pass, with the networks' settings small and transport on. */
+static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lights, int light_count) {
+    static const ssdgs_real eye[3] = {0, -2, (ssdgs_real)0.5}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    static ssdgs_camera camera;
+    camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
+    ssdgs_model_get(model);
+    if (!CHECK(!ssdgs__frame_begin(frame, model, &camera, lights, light_count, NULL, 0, 0))) exit(1);
+    if (!CHECK(!ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK))) exit(1);
+}
+
+static ssdgs_model *make_model(int count, double size) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    int i, c;
+    settings.transport = 1;
+    settings.scattering_width = 16;
+    if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
+    for (i = 0; i < count; i++)
+        for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(size);
+    return model;
+}
+
+/* The cues of 64 places from the frame's flux, by the library. */
+static void cues_at(ssdgs_frame *frame, int light, const ssdgs_real *x, const ssdgs_real *irradiance, ssdgs_real *cues) {
+    ssdgs__shade_job job;
+    memset(&job, 0, sizeof job);
+    job.frame = frame;
+    CHECK(!ssdgs__nodes(frame, &job.nodes, &job.node_count));
+    job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 4 * sizeof *job.sources);
+    ssdgs__transport_block(&job, light, 0, x, irradiance, cues);
+    free(job.sources);
+}
+
+/* 3,000 Gaussians on a sphere, in patches or without order, some dark, two lights: against the sum over all pairs. */
+static void test_pairs(int sorted) {
+    enum { COUNT = 3001 };
+    static ssdgs_real x[3 * SSDGS__BLOCK], irradiance[SSDGS__BLOCK], cues[SSDGS__LENGTHS * SSDGS__BLOCK];
+    ssdgs_model *model = make_model(COUNT, 0.01);
+    ssdgs_light lights[2];
+    ssdgs_frame frame;
+    double worst = 0;
+    int i, c, s, k, light;
+    memset(lights, 0, sizeof lights);
+    lights[0].position[2] = lights[1].position[0] = 2;
+    for (i = 0; i < COUNT; i++) {
+        const int patch = i / 64, cell = i % 64; /* 7 x 7 patches of 8 x 8 */
+        const double u = 2 * (sorted ? (patch % 7 + (cell % 8 + 0.5) / 8) / 7 : draw((uint64_t)i)) - 1, w = sqrt(1 - u * u);
+        const double a = 6.2831853 * (sorted ? (patch / 7 + (cell / 8 + 0.5) / 8) / 7 : draw(9000 + (uint64_t)i));
+        const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
+        for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
+    }
+    begin(&frame, model, lights, 2);
+    for (i = 0; i < 2 * COUNT; i++) frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
+    for (s = 0; s < SSDGS__BLOCK; s++) {
+        irradiance[s] = (ssdgs_real)(0.1 + draw(500 + (uint64_t)s));
+        for (c = 0; c < 3; c++) x[c * SSDGS__BLOCK + s] = model->gaussians[(size_t)c * model->capacity + 1000 + (size_t)s];
+    }
+    for (light = 0; light < 2; light++) {
+        cues_at(&frame, light, x, irradiance, cues);
+        for (s = 0; s < SSDGS__BLOCK; s++)
+            for (k = 0; k < SSDGS__LENGTHS; k++) {
+                const double l = 0.5 * 0.04 * (1 << k);
+                double sum = 0, error;
+                for (i = 0; i < COUNT; i++) {
+                    double r = 0.01 * 0.01;
+                    for (c = 0; c < 3; c++) r += pow((double)(x[c * SSDGS__BLOCK + s] - model->gaussians[(size_t)c * model->capacity + (size_t)i]), 2);
+                    r = sqrt(r);
+                    sum += (double)frame.flux[light * COUNT + i] * exp(-r / l) / (6.283185307179586 * l * r);
+                }
+                error = fabs((double)cues[k * SSDGS__BLOCK + s] * (double)irradiance[s] / sum - 1);
+                worst = error > worst ? error : worst;
+            }
+    }
+    printf("against all pairs, %s: worst %.2g of the sum\n", sorted ? "sorted" : "unsorted", worst);
+    CHECK(sorted ? worst > 1e-3 && worst < 0.03 : worst < 1e-3);
+    ssdgs_model_destroy(model);
+}
+
+/* A plane that takes up irradiance 1: at height h the integral is exp(-sqrt(h^2 + soft^2) / l). */
+static void test_plane(void) {
+    enum { ROW = 160, COUNT = ROW * ROW };
+    static ssdgs_real x[3 * SSDGS__BLOCK], irradiance[SSDGS__BLOCK], cues[SSDGS__LENGTHS * SSDGS__BLOCK];
+    ssdgs_model *model = make_model(COUNT, 0.01);
+    ssdgs_light light;
+    ssdgs_frame frame;
+    int i, s, k;
+    memset(&light, 0, sizeof light);
+    light.position[2] = 2;
+    for (i = 0; i < COUNT; i++) { /* rows to and fro, 0.005 apart */
+        const int row = i / ROW, column = row & 1 ? ROW - 1 - i % ROW : i % ROW;
+        model->gaussians[i] = (ssdgs_real)(0.005 * (column - ROW / 2));
+        model->gaussians[model->capacity + (size_t)i] = (ssdgs_real)(0.005 * (row - ROW / 2));
+    }
+    begin(&frame, model, &light, 1);
+    for (i = 0; i < COUNT; i++) frame.flux[i] = (ssdgs_real)(0.005 * 0.005);
+    for (s = 0; s < SSDGS__BLOCK; s++) {
+        irradiance[s] = 1;
+        x[s] = (ssdgs_real)(0.05 * (draw((uint64_t)s) - 0.5));
+        x[SSDGS__BLOCK + s] = (ssdgs_real)(0.05 * (draw(100 + (uint64_t)s) - 0.5));
+        x[2 * SSDGS__BLOCK + s] = (ssdgs_real)(0.002 * s);
+    }
+    cues_at(&frame, 0, x, irradiance, cues);
+    for (k = 0; k < 3; k++) /* longer lengths leave the plane */
+        for (s = 0; s < SSDGS__BLOCK; s++) {
+            const double l = 0.5 * 0.04 * (1 << k), h = 0.002 * s, expected = exp(-sqrt(h * h + 0.01 * 0.01) / l);
+            CHECK(fabs((double)cues[k * SSDGS__BLOCK + s] - expected) < 0.02 * expected + 0.004);
+        }
+    ssdgs_model_destroy(model);
+}
+
+/* What a closed sheet of Gaussians takes up is what the light sends there, near, far and from infinity; the tree's root has it all. */
+static void test_flux(void) {
+    enum { ROW = 60, COUNT = ROW * ROW };
+    ssdgs_model *model = make_model(COUNT, 0.012);
+    ssdgs__shade_job job;
+    ssdgs_frame frame;
+    ssdgs_light light;
+    int i, part;
+    for (i = 0; i < COUNT; i++) {
+        model->gaussians[i] = (ssdgs_real)(0.01 * (i % ROW - ROW / 2 + 0.5));
+        model->gaussians[model->capacity + (size_t)i] = (ssdgs_real)(0.01 * (i / ROW - ROW / 2 + 0.5));
+        model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
+    }
+    for (part = 0; part < 3; part++) {
+        const double height = part == 1 ? 5000 : 3, half = 0.3 + 0.012;
+        double sum = 0, expected = 4 * half * half;
+        memset(&light, 0, sizeof light);
+        light.kind = part == 2 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
+        light.position[2] = (ssdgs_real)(part == 2 ? 1 : height);
+        begin(&frame, model, &light, 1);
+        for (i = 0; i < COUNT; i++) sum += (double)frame.flux[i];
+        if (part == 0) expected = 4 * atan(half * half / (height * sqrt(height * height + 2 * half * half))); /* a square's solid angle */
+        if (part == 1) expected /= height * height;
+        printf("flux %g of %g\n", sum, expected);
+        CHECK(fabs(sum / expected - 1) < 0.06);
+        memset(&job, 0, sizeof job);
+        CHECK(!ssdgs__nodes(&frame, &job.nodes, &job.node_count));
+        CHECK(fabs((double)job.nodes[job.node_count - 1].flux / sum - 1) < 1e-4);
+    }
+    ssdgs_model_destroy(model);
+}
+
+int main(void) {
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
+    test_pairs(1);
+    test_pairs(0);
+    test_plane();
+    test_flux();
+    ssdgs_context_destroy(context);
+    TEST_END();
+}
