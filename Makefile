@@ -4,6 +4,8 @@ CXX ?= c++
 BUILD = build
 ITERATIONS = 5000
 BENCH =
+DATA = ../shared/data
+SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) -Wstrict-prototypes -Wmissing-prototypes
@@ -27,6 +29,12 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts (BENCH=--quick: a minute)
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
+
+experiments: $(BUILD)/train ## the paper's experiments on SCENES in DATA (hours) into tests/EXPERIMENTS.md
+	sh tests/experiments.sh $(BUILD) "$(DATA)" $(ITERATIONS) $(SCENES)
+	cp $(BUILD)/experiments/EXPERIMENTS.md tests/EXPERIMENTS.md
+experiments-quick: $(BUILD)/train ## the same on the scene in examples/data, 300 iterations: minutes
+	sh tests/experiments.sh $(BUILD) examples/data 300 waxcow:black
 
 # Models to measure with, trained where there are none; the published networks take longer: fewer iterations.
 $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
@@ -100,5 +108,5 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
-.PHONY: all demo bench test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 clean help

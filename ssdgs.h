@@ -81,10 +81,11 @@ WHAT IT COMPUTES
   are shared by all Gaussians.
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
   layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first; the shadow network
-  corrects the logit of eq. 7.
+  corrects the logit of eq. 7, where what lies nearer to the light by less than light_bias casts no shadow. transport = 1
+  lets the scattering network see besides what true dipole transport brings to x from where the light enters.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
-  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S; the light pass adds 0.3 px^2, where the
-  default keeps to a floor.
+  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S, no bias; the light pass adds 0.3 px^2,
+  where the default keeps to a floor.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
