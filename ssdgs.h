@@ -234,7 +234,8 @@ CONTENTS, search for the tag
   >>project_kernel  EWA projection
   >>bin_kernel      which parts of a tile an ellipse touches
   >>walk_kernels    transmittance walks of camera and lights
-  >>composite_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>dipole_kernel, >>colour_kernel, >>image_kernels
+  >>composite_kernel, >>transport_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>dipole_kernel, >>colour_kernel,
+  >>image_kernels
 
 VERSIONS
   0.1.0  the first
@@ -2978,7 +2979,10 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
     }
 }
 
-/* Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. */
+/* ---- true dipole transport ----
+   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. Of Gaussians in Morton
+   order this is an octree. */
+
 typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
 
 #define SSDGS__LEVELS 12
@@ -3018,7 +3022,8 @@ static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_re
 static void ssdgs__node_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
     const ssdgs_model_view *g = &job->frame->gaussians;
-    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK, end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK;
+    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
     int light, pass;
     size_t at, i;
@@ -3050,8 +3055,8 @@ static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, 
     ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
     for (light = 0; light < frame->light_count; light++)
         for (level = 1; level < levels; level++) {
-            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1], *node = below + (first[level] - first[level - 1]);
-            ssdgs__node *const end = node;
+            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1];
+            ssdgs__node *const end = below + (first[level] - first[level - 1]), *node = end;
             for (; below < end; node++) {
                 memset(node, 0, sizeof *node);
                 for (pass = 0; pass < 2; pass++)
@@ -3150,7 +3155,10 @@ static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int s
             for (c = 0; c < 3; c++) sources[4 * m + c] = node->x[c];
             sources[4 * m++ + 3] = node->flux;
         } else if (level) {
-            for (i = 8 * at; i < 8 * at + 8 && first[level - 1] + i < first[level]; i++) stack[depth] = i, level_of[depth++] = level - 1;
+            for (i = 8 * at; i < 8 * at + 8 && first[level - 1] + i < first[level]; i++) {
+                stack[depth] = i;
+                level_of[depth++] = level - 1;
+            }
         } else {
             for (i = 8 * at; i < 8 * at + 8 && i < n; i++) {
                 if (!(flux[i] > 0)) continue;
@@ -3267,7 +3275,8 @@ static void ssdgs__shade_task(void *data, int slot) {
     int block;
     ssdgs__row_lists_fill(&lists);
     for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
-        ssdgs__shade_block(job, block, &lists, slot, job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
+        ssdgs__shade_block(job, block, &lists, slot,
+                           job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
     if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
     job->counts[3 * slot] = lists.multiplied;
@@ -5138,7 +5147,8 @@ static void ssdgs__exposure_task(void *data, int index) {
 
 static void ssdgs__exposure_backward_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
-    const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height, begin = (size_t)index * SSDGS__PIXELS;
+    const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
+    const size_t begin = (size_t)index * SSDGS__PIXELS;
     const size_t end = begin + SSDGS__PIXELS < pixels ? begin + SSDGS__PIXELS : pixels;
     ssdgs_real *gradient = job->frame->pixel_gradient, *transmittance_gradient = gradient + 3 * pixels;
     size_t i, c;
@@ -6309,7 +6319,8 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
     SSDGS__UNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
 #else
-    for (i = 0; i < 16; i++) out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] = in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
+    for (i = 0; i < 16; i++)
+        out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] = in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
 #endif
 }
 
@@ -6966,7 +6977,7 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
     }
 }
 
-/* pixels: [micro-tile][3 colour gradients, their sum with the pixel's colours and transmittance][16 lanes]. Per entry, sums (n, 12) of
+/* pixels: [micro-tile][3 colour gradients, the gradients' product with the pixel][16 lanes]. Per entry, sums (n, 12) of
    g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w, 0, w dC. Walks front to back again: what lies
    behind an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, const R *pixels, R *sums) {
@@ -7830,8 +7841,8 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward), F(reflect), F(reflect_backward),
-        F(dipole_profile),
+    F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward),
+    F(reflect), F(reflect_backward), F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
 };
 
