@@ -45,7 +45,8 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
     size_t i, c;
     if (ssdgs__frame_begin(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
     if (ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
-    if (fixed) { /* visibility and depth cue are held fixed */
+    if (fixed) { /* visibility, depth cue and flux are held fixed */
+        if (frame->flux) memcpy(frame->flux, fixed->flux, n * sizeof(ssdgs_real));
         memcpy(frame->visibility, fixed->visibility, n * sizeof(ssdgs_real));
         memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
     }
@@ -99,7 +100,7 @@ static void run(const scene *s) {
     ssdgs_model *model = NULL;
     ssdgs_frame frame, fixed;
     ssdgs_photo photo;
-    ssdgs_real *gradient, *global_gradient, *visibility, *cue;
+    ssdgs_real *gradient, *global_gradient, *visibility, *cue, *flux;
     double value[9], pose[6], light_gradient[3];
     size_t first[SSDGS__GLOBAL_GROUPS + 1], stride;
     int group, c, i;
@@ -112,11 +113,14 @@ static void run(const scene *s) {
     global_gradient = (ssdgs_real *)malloc(model->global_count * sizeof *gradient);
     visibility = (ssdgs_real *)malloc(COUNT * 2 * sizeof *visibility);
     cue = (ssdgs_real *)malloc(COUNT * 2 * sizeof *cue);
+    flux = (ssdgs_real *)malloc(COUNT * 2 * sizeof *flux);
     memcpy(gradient, frame.gradient, stride * SSDGS_CHANNELS * sizeof *gradient);
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
     memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
+    if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
     fixed = frame;
+    fixed.flux = flux;
     fixed.visibility = visibility;
     fixed.depth_cue = cue;
     memset(&photo, 0, sizeof photo);
@@ -134,6 +138,7 @@ static void run(const scene *s) {
     }
     for (group = 0; group < SSDGS__PLANE_GROUPS; group++) {
         tally t = {0, 0, 0, 0};
+        if (s->settings.transport && group == SSDGS__G_POSITION) continue; /* its distances are held fixed, which nothing can do here */
         for (i = 0; i < COUNT; i += 2)
             for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++)
                 compare(s, model, &camera, lights, &fixed, model->gaussians + (size_t)c * stride + (size_t)i, gradient[(size_t)c * stride + (size_t)i], &t);
@@ -150,7 +155,7 @@ static void run(const scene *s) {
     }
     {
         tally t = {0, 0, 0, 0};
-        for (c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT; c++) compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
+        for (c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++) compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
         if (t.tried) finish(s, "light", &t);
     }
     { /* the pose, at a correction that is not zero */
@@ -182,6 +187,7 @@ static void run(const scene *s) {
     free(global_gradient);
     free(visibility);
     free(cue);
+    free(flux);
     ssdgs_model_destroy(model);
 }
 
@@ -332,6 +338,8 @@ int main(void) {
         base.lights[1].intensity[i] = 1;
     }
     run(&base);
+    s = base, s.name = "transport", s.settings.transport = 1;
+    run(&s);
     s = base, s.name = "antialias", s.options.antialias = 1;
     run(&s);
     s = base, s.name = "angular ASG, Burley", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;

@@ -150,12 +150,60 @@ static void test_flux(void) {
     ssdgs_model_destroy(model);
 }
 
+/* Same bits for any number of threads and for a light at rest; and the cues do reach the image. */
+static void test_bits(void) {
+    enum { COUNT = 700 };
+    static const ssdgs_real eye[2][3] = {{0, -2, (ssdgs_real)0.5}, {1, -2, 0}}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    static ssdgs_real color[4][SIDE * SIDE * 3];
+    ssdgs_light light;
+    ssdgs_image image;
+    int part, i, c, view;
+    memset(&light, 0, sizeof light);
+    light.position[0] = light.position[2] = 2;
+    for (c = 0; c < 3; c++) light.intensity[c] = 9;
+    for (part = 0; part < 4; part++) { /* one thread; three; its camera moved there; without transport's light */
+        ssdgs_context_desc desc;
+        ssdgs_context *own = NULL, *shared = context;
+        ssdgs_model *model;
+        memset(&desc, 0, sizeof desc);
+        desc.threads = part == 1 ? 3 : 1;
+        if (!CHECK(!ssdgs_context_create(&desc, &own))) exit(1);
+        context = own;
+        model = make_model(COUNT, 0.05);
+        context = shared;
+        for (i = 0; i < COUNT; i++)
+            for (c = 0; c < 3; c++) {
+                model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)(0.6 * draw(50000 + 3 * (uint64_t)i + (uint64_t)c) - 0.3);
+                model->gaussians[(size_t)(SSDGS_SCATTERING + c) * model->capacity + (size_t)i] = 3;
+            }
+        if (part == 3) { /* the last SSDGS__LENGTHS inputs of the first layer */
+            int sizes[SSDGS_MAX_LAYERS + 1];
+            ssdgs_real *weights = ssdgs_model_get(model).scattering;
+            ssdgs__network_sizes(&model->settings, 0, sizes);
+            for (i = 0; i < sizes[1]; i++)
+                for (c = 0; c < SSDGS__LENGTHS; c++) weights[(i + 1) * sizes[0] - 1 - c] = 0;
+        }
+        memset(&image, 0, sizeof image);
+        image.color = color[part];
+        for (view = part == 2 ? 0 : 1; view < 2; view++) {
+            const ssdgs_camera camera = ssdgs_camera_look_at(eye[view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
+            CHECK(!ssdgs_render(model, &camera, &light, 1, &image));
+        }
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(own);
+    }
+    CHECK(!memcmp(color[0], color[1], sizeof color[0]));
+    CHECK(!memcmp(color[0], color[2], sizeof color[0]));
+    CHECK(memcmp(color[0], color[3], sizeof color[0]));
+}
+
 int main(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_pairs(1);
     test_pairs(0);
     test_plane();
     test_flux();
+    test_bits();
     ssdgs_context_destroy(context);
     TEST_END();
 }
