@@ -4509,8 +4509,11 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
     ssdgs__ply_cursor cursor;
     uint32_t words[SSDGS__PLY_WORDS];
-    ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, SSDGS__PLY_WORDS);
+    const int later = (int)(offsetof(ssdgs_settings, transport) / sizeof(int)); /* 0 in files from before it */
+    ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, later);
+    if (!result) result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, later + 1, SSDGS__PLY_WORDS);
     if (result) return result;
+    memset(words, 0, sizeof words);
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers", ply->name);
