@@ -146,6 +146,11 @@ static void test_flux(void) {
         memset(&job, 0, sizeof job);
         CHECK(!ssdgs__nodes(&frame, &job.nodes, &job.node_count));
         CHECK(fabs((double)job.nodes[job.node_count - 1].flux / sum - 1) < 1e-4);
+        for (i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
+            const ssdgs__node *root = job.nodes + job.node_count - 1;
+            const double dx = (double)(model->gaussians[i] - root->x[0]), dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
+            CHECK(sqrt(dx * dx + dy * dy) <= (double)root->radius * 1.0001);
+        }
     }
     ssdgs_model_destroy(model);
 }
