@@ -3129,7 +3129,7 @@ static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int s
     const int levels = ssdgs__levels(n, first);
     int depth = 0, level_of[8 * SSDGS__LEVELS], k, s, c, m = 0;
     scale[0] = soft * soft;
-    scale[1] = -1 / ((ssdgs_real)0.04 * (1 << (SSDGS__LENGTHS - 1)) * unit);
+    scale[1] = -1 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
     for (c = 0; c < 3; c++) {
         ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
         for (s = 1; s < SSDGS__BLOCK; s++) {
@@ -3172,9 +3172,11 @@ static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int s
         }
     }
     frame->context->k->transport(sources, m, x, scale, cues);
-    for (k = 0; k < SSDGS__LENGTHS; k++)
+    for (k = 0; k < SSDGS__LENGTHS; k++) {
+        const ssdgs_real length = (ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit;
         for (s = 0; s < SSDGS__BLOCK; s++)
-            cues[k * SSDGS__BLOCK + s] *= (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (1 << k) * unit * irradiance[s]);
+            cues[k * SSDGS__BLOCK + s] *= (ssdgs_real)0.15915494309189535 / (length * irradiance[s]);
+    }
 }
 
 static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot, ssdgs_real *memory,
