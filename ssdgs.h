@@ -2107,7 +2107,7 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
     known = known && kept->lights_ready && frame->light_count == kept->light_count &&
         !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
         ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
-        !(frame->terms & ~kept->terms & SSDGS_SCATTERING_TERM); /* which alone asks for the depth cue */
+        !(frame->terms & ~kept->terms & SSDGS_SCATTERING_TERM); /* which alone asks for depth cue and flux */
     for (i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
         for (j = 0; j < 3; j++) known = known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
@@ -3122,7 +3122,8 @@ static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int s
     const ssdgs_frame *frame = job->frame;
     const size_t n = (size_t)frame->gaussians.count;
     const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
-    const ssdgs_real *flux = frame->flux + n * (size_t)light, *position = frame->gaussians.gaussians + SSDGS_POSITION;
+    const ssdgs_real *flux = frame->flux + n * (size_t)light;
+    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * frame->gaussians.stride;
     const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
     ssdgs_real *sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4, scale[2], middle[3], reach = 0;
     size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS];
