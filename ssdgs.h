@@ -863,8 +863,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BLOCK 64      /* Gaussians shaded together */
 #define SSDGS__AHEAD 12      /* ranks; their records lie anywhere in memory */
 #define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
-#define SSDGS__SAMPLE 1
-#define SSDGS__APPLY 2
 #define SSDGS__SUMS SSDGS_SPLAT_SUMS
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
@@ -977,6 +975,17 @@ static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
     int bit = 0, half;
     for (half = 32; half; half /= 2)
         if (!(mask >> bit & (((uint64_t)1 << half) - 1))) bit += half;
+    return bit;
+#endif
+}
+
+static SSDGS__INLINE int ssdgs__highest_bit(uint64_t mask) { /* of 0: 0 */
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return 63 ^ __builtin_clzll(mask | 1);
+#else
+    int bit = 0, half;
+    for (half = 32; half; half /= 2)
+        if (mask >> bit >> half) bit += half;
     return bit;
 #endif
 }
@@ -6844,46 +6853,53 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
 
 /* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho x cue, solid
    angle x blend weight. An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes
-   part in it once its own distance is reached; both at once where nothing lies between. */
+   part in it once its own distance is reached: two batches run along the list, the nearer one leaves what it has met after each
+   of its entries for the other to pick from. */
 SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     R transmittance[16][16], met[16][16]; /* met: sum of blend weight x distance */
-    F(batch) batch;
-    uint32_t sampled = 0, applied = 0;
-    int micro, v, n, i;
+    F(batch) applied, sampled;
+    uint32_t applying = 0, sampling = 0;
+    int micro, v, i;
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
             met[micro][v] = 0;
         }
-    while (applied < tile->count) {
-        unsigned char codes[SSDGS__BATCH];
-        R lanes[SSDGS__BATCH][4][SSDGS__VW]; /* an entry's sums before the lanes are added up */
-        for (n = 0; n < SSDGS__BATCH && applied < tile->count; n++) {
-            const R apply_at = tile->depth[tile->list[applied].gaussian];
-            const ssdgs_tile_entry *entry;
-            int code = SSDGS__APPLY;
-            if (sampled < tile->count && tile->depth[tile->list[sampled].gaussian] - tile->bias <= apply_at) {
-                code = SSDGS__SAMPLE;
-                if (sampled == applied && (sampled + 1 == tile->count ||
-                    tile->depth[tile->list[sampled + 1].gaussian] - tile->bias > apply_at)) code |= SSDGS__APPLY;
+    while (sampling < tile->count || (flux && applying < tile->count)) {
+        uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
+        R lanes[SSDGS__BATCH][3][SSDGS__VW], energy[SSDGS__BATCH][SSDGS__VW]; /* the sums before the lanes are added up */
+        R history[2][SSDGS__BATCH][16]; /* transmittance and met, before the first applied and after each; 63 at most */
+        int samples = 0, applies = 0;
+        while (sampling < tile->count || (flux && applying < tile->count)) {
+            const int sample = sampling < tile->count && tile->depth[tile->list[sampling].gaussian] - tile->bias <=
+                                                             tile->depth[tile->list[applying].gaussian];
+            F(batch) *batch = sample ? &sampled : &applied;
+            const uint32_t place = sample ? sampling : applying;
+            const int n = sample ? samples : applies;
+            if (n == (sample ? SSDGS__BATCH : SSDGS__BATCH - 1)) break;
+            F(batch_add)(batch, n, tile, place, tile->list[place].mask);
+            batch->record[n][6] = tile->depth[tile->list[place].gaussian] - tile->depth_origin;
+            if (sample) {
+                nearer[n] = ((uint64_t)1 << applies) - 1;
+                memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
             }
-            entry = tile->list + (code & SSDGS__SAMPLE ? sampled : applied);
-            F(batch_add)(&batch, n, tile, (uint32_t)(entry - tile->list), entry->mask);
-            batch.record[n][6] = tile->depth[entry->gaussian] - tile->depth_origin;
-            if (code & SSDGS__SAMPLE) /* its first appearance */
-                memset(sums + (size_t)batch.place[n] * 4, 0, 4 * sizeof(R));
-            sampled += code & SSDGS__SAMPLE ? 1u : 0u;
-            applied += code & SSDGS__APPLY ? 1u : 0u;
-            codes[n] = (unsigned char)code;
+            samples += sample;
+            applies += !sample;
+            sampling += (uint32_t)sample;
+            applying += (uint32_t)!sample;
         }
-        F(batch_transpose)(&batch, n);
-        for (i = 0; i < n; i++)
-            for (v = 0; v < 4; v++) VSTORE(lanes[i][v], VSET(0));
+        F(batch_transpose)(&applied, applies);
+        F(batch_transpose)(&sampled, samples);
+        for (i = 0; i < SSDGS__BATCH; i++) {
+            for (v = 0; v < 3; v++) VSTORE(lanes[i][v], VSET(0));
+            if (flux) VSTORE(energy[i], VSET(0));
+        }
         for (micro = 0; micro < 16; micro++) {
-            uint64_t left = batch.entries[micro];
+            const uint64_t entries = applied.entries[micro];
+            uint64_t left;
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
-            if (!left) continue;
+            if (!(entries | sampled.entries[micro])) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 if (flux) {
@@ -6893,40 +6909,55 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                     omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
                 }
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+                VSTORE(history[0][0] + v * SSDGS__VW, t[v]);
+                if (!cue) continue;
                 b[v] = VLOAD(met[micro] + v * SSDGS__VW);
+                VSTORE(history[1][0] + v * SSDGS__VW, b[v]);
             }
-            for (; left; left &= left - 1) {
-                const int index = ssdgs__lowest_bit(left), code = codes[index];
-                const V distance = VSET(batch.record[index][6]);
-                V sum[4];
-                SSDGS__UNROLL for (v = 0; v < 4; v++) sum[v] = VLOAD(lanes[index][v]);
+            for (left = entries; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left);
+                const V distance = VSET(applied.record[index][6]);
+                V sum = flux ? VLOAD(energy[index]) : one;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
-                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    if (code & SSDGS__SAMPLE) {
-                        raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: the opacity cancels in the ratio */
-                        sum[0] = VFMA(raw, t[v], sum[0]);
-                        sum[1] = VADD(sum[1], raw);
-                        if (cue) sum[2] = VFMA(raw, VFNMA(distance, t[v], VSUB(distance, b[v])), sum[2]);
-                    }
-                    if (code & SSDGS__APPLY) {
-                        w = VMUL(alpha, t[v]);
-                        if (flux) sum[3] = VFMA(omega[v], w, sum[3]);
-                        if (cue) b[v] = VFMA(w, distance, b[v]);
-                        t[v] = VFNMA(alpha, t[v], t[v]);
-                    }
+                    alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    if (cue || flux) w = VMUL(alpha, t[v]);
+                    if (flux) sum = VFMA(omega[v], w, sum);
+                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
+                    if (!cue) continue;
+                    b[v] = VFMA(w, distance, b[v]);
+                    VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
                 }
-                SSDGS__UNROLL for (v = 0; v < 2 + cue + flux; v++) VSTORE(lanes[index][v], sum[v]);
+                if (flux) VSTORE(energy[index], sum);
+            }
+            for (left = sampled.entries[micro]; left; left &= left - 1) {
+                const int index = ssdgs__lowest_bit(left), then = ssdgs__highest_bit((entries & nearer[index]) << 1);
+                const V distance = VSET(sampled.record[index][6]);
+                V sum[3];
+                SSDGS__UNROLL for (v = 0; v < 2 + cue; v++) sum[v] = VLOAD(lanes[index][v]);
+                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    const V past = VLOAD(history[0][then] + v * SSDGS__VW);
+                    V dx, dy, raw;
+                    VM drawn;
+                    (void)F(alpha)(sampled.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: the opacity cancels in the ratio */
+                    sum[0] = VFMA(raw, past, sum[0]);
+                    sum[1] = VADD(sum[1], raw);
+                    if (cue) sum[2] = VFMA(raw, VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
+                                           sum[2]);
+                }
+                SSDGS__UNROLL for (v = 0; v < 2 + cue; v++) VSTORE(lanes[index][v], sum[v]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
-                VSTORE(met[micro] + v * SSDGS__VW, b[v]);
+                if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
             }
         }
-        for (i = 0; i < n; i++)
-            F(sum4)(sums + (size_t)batch.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]),
-                    VLOAD(lanes[i][3]));
+        for (i = 0; i < samples; i++)
+            F(sum4)(sums + (size_t)sampled.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]), VSET(0));
+        for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(VLOAD(energy[i]));
     }
 }
 
