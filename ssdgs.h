@@ -67,7 +67,7 @@ DO THIS
   progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole.
 
 WHAT IT COMPUTES
-  Splatting (eq. 1): every Gaussian is projected (EWA, + 0.3 px^2) and blended front to back, one colour C each:
+  Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one colour C each:
       C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss),  E = light_scale intensity / distance^2
   (eq. 3), with
   f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
@@ -84,8 +84,8 @@ WHAT IT COMPUTES
   corrects the logit of eq. 7, where what lies nearer to the light by less than light_bias casts no shadow. transport = 1
   lets the scattering network see besides what true dipole transport brings to x from where the light enters.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
-  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S, no bias; the light pass adds 0.3 px^2,
-  where the default keeps to a floor.
+  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S, no bias; both passes add 0.3 px^2,
+  where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
@@ -368,7 +368,7 @@ typedef enum ssdgs_dipole {
 } ssdgs_dipole;
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR } ssdgs_asg; /* eq. 12, or the released angular form */
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
-/* +0.3 px^2, or a floor of 0.2 px^2 with opacity compensation */
+/* variance added to a splat's, or a floor of it with opacity compensation */
 typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 
 enum { /* terms of eq. 3; a mask */
@@ -403,10 +403,11 @@ typedef struct ssdgs_settings {
     int scattering_width;     /* hidden width */
     int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
     int shadow_width;
-    int light_blur;           /* ssdgs_blur of the light pass */
+    int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
     int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide */
     ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
                                  layer of Gaussians that would shadow each other at random */
+    ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: the pixel filter's, added to a splat's in the camera pass */
     ssdgs_real eta;           /* index of refraction, 1 .. 2.5 */
     ssdgs_real centre[3];     /* origin of the networks' positions */
     ssdgs_real length_unit;   /* world units in one network unit */
@@ -496,7 +497,7 @@ typedef struct ssdgs_render_options {
     int terms;                    /* of the model's terms, those to render */
     int bf16;                     /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour. Leaves no dead neurons
                                      out: slower than 0 on Intel's CPUs, see `make bench` on others */
-    int antialias;                /* 1: opacity compensated for the 0.3 px^2 blur (Mip-Splatting) */
+    int antialias;                /* 1: opacity compensated for pixel_variance (Mip-Splatting) */
     ssdgs_real background[3];     /* linear; transfer none: stored values */
     ssdgs_real stop;              /* a pixel is done when its transmittance falls below; 0 = never */
     ssdgs_real alpha_threshold;   /* splats fainter than this at a pixel are not drawn */
@@ -656,6 +657,7 @@ typedef struct ssdgs_splat_view {
     int kept;                   /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
     int compensate;             /* opacity compensated for the blur */
     int blur;                   /* ssdgs_blur */
+    ssdgs_real variance;        /* px^2, of the blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
     ssdgs_real steepest;        /* centres beyond this slope x / z, y / z are not drawn */
     /* SSDGS_STAGE_PROJECT */
@@ -884,7 +886,7 @@ enum { /* rows of a block's geometry */
 /* ---- what the kernels are called with ---- */
 
 typedef struct ssdgs__projection {
-    ssdgs_real view[12], fx, fy, cx, cy, near_plane, steepest, log2_threshold;
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, steepest, log2_threshold, variance;
     int width, height, orthographic, by_distance, compensate, blur;
 } ssdgs__projection;
 
@@ -1601,6 +1603,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.shadow_width = 32;
     s.light_blur = SSDGS_BLUR_FLOOR;
     s.light_bias = (ssdgs_real)0.06;
+    s.pixel_variance = (ssdgs_real)0.1;
     s.eta = (ssdgs_real)1.3;
     s.length_unit = (ssdgs_real)0.5;
     s.light_scale = 1;
@@ -1615,6 +1618,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     s.scattering_width = 256;
     s.light_blur = SSDGS_BLUR_ADD;
     s.light_bias = 0;
+    s.pixel_variance = (ssdgs_real)0.3;
     s.length_unit = 1;
     return s;
 }
@@ -1645,6 +1649,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(light_blur, 0, SSDGS_BLUR_FLOOR);
     SSDGS__RANGE(light_map_size, 0, 8192);
     SSDGS__RANGE(light_bias, 0, (ssdgs_real)1e30);
+    SSDGS__RANGE(pixel_variance, (ssdgs_real)0.01, 10);
     SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
     SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
     SSDGS__RANGE(light_scale, 0, (ssdgs_real)1e30);
@@ -1983,6 +1988,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         v->light = index;
         v->width = v->height = map;
         v->blur = settings->light_blur;
+        v->variance = (ssdgs_real)(v->blur == SSDGS_BLUR_FLOOR ? 0.2 : 0.3);
         v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
         v->cx = v->cy = (ssdgs_real)map / 2;
         v->steepest = (ssdgs_real)1e30;
@@ -2197,6 +2203,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].cy = camera->cy;
         frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
         frame->views[0].compensate = frame->options.antialias;
+        frame->views[0].variance = frame->settings.pixel_variance;
         frame->views[0].steepest = (ssdgs_real)1e30;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
@@ -2259,6 +2266,7 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.by_distance = v->by_distance;
     p.compensate = v->compensate;
     p.blur = v->blur;
+    p.variance = v->variance;
     return p;
 }
 
@@ -4147,7 +4155,8 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the fil
     SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked) SSDGS__I(transfer) SSDGS__I(dipole) SSDGS__I(asg)
     SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
     SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
-    SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias) SSDGS__R("eta", 0, eta)
+    SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias)
+    SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R("eta", 0, eta)
     SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
     SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS) SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS)
     SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA)
@@ -4521,11 +4530,18 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
     ssdgs__ply_cursor cursor;
     uint32_t words[SSDGS__PLY_WORDS];
-    const int later = (int)(offsetof(ssdgs_settings, transport) / sizeof(int)); /* 0 in files from before it */
-    ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, later);
-    if (!result) result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, later + 1, SSDGS__PLY_WORDS);
-    if (result) return result;
+    static const struct { size_t at; double before; } added[2] = { /* settings of later files, and what held before them */
+        {offsetof(ssdgs_settings, transport), 0}, {offsetof(ssdgs_settings, pixel_variance), 0.3}
+    };
+    int i, next = 0;
     memset(words, 0, sizeof words);
+    for (i = 0; i < 3; i++) {
+        const int word = i < 2 ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
+        const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
+        if (result) return result;
+        if (i < 2) words[word] = ssdgs__ply_bits(added[i].before);
+        next = word + 1;
+    }
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers", ply->name);
@@ -4626,6 +4642,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     } else if (stats->plain) {
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
+        settings.pixel_variance = (ssdgs_real)0.3; /* as other programs trained it */
         color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1) ? SSDGS__PLY_DC : SSDGS__PLY_RGB;
         result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, color, color + 3);
     } else { /* the published implementation keeps the rest elsewhere */
@@ -6527,11 +6544,11 @@ SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, co
     }
     p->det0 = VDOT3(cross[0], cross[1], cross[2], cross[0], cross[1], cross[2]);
     if (k->blur == SSDGS_BLUR_ADD) {
-        p->h = VSET(0.3);
+        p->h = VSET(k->variance);
     } else {
         V mean = VMUL(VSET(0.5), VADD(p->a, p->c)), half = VMUL(VSET(0.5), VSUB(p->a, p->c));
         V largest = VADD(mean, VSQRT(VFMA(half, half, VMUL(p->b, p->b))));
-        p->h = VMAX(VSET(0), VSUB(VSET(0.2), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
+        p->h = VMAX(VSET(0), VSUB(VSET(k->variance), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
     }
     p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
     p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));

@@ -44,7 +44,7 @@ static const field fields[] = {
     SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue), SETTING(0, 1, transport),
     SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
     SETTING(0, 1, scattering_width), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
-    SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, eta),
+    SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, pixel_variance), SETTING(1, 1, eta),
     OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
     OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim),
     OPTION(1, 3, bounds_min), OPTION(1, 3, bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size),

@@ -11,10 +11,12 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
 /* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to say. */
 static ssdgs_model *make_model(ssdgs_context *context) {
+    ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
     ssdgs_model_view v;
     size_t i, c;
-    if (!CHECK(!ssdgs_model_create(context, NULL, COUNT, &model))) exit(1);
+    settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
+    if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
     v = ssdgs_model_get(model);
     for (i = 0; i < COUNT; i++) {
         const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;

@@ -103,6 +103,7 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *ca
 }
 
 static void test_raster(void) {
+    ssdgs_settings settings = ssdgs_settings_published();
     ssdgs_model *model;
     ssdgs_camera camera;
     ssdgs_frame frame;
@@ -111,7 +112,7 @@ static void test_raster(void) {
     size_t n, i, pixels;
     int c;
     if (!gold_open(&file, "raster")) return;
-    model = gold_geometry(NULL);
+    model = gold_geometry(&settings);
     camera = gold_camera();
     n = (size_t)model->count;
     pixels = (size_t)camera.width * (size_t)camera.height;
@@ -600,6 +601,7 @@ static void test_full(const char *name, int defaults) {
     size_t n, i, pixels, first[SSDGS__GLOBAL_GROUPS + 1], stride;
     int c;
     if (!gold_open(&file, name)) return;
+    settings.pixel_variance = (ssdgs_real)0.3;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
     model = gold_geometry(&settings);
     view = ssdgs_model_get(model);

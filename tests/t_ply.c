@@ -70,6 +70,7 @@ static ssdgs_model *make_model(int count) {
     settings.dipole = SSDGS_DIPOLE_BURLEY;
     settings.centre[1] = (ssdgs_real)(float)-0.3;
     settings.eta = (ssdgs_real)(float)1.3;
+    settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     view = ssdgs_model_get(model);
@@ -342,6 +343,10 @@ static void test_variants(void) {
             if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") || !strcmp(name, "nz") ||
                 !strcmp(name, "transport")) {
                 CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
+                ssdgs_model_destroy(back);
+            } else if (!strcmp(name, "pixel_variance")) {
+                CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same_gaussians(model, back) &&
+                      ssdgs_model_settings(back)->pixel_variance == (ssdgs_real)(float)0.3);
                 ssdgs_model_destroy(back);
             } else {
                 CHECK(refused(other.data, other.size) && strstr(ssdgs_error_message(context), name));
