@@ -587,7 +587,9 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
-    ssdgs_real prune_opacity;  /* 0.005 */
+    ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
+    ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
+                                  photographs that see it; 0.05; 0 = none */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
     ssdgs_rate camera_rate, light_rate;
 } ssdgs_train_options;
@@ -4998,6 +5000,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.densify_gradient = (ssdgs_real)4e-4;
     o.densify_size = (ssdgs_real)0.01;
     o.prune_opacity = (ssdgs_real)0.005;
+    o.prune_weight = (ssdgs_real)0.05;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
@@ -5458,6 +5461,9 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const double split_size = (double)o->densify_size * trainer->extent;
     const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
+    /* opacities were reset since the last control: weights say little */
+    const int before = trainer->iteration - 1, resets = o->opacity_reset_every;
+    const int recovering = resets && before / resets > (before - o->densify_every) / resets;
     ssdgs__ranked *candidates;
     uint64_t *order;
     unsigned char *drop;
@@ -5477,7 +5483,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
         }
-        drop[i] = p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size);
+        drop[i] = p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size) ||
+                  (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
         if (trainer->screen_gradient[i] / trainer->screen_count[i] < o->densify_gradient) continue;
@@ -5595,6 +5602,8 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
     if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity or densify_size is out of range");
+    if (!(o->prune_weight >= 0) || !ssdgs__finite(o->prune_weight)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            "train options: prune_weight is negative or not finite");
     if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
             "train options: densify_gradient is negative");
     for (i = 0; i < 12; i++)

@@ -754,6 +754,35 @@ static void test_density(void) {
     CHECK(before == 0 && fabs(correction.value[6] + 1e-3) < 1e-6 && fabs(correction.value[0] + 0.05) < 1e-4);
 }
 
+/* Gaussians that hardly show go, but neither those never seen nor all of them after opacities were reset. */
+static void test_prune_weight(void) {
+    enum { MANY = 8, LIGHT = 3 };
+    ssdgs_train_options options = short_run(100);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    int i, pass;
+    options.densify_gradient = 1e30f;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
+    for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (pass = 0; pass < 2; pass++) { /* opacities are reset at 30 */
+        for (i = 0; i < MANY; i++) {
+            model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
+            trainer->screen_count[i] = i == LIGHT ? 0 : 4;
+            trainer->contribution[i] = trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
+        }
+        trainer->iteration = pass ? 50 : 40;
+        CHECK(!ssdgs__densify(trainer));
+        CHECK(model->count == (pass ? MANY - LIGHT : MANY));
+    }
+    for (i = 0; i < model->count; i++) CHECK(model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= LIGHT);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     make_photos();
     test_same_bits();
@@ -767,6 +796,7 @@ int main(void) {
     test_bf16();
     test_isolation();
     test_density();
+    test_prune_weight();
     test_learning();
     test_schedule();
     TEST_END();
