@@ -587,6 +587,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
+    ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on average, is halved,
+                                  since no shadow's edge shows within a Gaussian; 0.25; 0 = none is */
     ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
@@ -4972,6 +4974,7 @@ struct ssdgs_trainer {
     ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly it was seen */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
+    ssdgs_real *half_shadow;
     double extent;            /* 1.1 x the cameras' radius */
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -4999,6 +5002,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.opacity_reset_every = 3000;
     o.densify_gradient = (ssdgs_real)4e-4;
     o.densify_size = (ssdgs_real)0.01;
+    o.densify_shadow = (ssdgs_real)0.25;
     o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
@@ -5360,6 +5364,9 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
+#define SSDGS__STATISTICS 4
+#define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
+
 /* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move: all or nothing. */
 static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs_context *context = trainer->context;
@@ -5372,7 +5379,7 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     capacity = count <= model->capacity ? model->capacity : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
     if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT,
             "%z Gaussians", capacity);
-    statistics = (ssdgs_real *)ssdgs__allocate(context, 3 * capacity * sizeof(ssdgs_real));
+    statistics = (ssdgs_real *)ssdgs__allocate(context, SSDGS__STATISTICS * capacity * sizeof(ssdgs_real));
     for (i = 0; i < 3; i++) grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
     if (!statistics || !grown[0] || !grown[1] || !grown[2]) {
         for (i = 0; i < 3; i++) ssdgs__release(context, grown[i]);
@@ -5389,6 +5396,7 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     trainer->screen_gradient = statistics;
     trainer->screen_count = statistics + capacity;
     trainer->contribution = statistics + 2 * capacity;
+    trainer->half_shadow = statistics + 3 * capacity;
     trainer->stride = model->capacity = capacity;
     return SSDGS_OK;
 }
@@ -5478,7 +5486,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
     p = model->gaussians;
     for (i = 0; i < n; i++) {
-        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
+        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i], gradient, shadow;
         for (c = 1; c < 3; c++) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
@@ -5487,8 +5495,10 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
                   (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
-        if (trainer->screen_gradient[i] / trainer->screen_count[i] < o->densify_gradient) continue;
-        candidates[wanted].value = trainer->screen_gradient[i] / trainer->screen_count[i];
+        gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
+        shadow = trainer->half_shadow[i] / trainer->screen_count[i];
+        if (gradient < o->densify_gradient && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
+        candidates[wanted].value = gradient < o->densify_gradient ? -1 / shadow : gradient; /* below 0: to be halved, after the others */
         candidates[wanted++].index = (uint32_t)i;
     }
     if (dropped == n) { /* never extinct */
@@ -5525,27 +5535,40 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         const size_t from = candidates[i].index, to = n + added;
         const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
         ssdgs_real q[4], raw[4], r[9];
+        const int halve = candidates[i].value < 0;
         double size = -1e30;
-        int half, j;
+        int longest = 0, half, j;
         if (drop[from]) continue;
         added++;
         ssdgs__copy_gaussian(p, trainer->stride, to, from);
-        for (c = 0; c < 3; c++) size = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] > size
-            ? (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from] : size;
-        if (size <= log(split_size)) continue; /* small: the copy is the clone */
+        for (c = 0; c < 3; c++) {
+            const double axis = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from];
+            if (axis > size) {
+                size = axis;
+                longest = c;
+            }
+        }
+        if (!halve && size <= log(split_size)) continue; /* small: the copy is the clone */
         for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * trainer->stride + from];
         ssdgs__rotation_scalar(raw, q, r);
-        for (half = 0; half < 2; half++) { /* large: two samples of it, smaller */
+        for (half = 0; half < 2; half++) { /* large: two samples of it, smaller; or its halves */
             const size_t at = half ? to : from;
-            double offset[3];
+            double offset[3] = {0, 0, 0};
             for (c = 0; c < 3; c++) {
-                ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * trainer->stride;
-                offset[c] = ssdgs__normal(key, (uint64_t)(3 * half + c)) * (double)ssdgs__exp_scalar(scale[half ? to : from]);
-                scale[at] -= (ssdgs_real)0.47000362924573558; /* ln 1.6 */
+                ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + at;
+                if (halve ? c != longest : 0) continue;
+                offset[c] = (double)ssdgs__exp_scalar(*scale) *
+                            (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF) : ssdgs__normal(key, (uint64_t)(3 * half + c)));
+                *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
             }
             for (c = 0; c < 3; c++)
                 for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * trainer->stride +
                                           at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
+            if (halve) { /* together as opaque as the whole */
+                ssdgs_real *opacity = p + (size_t)SSDGS_OPACITY * trainer->stride + at;
+                const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) / (2 * SSDGS__HALF); /* -ln(1 - opacity) */
+                *opacity = (ssdgs_real)log(expm1(veil));
+            }
             if (half == 0)
                 for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + from] =
                     trainer->square[(size_t)c * trainer->stride + from] = 0;
@@ -5557,7 +5580,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     for (i = 0; i < n + added; i++)
         if (i >= n || !drop[i]) order[kept++] = i;
     ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + 2 * n));
-    memset(trainer->screen_gradient, 0, 3 * trainer->stride * sizeof(ssdgs_real));
+    memset(trainer->screen_gradient, 0, SSDGS__STATISTICS * trainer->stride * sizeof(ssdgs_real));
     ssdgs__release(context, candidates);
     return SSDGS_OK;
 }
@@ -5578,10 +5601,12 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
     int i;
     for (i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
+        const ssdgs_real lit = frame->terms & SSDGS_SHADOW_TERM ? frame->visibility[g] : 1;
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
         trainer->screen_gradient[g] += SSDGS__SQRT(x * x + y * y);
         trainer->screen_count[g] += 1;
         trainer->contribution[g] += d[6];
+        if (d[6] > 1) trainer->half_shadow[g] += 4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
     }
 }
 
@@ -5600,8 +5625,8 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
             "train options: max_gaussians = %d", o->max_gaussians);
     if (o->densify_every < 1 || o->opacity_reset_every < 0 || o->schedule < 0 || o->schedule > SSDGS_SCHEDULE_MERGED)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
-    if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity or densify_size is out of range");
+    if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0) || !(o->densify_shadow >= 0))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity, densify_size or densify_shadow is out of range");
     if (!(o->prune_weight >= 0) || !ssdgs__finite(o->prune_weight)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
             "train options: prune_weight is negative or not finite");
     if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
@@ -5982,7 +6007,7 @@ typedef ssdgs_result (*ssdgs__visit)(void *user, void *data, size_t size);
 static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs__visit visit, void *user) {
     ssdgs_model *model = trainer->model;
     const size_t n = (size_t)model->count * sizeof(ssdgs_real), globals = model->global_count * sizeof(ssdgs_real);
-    ssdgs_real *planes[3], *statistics[3], *shared[3];
+    ssdgs_real *planes[3], *statistics[SSDGS__STATISTICS], *shared[3];
     ssdgs_result result = SSDGS_OK;
     int i, c;
     planes[0] = model->gaussians;
@@ -5991,14 +6016,15 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     statistics[0] = trainer->screen_gradient;
     statistics[1] = trainer->screen_count;
     statistics[2] = trainer->contribution;
+    statistics[3] = trainer->half_shadow;
     shared[0] = model->globals;
     shared[1] = trainer->global_mean;
     shared[2] = trainer->global_square;
     for (i = 0; i < 3 && !result; i++) {
         for (c = 0; c < SSDGS_CHANNELS && !result; c++) result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
-        if (!result) result = visit(user, statistics[i], n);
         if (!result) result = visit(user, shared[i], globals);
     }
+    for (i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
     if (!result) result = visit(user, trainer->order, (size_t)trainer->photo_count * sizeof *trainer->order);
     if (!result) result = visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
     return result;
@@ -6093,13 +6119,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
                     offsetof(ssdgs_settings, light_bias) - offsetof(ssdgs_settings, terms)))
         reason = "it belongs to other settings";
     else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
-             (size_t)head.count > size / (3 * sizeof(ssdgs_real) * (SSDGS_CHANNELS + 1)) ||
+             (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
              head.iteration < 0 || head.skipped < 0) reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
         expected = sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
-                   3 * sizeof(ssdgs_real) * ((size_t)head.count * (SSDGS_CHANNELS + 1) + (size_t)head.global_count);
+                   sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) + 3 * (size_t)head.global_count);
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";

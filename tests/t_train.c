@@ -783,6 +783,85 @@ static void test_prune_weight(void) {
     ssdgs_context_destroy(context);
 }
 
+/* What lies half in shadow is halved along its longest axis, so that centre, variance and, where they overlap, the light that
+   gets through stay. */
+static void test_half_shadow(void) {
+    static const double turn[4] = {0.9, 0.1, -0.3, 0.3}, scale[3] = {0.02, 0.11, 0.05};
+    ssdgs_train_options options = short_run(100);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_real *p, q[4], raw[4], r[9];
+    double middle[3], apart[3], length = 0;
+    size_t stride;
+    int i, c, half;
+    options.opacity_reset_every = 0;
+    options.densify_gradient = 1;
+    options.densify_shadow = 2;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, NULL, 2, &model));
+    p = model->gaussians;
+    for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * model->capacity + 1] = (ssdgs_real)turn[c];
+    for (c = 0; c < 3; c++) {
+        p[(size_t)c * model->capacity + 1] = (ssdgs_real)0.2;
+        p[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + 1] = (ssdgs_real)log(scale[c]);
+    }
+    p[SSDGS_OPACITY * model->capacity + 1] = (ssdgs_real)1.2;
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (i = 0; i < 2; i++) { /* the first has too little of it */
+        trainer->screen_count[i] = 3;
+        trainer->contribution[i] = 100;
+        trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
+    }
+    trainer->iteration = 50;
+    CHECK(!ssdgs__densify(trainer) && model->count == 3);
+    p = model->gaussians;
+    stride = model->capacity;
+    ssdgs__rotation_scalar(raw, q, r);
+    for (half = 0, i = 0; i < 3; i++) { /* Morton order: the first is still the first */
+        if (i == 0) continue;
+        for (c = 0; c < 3; c++) {
+            const double x = (double)p[(size_t)c * stride + (size_t)i];
+            middle[c] = (half ? middle[c] : 0) + x / 2;
+            apart[c] = half ? apart[c] - x : x;
+            CHECK(fabs(exp((double)p[(size_t)(SSDGS_LOG_SCALE + c) * stride + (size_t)i]) - (c == 1 ? 0.75 : 1) * scale[c]) < 1e-6);
+        }
+        { /* 1 - opacity to the power 2/3: 1 / (2 x 0.75) */
+            const double veil = pow(1 + exp(1.2), -2.0 / 3), opacity = 1 / (1 + exp(-(double)p[SSDGS_OPACITY * stride + (size_t)i]));
+            CHECK(fabs(opacity - (1 - veil)) < 1e-6);
+        }
+        half++;
+    }
+    for (c = 0; c < 3; c++) {
+        CHECK(fabs(middle[c] - 0.2) < 1e-6);
+        length += apart[c] * apart[c];
+        CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) < 1e-6);
+    }
+    CHECK(fabs(length / 4 + 0.75 * 0.75 * scale[1] * scale[1] - scale[1] * scale[1]) < 1e-7);
+    for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a pixel; two photographs */
+        ssdgs_real splat[SSDGS__SPLAT] = {3, 4}, lit = (ssdgs_real)0.2;
+        uint32_t first = 0;
+        ssdgs_frame frame;
+        memset(&frame, 0, sizeof frame);
+        frame.camera.width = frame.camera.height = 2;
+        frame.terms = i == 1 ? SSDGS_DIFFUSE_TERM : SSDGS_ALL_TERMS;
+        frame.shaded_count = 1;
+        frame.shaded = &first;
+        frame.splat_gradient = splat;
+        frame.visibility = &lit;
+        splat[6] = (ssdgs_real)(i == 2 ? 0.9 : 11);
+        if (i < 3) trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] = trainer->screen_count[0] = 0;
+        ssdgs__gather_statistics(trainer, &frame);
+        if (i == 3) ssdgs__gather_statistics(trainer, &frame);
+        CHECK(fabs((double)trainer->half_shadow[0] - (i == 0 ? 6.4 : i == 3 ? 12.8 : 0)) < 1e-5);
+        CHECK(fabs((double)trainer->contribution[0] - (i == 2 ? 0.9 : i == 3 ? 22.9 : 11)) < 1e-5);
+        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 15 : 5)) < 1e-5 && trainer->screen_count[0] == (i == 3 ? 3 : 1));
+    }
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     make_photos();
     test_same_bits();
@@ -797,6 +876,7 @@ int main(void) {
     test_isolation();
     test_density();
     test_prune_weight();
+    test_half_shadow();
     test_learning();
     test_schedule();
     TEST_END();
