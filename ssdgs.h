@@ -89,6 +89,8 @@ WHAT IT COMPUTES
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
+  Density control clones or splits where the image pulls at a Gaussian, as published; it also halves what lies half in
+  shadow (densify_shadow) and drops what hardly shows (prune_weight).
 
 CONVENTIONS
   camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a translation. The
@@ -588,7 +590,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
     ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on average, is halved,
-                                  since no shadow's edge shows within a Gaussian; 0.25; 0 = none is */
+                                  since no shadow's edge shows within a Gaussian; 0.5; 0 = none is */
     ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
@@ -5002,7 +5004,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.opacity_reset_every = 3000;
     o.densify_gradient = (ssdgs_real)4e-4;
     o.densify_size = (ssdgs_real)0.01;
-    o.densify_shadow = (ssdgs_real)0.25;
+    o.densify_shadow = (ssdgs_real)0.5;
     o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
@@ -5365,6 +5367,7 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
 #define SSDGS__STATISTICS 4
+#define SSDGS__HALVED 0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
 #define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
 
 /* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move: all or nothing. */
@@ -5475,7 +5478,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs__ranked *candidates;
     uint64_t *order;
     unsigned char *drop;
-    size_t i, kept = 0, dropped = 0, wanted = 0, added, room;
+    size_t i, kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n), added, room;
     ssdgs_real *p;
     ssdgs_result result;
     int c;
@@ -5487,6 +5490,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     p = model->gaussians;
     for (i = 0; i < n; i++) {
         ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i], gradient, shadow;
+        int pull;
         for (c = 1; c < 3; c++) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
@@ -5497,15 +5501,18 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
         gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
         shadow = trainer->half_shadow[i] / trainer->screen_count[i];
-        if (gradient < o->densify_gradient && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
-        candidates[wanted].value = gradient < o->densify_gradient ? -1 / shadow : gradient; /* below 0: to be halved, after the others */
+        pull = !(gradient < o->densify_gradient);
+        if (!pull && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
+        candidates[wanted].value = pull ? gradient : -1 / shadow; /* below 0: to be halved, after the others */
         candidates[wanted++].index = (uint32_t)i;
+        pulled += (size_t)pull;
     }
     if (dropped == n) { /* never extinct */
         drop[0] = 0;
         dropped--;
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
+    wanted = wanted - pulled < halved ? wanted : pulled + halved;
     room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
     if (wanted > room || n - dropped > (size_t)o->max_gaussians) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth at a time */

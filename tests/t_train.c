@@ -838,6 +838,20 @@ static void test_half_shadow(void) {
         CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) < 1e-6);
     }
     CHECK(fabs(length / 4 + 0.75 * 0.75 * scale[1] * scale[1] - scale[1] * scale[1]) < 1e-7);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    CHECK(!ssdgs_model_create(context, NULL, 200, &model)); /* of many, the few with the most */
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (i = 0; i < 200; i++) {
+        model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
+        trainer->screen_count[i] = 1;
+        trainer->contribution[i] = 100;
+        trainer->half_shadow[i] = (ssdgs_real)(10 + i);
+    }
+    trainer->iteration = 50;
+    CHECK(!ssdgs__densify(trainer) && model->count == 204);
+    for (i = 0, c = 0; i < 204; i++) c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
+    CHECK(c == 8);
     for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a pixel; two photographs */
         ssdgs_real splat[SSDGS__SPLAT] = {3, 4}, lit = (ssdgs_real)0.2;
         uint32_t first = 0;
