@@ -5464,12 +5464,47 @@ static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count,
     trainer->model->count = (int)count;
 }
 
+/* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it is small, two
+   samples of it, smaller, if it is large. */
+static void ssdgs__double(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
+    const ssdgs_train_options *o = &trainer->options;
+    const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
+    const size_t stride = trainer->stride;
+    ssdgs_real *p = trainer->model->gaussians, q[4], raw[4], r[9];
+    int longest = 0, half, c, j;
+    ssdgs__copy_gaussian(p, stride, to, from);
+    for (c = 1; c < 3; c++)
+        if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] > p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from]) longest = c;
+    if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <= log((double)o->densify_size * trainer->extent))
+        return; /* the copy is the clone */
+    for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
+    ssdgs__rotation_scalar(raw, q, r);
+    for (half = 0; half < 2; half++) {
+        const size_t at = half ? to : from;
+        double offset[3] = {0, 0, 0};
+        for (c = 0; c < 3; c++) {
+            ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * stride + at;
+            if (halve && c != longest) continue;
+            offset[c] = (double)ssdgs__exp_scalar(*scale) *
+                        (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF) : ssdgs__normal(key, (uint64_t)(3 * half + c)));
+            *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
+        }
+        for (c = 0; c < 3; c++)
+            for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * stride + at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
+        if (halve) { /* together as opaque as the whole */
+            ssdgs_real *opacity = p + (size_t)SSDGS_OPACITY * stride + at;
+            const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) / (2 * SSDGS__HALF); /* -ln(1 - opacity) */
+            *opacity = (ssdgs_real)log(expm1(veil));
+        }
+    }
+    for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
+}
+
 static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count;
-    const double split_size = (double)o->densify_size * trainer->extent;
     const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
     /* opacities were reset since the last control: weights say little */
@@ -5538,49 +5573,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         return result;
     }
     p = model->gaussians;
-    for (i = 0, added = 0; i < wanted; i++) {
-        const size_t from = candidates[i].index, to = n + added;
-        const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
-        ssdgs_real q[4], raw[4], r[9];
-        const int halve = candidates[i].value < 0;
-        double size = -1e30;
-        int longest = 0, half, j;
-        if (drop[from]) continue;
-        added++;
-        ssdgs__copy_gaussian(p, trainer->stride, to, from);
-        for (c = 0; c < 3; c++) {
-            const double axis = (double)p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + from];
-            if (axis > size) {
-                size = axis;
-                longest = c;
-            }
-        }
-        if (!halve && size <= log(split_size)) continue; /* small: the copy is the clone */
-        for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * trainer->stride + from];
-        ssdgs__rotation_scalar(raw, q, r);
-        for (half = 0; half < 2; half++) { /* large: two samples of it, smaller; or its halves */
-            const size_t at = half ? to : from;
-            double offset[3] = {0, 0, 0};
-            for (c = 0; c < 3; c++) {
-                ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + at;
-                if (halve ? c != longest : 0) continue;
-                offset[c] = (double)ssdgs__exp_scalar(*scale) *
-                            (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF) : ssdgs__normal(key, (uint64_t)(3 * half + c)));
-                *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
-            }
-            for (c = 0; c < 3; c++)
-                for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * trainer->stride +
-                                          at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
-            if (halve) { /* together as opaque as the whole */
-                ssdgs_real *opacity = p + (size_t)SSDGS_OPACITY * trainer->stride + at;
-                const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) / (2 * SSDGS__HALF); /* -ln(1 - opacity) */
-                *opacity = (ssdgs_real)log(expm1(veil));
-            }
-            if (half == 0)
-                for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + from] =
-                    trainer->square[(size_t)c * trainer->stride + from] = 0;
-        }
-    }
+    for (i = 0, added = 0; i < wanted; i++)
+        if (!drop[candidates[i].index]) ssdgs__double(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
     for (i = n; i < n + added; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] =
             trainer->square[(size_t)c * trainer->stride + i] = 0;
