@@ -5466,7 +5466,7 @@ static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count,
 
 /* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it is small, two
    samples of it, smaller, if it is large. */
-static void ssdgs__double(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
+static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
     const ssdgs_train_options *o = &trainer->options;
     const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
     const size_t stride = trainer->stride;
@@ -5574,7 +5574,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     p = model->gaussians;
     for (i = 0, added = 0; i < wanted; i++)
-        if (!drop[candidates[i].index]) ssdgs__double(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
+        if (!drop[candidates[i].index]) ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
     for (i = n; i < n + added; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] =
             trainer->square[(size_t)c * trainer->stride + i] = 0;
@@ -6944,10 +6944,9 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         }
         F(batch_transpose)(&applied, applies);
         F(batch_transpose)(&sampled, samples);
-        for (i = 0; i < SSDGS__BATCH; i++) {
-            for (v = 0; v < 3; v++) VSTORE(lanes[i][v], VSET(0));
-            if (flux) VSTORE(energy[i], VSET(0));
-        }
+        for (i = 0; i < samples; i++)
+            for (v = 0; v < 2 + cue; v++) VSTORE(lanes[i][v], VSET(0));
+        for (i = 0; flux && i < applies; i++) VSTORE(energy[i], VSET(0));
         for (micro = 0; micro < 16; micro++) {
             const uint64_t entries = applied.entries[micro];
             uint64_t left;
@@ -7009,7 +7008,8 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             }
         }
         for (i = 0; i < samples; i++)
-            F(sum4)(sums + (size_t)sampled.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]), VLOAD(lanes[i][2]), VSET(0));
+            F(sum4)(sums + (size_t)sampled.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]),
+                    cue ? VLOAD(lanes[i][2]) : VSET(0), VSET(0));
         for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(VLOAD(energy[i]));
     }
 }

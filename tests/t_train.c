@@ -754,6 +754,28 @@ static void test_density(void) {
     CHECK(before == 0 && fabs(correction.value[6] + 1e-3) < 1e-6 && fabs(correction.value[0] + 0.05) < 1e-4);
 }
 
+/* A Gaussian of no size is as wide as each pass's blur makes it. */
+static void test_blur(void) {
+    int i, pass;
+    for (i = 0; i < 2; i++) {
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_frame frame;
+        settings.pixel_variance = (ssdgs_real)(i ? 0.7 : 0.1);
+        settings.light_blur = i ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
+        CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 1, &model));
+        for (pass = 0; pass < 3; pass++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);
+        model->gaussians[(size_t)SSDGS_OPACITY * model->capacity] = 4;
+        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) && frame.view_count > 1);
+        CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_PROJECT));
+        CHECK(fabs(-0.5 * 1.4426950408889634 / (double)frame.views[0].record[2] - (double)settings.pixel_variance) < 1e-3);
+        CHECK(fabs((double)frame.views[1].variance - (i ? 0.3 : 0.2)) < 1e-6);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
 /* Gaussians that hardly show go, but neither those never seen nor all of them after opacities were reset. */
 static void test_prune_weight(void) {
     enum { MANY = 8, LIGHT = 3 };
@@ -889,6 +911,7 @@ int main(void) {
     test_bf16();
     test_isolation();
     test_density();
+    test_blur();
     test_prune_weight();
     test_half_shadow();
     test_learning();
