@@ -80,11 +80,12 @@ WHAT IT COMPUTES
   c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The 8 ASG bases and both networks
   are shared by all Gaussians.
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
-  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first; the shadow network
-  corrects the logit of eq. 7, where what lies nearer to the light by less than light_bias casts no shadow. transport = 1
-  lets the scattering network see besides what true dipole transport brings to x from where the light enters.
+  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, but no sines of wo and few
+  of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
+  by less than light_bias casts no shadow. transport = 1 lets the scattering network see besides what true dipole
+  transport brings to x from where the light enters.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
-  channels, 6 layers, 256 wide, no depth cue; the shadow network's output is S, no bias; both passes add 0.3 px^2,
+  channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S, no bias; both passes add 0.3 px^2,
   where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
@@ -403,6 +404,9 @@ typedef struct ssdgs_settings {
     int shadow_on_scattering; /* 1: eq. 14, the ablation */
     int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
     int scattering_width;     /* hidden width */
+    int view_octaves;         /* of sines and cosines of wo, which the scattering network sees, 0 .. 8: with many it learns the
+                                 photographs by heart */
+    int light_octaves;        /* and of wi */
     int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
     int shadow_width;
     int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
@@ -1571,8 +1575,9 @@ static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
 static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
     const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
     int i;
-    sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT : 27 * 3 + 3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0) +
-        (settings->transport ? SSDGS__LENGTHS : 0);
+    sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT
+        : 27 + 3 * (1 + 2 * settings->view_octaves) + 3 * (1 + 2 * settings->light_octaves) + 3 + SSDGS_MATERIAL_COUNT +
+        (settings->depth_cue ? 9 : 0) + (settings->transport ? SSDGS__LENGTHS : 0);
     for (i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
     if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
     return layers;
@@ -1605,6 +1610,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.per_channel_optics = s.depth_cue = s.residual_shadow = 1;
     s.scattering_layers = 3;
     s.scattering_width = 64;
+    s.light_octaves = 1;
     s.shadow_layers = 4;
     s.shadow_width = 32;
     s.light_blur = SSDGS_BLUR_FLOOR;
@@ -1622,6 +1628,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     s.per_channel_optics = s.depth_cue = s.residual_shadow = 0;
     s.scattering_layers = 6;
     s.scattering_width = 256;
+    s.view_octaves = s.light_octaves = 4;
     s.light_blur = SSDGS_BLUR_ADD;
     s.light_bias = 0;
     s.pixel_variance = (ssdgs_real)0.3;
@@ -1650,6 +1657,8 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(shadow_on_scattering, 0, 1);
     SSDGS__RANGE(scattering_layers, 2, SSDGS_MAX_LAYERS);
     SSDGS__RANGE(scattering_width, 1, 1024);
+    SSDGS__RANGE(view_octaves, 0, 8);
+    SSDGS__RANGE(light_octaves, 0, 8);
     SSDGS__RANGE(shadow_layers, 0, SSDGS_MAX_LAYERS);
     SSDGS__RANGE(shadow_width, 1, 1024);
     SSDGS__RANGE(light_blur, 0, SSDGS_BLUR_FLOOR);
@@ -2949,8 +2958,8 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
         inputs[n].from = (place), inputs[n++].of_gaussian = (own), row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
     } while (0)
     SSDGS__INPUT(3, shadow ? 3 : 4, scaled ? inverse_unit : 1, b * SSDGS_POSITION, 1);
-    if (!shadow) SSDGS__INPUT(3, 4, 1, b * SSDGS__WO, 0);
-    SSDGS__INPUT(3, shadow ? 3 : 4, 1, b * SSDGS__WI, 0);
+    if (!shadow) SSDGS__INPUT(3, frame->settings.view_octaves, 1, b * SSDGS__WO, 0);
+    SSDGS__INPUT(3, shadow ? 3 : frame->settings.light_octaves, 1, b * SSDGS__WI, 0);
     if (shadow) SSDGS__INPUT(1, -1, 1, l->visibility, 0);
     else SSDGS__INPUT(3, -1, 1, b * SSDGS__NORMAL, 0);
     SSDGS__INPUT(SSDGS_MATERIAL_COUNT, -1, 1, b * SSDGS_MATERIAL, 1);
@@ -4160,7 +4169,8 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the fil
     SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2)
     SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked) SSDGS__I(transfer) SSDGS__I(dipole) SSDGS__I(asg)
     SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
-    SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
+    SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(view_octaves) SSDGS__I(light_octaves)
+    SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
     SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias)
     SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R("eta", 0, eta)
     SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
@@ -4536,16 +4546,17 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
     ssdgs__ply_cursor cursor;
     uint32_t words[SSDGS__PLY_WORDS];
-    static const struct { size_t at; double before; } added[2] = { /* settings of later files, and what held before them */
-        {offsetof(ssdgs_settings, transport), 0}, {offsetof(ssdgs_settings, pixel_variance), 0.3}
+    static const struct { size_t at; double before; } added[4] = { /* settings of later files, and what held before them */
+        {offsetof(ssdgs_settings, transport), 0}, {offsetof(ssdgs_settings, view_octaves), 4},
+        {offsetof(ssdgs_settings, light_octaves), 4}, {offsetof(ssdgs_settings, pixel_variance), 0.3}
     };
     int i, next = 0;
     memset(words, 0, sizeof words);
-    for (i = 0; i < 3; i++) {
-        const int word = i < 2 ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
+    for (i = 0; i < 5; i++) {
+        const int word = i < 4 ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
         const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
-        if (i < 2) words[word] = ssdgs__ply_bits(added[i].before);
+        if (i < 4) words[word] = ssdgs__ply_bits(added[i].before);
         next = word + 1;
     }
     ply->at = element->data;

@@ -43,7 +43,7 @@ typedef struct field { const char *name; int in_options, reals, count; size_t at
 static const field fields[] = {
     SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue), SETTING(0, 1, transport),
     SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
-    SETTING(0, 1, scattering_width), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
+    SETTING(0, 1, scattering_width), SETTING(0, 1, view_octaves), SETTING(0, 1, light_octaves), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
     SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, pixel_variance), SETTING(1, 1, eta),
     OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
     OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim),

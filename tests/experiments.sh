@@ -111,6 +111,7 @@ TEXT
     row 'no depth cue' '' no_cue --set depth_cue=0
     row 'one optics for all channels' '' one_optics --set per_channel_optics=0
     row 'plain shadow network' '' plain_shadow --set residual_shadow=0
+    row 'four octaves of wo and wi' '' octaves --set view_octaves=4 --set light_octaves=4
     row 'no shadow network' '' no_shadow_net --set shadow_layers=0
     row 'no light bias' '' no_bias --set light_bias=0
     row 'true dipole transport' '' transport --set transport=1

@@ -412,6 +412,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     const int *sizes;
     size_t count;
     if (!gold_open(&file, name)) return;
+    settings.view_octaves = settings.light_octaves = 4;
     settings.residual_shadow = residual;
     settings.shadow_width = 32;
     settings.shadow_layers = 4;
@@ -602,6 +603,7 @@ static void test_full(const char *name, int defaults) {
     int c;
     if (!gold_open(&file, name)) return;
     settings.pixel_variance = (ssdgs_real)0.3;
+    settings.view_octaves = settings.light_octaves = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
     model = gold_geometry(&settings);
     view = ssdgs_model_get(model);

@@ -312,6 +312,40 @@ static void test_compose(void) {
     }
 }
 
+/* The scattering network's inputs, in their order: x in four octaves, wo in view_octaves, wi in light_octaves, n. */
+static void test_octaves(void) {
+    ssdgs_frame frame;
+    ssdgs__block_layout l;
+    ssdgs_real *gauss, *part, *rows;
+    double want[27 + 15 + 9 + 3];
+    int n = 0, i, c, k;
+    memset(&frame, 0, sizeof frame);
+    frame.context = context;
+    frame.settings = ssdgs_settings_default();
+    frame.settings.length_unit = 1;
+    frame.settings.view_octaves = 2;
+    frame.settings.light_octaves = 1;
+    frame.terms = SSDGS_SCATTERING_TERM;
+    frame.light_count = 1;
+    l = ssdgs__layout(&frame);
+    CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + 9);
+    gauss = (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
+    part = gauss + l.lights;
+    rows = part + l.light_size;
+    for (i = 0; i < 4; i++) {
+        static const int octaves[4] = {4, 2, 1, 0}, from[4] = {SSDGS_POSITION, SSDGS__WO, SSDGS__WI, SSDGS__NORMAL};
+        for (c = 0; c < 3; c++) (i ? part : gauss)[(from[i] + c) * SSDGS__BLOCK] = want[n++] = 0.2 + 0.3 * i - 0.5 * c;
+        for (k = 0; k < 6 * octaves[i]; k++, n++) {
+            const double angle = (0.2 + 0.3 * i - 0.5 * (k % 3)) * (1 << k / 3 % octaves[i]);
+            want[n] = k < 3 * octaves[i] ? sin(angle) : cos(angle);
+        }
+    }
+    ssdgs__encode_inputs(&frame, &l, 0, gauss, part, rows);
+    for (i = 0; i < n; i++) rows[i] = rows[i * SSDGS__BLOCK];
+    CHECK_NEAR(rows, want, n, 1e-12, 0, "the scattering network's inputs");
+    free(gauss);
+}
+
 int main(void) {
     scene base, s;
     int i;
@@ -321,6 +355,7 @@ int main(void) {
     test_photo(SSDGS_TRANSFER_SRGB);
     test_photo(SSDGS_TRANSFER_NONE);
     test_compose();
+    test_octaves();
     memset(&base, 0, sizeof base);
     base.name = "default";
     base.settings = ssdgs_settings_default();
