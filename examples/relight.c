@@ -33,7 +33,7 @@ static int fail(const char *message)
 
 /* What is written for a view; the first columns of the sheet come first. */
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
-enum { SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4 };
+enum { SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
 static const char *const suffixes[OUTPUT_COUNT] = {
     "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"
 };
@@ -50,7 +50,7 @@ typedef struct job {
     ssdgs_image planes;              /* of the view at hand; color is scratch once image is made */
     ssdgs_real *memory, *image;      /* what planes point into; (h,w,3) stored values */
     unsigned char *bytes, *sheet;    /* (h,w,3) */
-    int sheet_rows, cell_width, cell_height;
+    int sheet_rows, cell_width, cell_height, shrink; /* so many pixels each way become one of the sheet */
 } job;
 
 static int parse(job *j, int argc, char **argv)
@@ -294,8 +294,9 @@ static int make_planes(job *j)
     j->bytes = (unsigned char *)malloc(most * 3 + 1);
     if (j->given[SHEET] && j->data.count > 0) {
         j->sheet_rows = j->data.count < SHEET_ROWS ? j->data.count : SHEET_ROWS;
-        j->cell_width = j->data.frames[0].camera.width;
-        j->cell_height = j->data.frames[0].camera.height;
+        j->shrink = (j->data.frames[0].camera.width + SHEET_CELL - 1) / SHEET_CELL;
+        j->cell_width = j->data.frames[0].camera.width / j->shrink;
+        j->cell_height = j->data.frames[0].camera.height / j->shrink;
         j->sheet = (unsigned char *)calloc(most * SHEET_COLUMNS, (size_t)j->sheet_rows * 3);
     }
     if (!j->metrics || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet)) return !fail("out of memory");
@@ -385,13 +386,19 @@ static void show(job *j, const olat_frame *frame, int output)
     ssdgs_to_bytes(out, 3 * pixels, transfer, j->bytes);
 }
 
-/* Puts the bytes into a cell of the sheet, cut to its size. */
+/* Puts the bytes, shrunk, into a cell of the sheet, cut to its size. */
 static void paste(job *j, const olat_frame *frame, int row, int column)
 {
-    int y, width = frame->camera.width < j->cell_width ? frame->camera.width : j->cell_width;
-    for (y = 0; y < j->cell_height && y < frame->camera.height; y++)
-        memcpy(j->sheet + 3 * (size_t)j->cell_width * ((size_t)(row * j->cell_height + y) * SHEET_COLUMNS + (size_t)column),
-               j->bytes + 3 * (size_t)frame->camera.width * (size_t)y, 3 * (size_t)width);
+    const int n = j->shrink;
+    int x, y, c, k, sum;
+    for (y = 0; y < j->cell_height && (y + 1) * n <= frame->camera.height; y++)
+        for (x = 0; x < j->cell_width && (x + 1) * n <= frame->camera.width; x++)
+            for (c = 0; c < 3; c++) {
+                for (sum = 0, k = 0; k < n * n; k++)
+                    sum += j->bytes[3 * ((size_t)(y * n + k / n) * (size_t)frame->camera.width + (size_t)(x * n + k % n)) + (size_t)c];
+                j->sheet[3 * ((row * j->cell_height + y) * SHEET_COLUMNS * j->cell_width + column * j->cell_width + x) + c] =
+                    (unsigned char)((sum + n * n / 2) / (n * n));
+            }
 }
 
 /* Frames of a path may have no file: they are numbered. */

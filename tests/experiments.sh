@@ -61,6 +61,20 @@ details() {
     done
 }
 
+# sheet LABEL NAME: photograph, rendering, diffuse, specular, scattering, shadow, normals of four test views, of each scene; the
+# first scene's is shown.
+sheet() {
+    for s in $scenes; do
+        scene=${s%%:*}
+        [ "$out/$scene.$2.png" -nt "$out/$scene.$2.ply" ] || "$build/relight" "$out/$scene.$2.ply" "$data/$scene" \
+            --background "${s##*:}" --out "$out/frames" --sheet "$out/$scene.$2.png" >&2
+    done
+    scene=${scenes%%:*}
+    mkdir -p "$out/images"
+    cp "$out/$scene.$2.png" "$out/images"
+    printf '\n%s:\n\n![%s](images/%s)\n' "$1" "$1" "$scene.$2.png"
+}
+
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
 {
     cat <<TEXT
@@ -89,10 +103,17 @@ TEXT
     row 'I: diffuse, shadow, scattering, specular' '33.29 (34.69)' default
     row 'J: last two swapped' '32.08 (32.71)' swapped --schedule swapped
     row 'K: all after diffuse' '32.74 (33.52)' merged --schedule merged
+    printf '\nPhotograph, rendering, diffuse, specular, scattering, shadow, normals (as Figures 5 and 12; the other scenes'\''\n'
+    printf 'are in build/experiments).\n'
+    sheet 'H, all from the start' joint
+    sheet 'I, diffuse, shadow, scattering, specular' default
+    sheet 'J, last two swapped' swapped
+    sheet 'K, all after diffuse' merged
 
     head_line 'Shadow also on scattering (eq. 14, Table 5)' 'shadow on' 'paper (9 scenes)'
     row 'diffuse and specular' '33.00 (34.37)' default
     row 'all terms' '32.13 (33.14)' shadow_on_scattering --set shadow_on_scattering=1
+    sheet 'Shadow on all terms (above, under I, on diffuse and specular)' shadow_on_scattering
 
     head_line 'Disturbed cameras and lights' 'training' 'paper (SSS-GS scenes, its own noise)'
     row 'true poses and lights' '' default
