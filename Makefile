@@ -17,6 +17,8 @@ SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual
+BUILDS = builds
+RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 
 all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/bench
@@ -46,9 +48,9 @@ $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
 
 # Each program closes with "N passed, N failed"; one that does not counts as one failed.
 test: $(TESTS) $(EXAMPLES) ## every test; SSDGS_GOLDEN=folder reads the golden files there
-	@passed=0; failed=0; for t in $(TESTS) builds; do \
+	@passed=0; failed=0; for t in $(TESTS) $(BUILDS); do \
 	  echo "== $$t"; log=$(BUILD)/$${t##*/}.log; \
-	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; *) $$t;; esac >$$log 2>&1; code=$$?; \
+	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; *) $(RUN) $$t;; esac >$$log 2>&1; code=$$?; \
 	  cat $$log; p=0; f=1; \
 	  line=$$(sed -n '$$s/^\([0-9][0-9]*\) passed, \([0-9][0-9]*\) failed$$/p=\1 f=\2/p' $$log); \
 	  if [ -n "$$line" ]; then eval "$$line"; fi; \
@@ -77,6 +79,9 @@ test-fastmath: ## tests with -ffast-math
 	$(MAKE) test BUILD=$(BUILD)/fastmath CFLAGS="$(CFLAGS) -ffast-math"
 test-c99: ## tests with -std=c99
 	$(MAKE) test BUILD=$(BUILD)/c99 CC="$(CC) -std=c99"
+
+test-matrix: ## tests with every compiler and machine at hand (an hour); others are named
+	sh tests/matrix.sh $(BUILD)
 
 clean: ## removes build/
 	rm -rf $(BUILD)
@@ -111,4 +116,4 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
 .PHONY: all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
-	test-c99 clean help
+	test-c99 test-matrix clean help

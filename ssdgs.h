@@ -7005,7 +7005,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                     V dx, dy, raw;
                     VM drawn;
                     (void)F(alpha)(sampled.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: the opacity cancels in the ratio */
+                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
                     sum[0] = VFMA(raw, past, sum[0]);
                     sum[1] = VADD(sum[1], raw);
                     if (cue) sum[2] = VFMA(raw, VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),

@@ -1,0 +1,52 @@
+#!/bin/sh
+# sh tests/matrix.sh BUILD [NAME...]: the tests with every compiler, option and machine at hand, or those named. Cross compilers,
+# emulators: Debian's packages. A line each, "NAME: N passed, N failed" or "NAME: absent"; figures at the end.
+build=$1
+shift
+wanted=" $* "
+few='t_golden t_ply t_olat' # under an emulator: minutes
+mkdir -p "$build/matrix"
+tried=0 good=0
+
+# row NAME RUNNER TESTS CC CFLAGS: RUNNER starts a program, '' = the machine itself
+row() {
+    [ "$wanted" = '  ' ] || case $wanted in *" $1 "*) ;; *) return ;; esac
+    for tool in ${4%% *} ${2%% *}; do
+        command -v "$tool" >/dev/null || { echo "$1: absent ($tool)"; return; }
+    done
+    tests=
+    for t in $3; do tests="$tests $build/matrix/$1/$t"; done
+    log=$build/matrix/$1.log
+    # the tests' exit status is in the closing line
+    make -j2 test BUILD="$build/matrix/$1" CC="$4" CXX="${6:-c++}" CFLAGS="$5" RUN="$2" ${tests:+TESTS="$tests" EXAMPLES= BUILDS=} >"$log" 2>&1
+    line=$(sed -n 's/^\([0-9]* passed, [0-9]* failed\)$/\1/p' "$log" | tail -n 1)
+    tried=$((tried + 1))
+    case $line in *', 0 failed') good=$((good + 1)) ;; esac
+    echo "$1: ${line:-no result, see $log}"
+}
+
+for level in -O0 -O2 -O3 -Os '-O2 -ffast-math' '-O2 -march=native'; do
+    name=$(echo "$level" | tr -d ' ')
+    row "gcc$name" '' '' gcc "$level"
+    row "clang$name" '' '' clang "$level" clang++
+done
+for standard in c99 c11 c17; do
+    row "gcc-$standard" '' "$few" "gcc -std=$standard -pedantic-errors" -O1
+    row "clang-$standard" '' "$few" "clang -std=$standard -pedantic-errors" -O1
+done
+for standard in c++11 c++14 c++17 c++20; do
+    row "g$standard" '' "$few" "g++ -std=$standard" -O1 g++
+    row "clang$standard" '' "$few" "clang++ -x c++ -std=$standard" -O1 clang++
+done
+row tcc '' '' tcc ''
+row musl '' "$few" 'musl-gcc -static' -O2
+row i686 '' "$few" 'i686-linux-gnu-gcc -static' -O2
+row mingw wine64 "$few" x86_64-w64-mingw32-gcc '-O2 -static'
+for machine in aarch64:linux-gnu arm:linux-gnueabihf riscv64:linux-gnu s390x:linux-gnu powerpc64:linux-gnu; do
+    emulator=$(echo "${machine%%:*}" | sed 's/^powerpc/ppc/')
+    row "${machine%%:*}" "qemu-$emulator" "$few" "${machine%%:*}-${machine##*:}-gcc -static" -O2
+done
+row emscripten node "$few" emcc '-O2 -s NODERAWFS=1 -s ALLOW_MEMORY_GROWTH=1'
+echo "figure compilers_passed $good"
+echo "figure compilers_tried $tried"
+[ $good -eq $tried ]
