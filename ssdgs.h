@@ -187,8 +187,8 @@ ERRORS
   NULL argument for one, leave the message as it was; a failed ssdgs_context_create() has none. desc.logger hears every
   message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
   Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused, Gaussians that are not finite are not drawn. A
-  training step with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
+  Cameras, lights and backgrounds that are not finite are refused, Gaussians that are not finite are not
+  drawn, those whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
   SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
 
 FILES
@@ -524,7 +524,8 @@ typedef struct ssdgs_render_stats {
     int visible;        /* inside the camera's frustum */
     int shaded;         /* contributing to a pixel */
     int glimpsed;       /* contributing, but left unshaded within max_error */
-    int rejected;       /* never drawn: position, rotation, scale or opacity is not finite */
+    int rejected;       /* never drawn: position or rotation is not finite, scale or opacity is NaN */
+    int blackened;      /* drawn black: the colour is not finite */
     int light_views;    /* light maps in use */
     int camera_kept;    /* 1: projection, order, tiles and what the camera sees are the last frame's */
     int lights_kept;    /* 1: so is the light pass */
@@ -716,7 +717,7 @@ typedef struct ssdgs_frame {
     /* SSDGS_STAGE_SHADE */
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
-    ssdgs_real *color;          /* (n, 4) */
+    ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
     ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;         /* (3, h, w) without background */
@@ -1100,7 +1101,9 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
         value = -value;
     }
     if (!(value < 9e15)) {
-        ssdgs__append(text, at, "huge");
+        memcpy(&whole, &value, sizeof whole);
+        rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF), whole = UINT64_C(0x7FF0000000000000);
+        ssdgs__append(text, at, rest > whole ? "NaN" : rest == whole ? "infinite" : "huge");
         return;
     }
     whole = (uint64_t)value;
@@ -1923,17 +1926,18 @@ static void ssdgs__bounds_task(void *data, int index) {
     b->count = 0;
     for (i = index * SSDGS__CHUNK; i < end; i++) {
         const ssdgs_real *p = g->gaussians + i;
-        ssdgs_real largest = p[SSDGS_LOG_SCALE * g->stride], reach;
+        ssdgs_real largest = -20, reach;
         double mean = 0;
         int usable = p[SSDGS_OPACITY * g->stride] >= job->faint;
-        for (j = 0; j < 3; j++) {
-            const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + j) * g->stride];
-            usable = usable && ssdgs__finite(s) && ssdgs__finite(p[(size_t)j * g->stride]);
+        for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
+        for (; j < SSDGS_OPACITY; j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
+            const ssdgs_real s = p[(size_t)j * g->stride];
+            usable = usable && s < 20;
             largest = s > largest ? s : largest;
-            mean += (double)s / 3;
+            mean += (double)(s > -20 ? s : -20) / 3;
         }
         if (!usable) continue;
-        reach = 3 * ssdgs__exp_scalar(largest < 20 ? largest : 20);
+        reach = 3 * ssdgs__exp_scalar(largest);
         b->log_scale += mean;
         b->count++;
         for (j = 0; j < 3; j++) {
@@ -2039,10 +2043,10 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
     if (c->width < 1 || c->height < 1 || c->width > 1 << 15 || c->height > 1 << 15)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
     if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) ||
-        !ssdgs__finite(c->cy))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: focal lengths must be positive, the centre finite");
-    if (!(c->near_plane >= 0) || !ssdgs__finite(c->near_plane)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            "camera: near_plane is negative");
+        !ssdgs__finite(c->cy) || !(c->near_plane >= 0) || !ssdgs__finite(c->near_plane))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
+                           "lengths must be positive, near_plane not negative, all finite", (double)c->fx, (double)c->fy,
+                           (double)c->cx, (double)c->cy, (double)c->near_plane);
     for (i = 0; i < 12; i++)
         if (!ssdgs__finite(c->view[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
     for (i = 0; i < 3; i++)
@@ -2068,7 +2072,8 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
             if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                     "light %d: its position is not finite", i);
             if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its intensity is negative or not finite", i);
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: intensity[%d] = %g is negative or not finite", i, j,
+                                   (double)lights[i].intensity[j]);
             norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
         if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
@@ -3259,22 +3264,26 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     }
     for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++) {
         const size_t g = at[s];
-        const ssdgs_real *o = outs + s;
-        for (c = 0; c < 3; c++)
-            frame->color[4 * g + (size_t)c] = frame->settings.baked
-                ? ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s])
-                                                                   : o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] +
-                                                                       o[(6 + c) * SSDGS__BLOCK];
+        ssdgs_real *o = outs + s, *color = frame->color + 4 * g;
+        int black = !ssdgs__finite(o[9 * SSDGS__BLOCK]);
+        for (c = 0; c < 3; c++) {
+            if (frame->settings.baked)
+                o[c * SSDGS__BLOCK] = ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s]);
+            color[c] = o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
+            black |= !ssdgs__finite(color[c]);
+        }
+        for (c = 0; c < SSDGS__OUTS && black; c++) color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
+        color[3] = (ssdgs_real)black;
         if (!frame->components) continue;
         {
             ssdgs_real raw[4], q[4], r[9];
             for (i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
             ssdgs__rotation_scalar(raw, q, r);
             for (c = 0; c < 3; c++) {
-                frame->diffuse[4 * g + (size_t)c] = frame->settings.baked ? frame->color[4 * g + (size_t)c] : o[c * SSDGS__BLOCK];
+                frame->diffuse[4 * g + (size_t)c] = o[c * SSDGS__BLOCK];
                 frame->specular[4 * g + (size_t)c] = o[(3 + c) * SSDGS__BLOCK];
                 frame->scattering[4 * g + (size_t)c] = o[(6 + c) * SSDGS__BLOCK];
-                frame->normal[4 * g + (size_t)c] = r[3 * c + 2];
+                frame->normal[4 * g + (size_t)c] = ssdgs__finite(r[3 * c + 2]) ? r[3 * c + 2] : 0;
             }
             frame->shadow[4 * g] = frame->light_count ? o[9 * SSDGS__BLOCK] / (ssdgs_real)frame->light_count : 1;
             frame->shadow[4 * g + 1] = frame->views[0].depth[g];
@@ -3743,11 +3752,13 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         }
         stats->network_work = all > 0 ? done / all : 0;
         stats->instances = frame.views[0].instances;
+        for (i = 0; i < (size_t)frame.shaded_count; i++) stats->blackened += frame.color[4 * frame.shaded[i] + 3] > 0;
         for (c = 0; c < SSDGS_DIFFUSE; c++) finite = finite && context->k->finite(model->gaussians + (size_t)c * model->capacity,
                                                                                   (size_t)model->count);
         for (i = 0; i < (size_t)model->count && !finite; i++)
             for (c = 0; c < SSDGS_DIFFUSE; c++)
-                if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i])) {
+                if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i]) &&
+                    !(c >= SSDGS_LOG_SCALE && ssdgs__finite(1 / model->gaussians[(size_t)c * model->capacity + i]))) {
                     stats->rejected++;
                     break;
                 }
@@ -6519,7 +6530,8 @@ SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(
 /* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
     V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
-    V inverse = VDIV(VSET(1), VMAX(largest, VSET(1e-30))), two = VSET(2), one = VSET(1), norm2;
+    V least = VSET(1e-37), two = VSET(2), one = VSET(1), norm2;
+    V inverse = VSEL(VLT(largest, least), VSET(0), VDIV(one, VMAX(largest, least)));
     int i;
     for (i = 0; i < 4; i++) q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
     norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
