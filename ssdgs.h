@@ -187,9 +187,9 @@ ERRORS
   NULL argument for one, leave the message as it was; a failed ssdgs_context_create() has none. desc.logger hears every
   message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
   Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused, Gaussians that are not finite are not
-  drawn, those whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
-  SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
+  Cameras, lights and backgrounds that are not finite are refused; Gaussians that are not finite are not drawn, those
+  whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in
+  skipped_steps and returns SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
 
 FILES
   A model is one binary little-endian PLY of 32-bit values: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
@@ -1019,7 +1019,7 @@ static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties
 }
 
 static SSDGS__INLINE float ssdgs__pow2(float n) {
-    const uint32_t bits = (uint32_t)((n > -127 ? (int)n : -127) + 127) << 23; /* NaN too */
+    const uint32_t bits = n > -127 ? (uint32_t)((int)n + 127) << 23 : (uint32_t)1 << 22; /* 2^-127 is subnormal; NaN too */
     float x;
     memcpy(&x, &bits, 4);
     return x;
@@ -2706,6 +2706,9 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     return l;
 }
 
+/* Raw parameters of the angular form, within what neither over- nor underflows. */
+static ssdgs_real ssdgs__angular_raw(ssdgs_real raw) { return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw; }
+
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     const ssdgs_settings *s = &frame->settings;
     const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
@@ -2736,8 +2739,8 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
         for (i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
         if (k.angular) {
             const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
-            for (i = 0; i < 2; i++) b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(sharpness[i]);
-            b[11] = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]) * ssdgs__softplus_scalar(step);
+            for (i = 0; i < 2; i++) b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j])) * ssdgs__softplus_scalar(step);
         } else {
             for (i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
         }
@@ -2757,14 +2760,14 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
         for (i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
         ssdgs__rotation_backward_scalar(frame->global_gradient + 4 * j, q, inverse, dr);
         for (i = 0; i < 2; i++) {
-            const ssdgs_real s = ssdgs__sigmoid_scalar(sharpness[i]);
+            const ssdgs_real s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
             /* angular: 1 / (10 s), d = -(1 - s) / (10 s) */
             out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s
                 : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
         }
         if (frame->settings.asg == SSDGS_ASG_ANGULAR) {
             const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)),
-                s = ssdgs__sigmoid_scalar(frame->gaussians.asg_sigma[j]);
+                s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
             frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] = d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
         }
     }
@@ -7431,7 +7434,7 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const
     for (i = 0; i < 3; i++) g->h[i] = VMUL(g->h[i], g->inverse_h);
     for (i = 0; i < 3; i++) g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
     g->woh = VDOT3(g->wo[0], g->wo[1], g->wo[2], g->h[0], g->h[1], g->h[2]);
-    missing = VMAX(VSET(0), VSUB(VSET(1), g->woh));
+    missing = VMAX(VSET(0), VMIN(VSET(1), VSUB(VSET(1), g->woh))); /* where wi is nearly -wo, h is rounding and wo.h any number */
     h2 = VMUL(missing, missing);
     g->fresnel = VFMA(VSET(1 - SSDGS__F0), VMUL(VMUL(h2, h2), missing), VSET(SSDGS__F0));
 }
@@ -7539,7 +7542,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-        missing2 = VMAX(VSET(0), VSUB(VSET(1), g.woh));
+        missing2 = VMAX(VSET(0), VMIN(VSET(1), VSUB(VSET(1), g.woh)));
         missing2 = VMUL(missing2, missing2);
         dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
         for (i = 0; i < 3; i++) {
