@@ -5,6 +5,8 @@ BUILD = build
 ITERATIONS = 5000
 BENCH =
 DATA = ../shared/data
+FUZZ_SECONDS = 1800
+FUZZ_TARGETS = render train ply checkpoint png unfilter inflate dataset json
 SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
@@ -16,7 +18,7 @@ EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
-	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual
+	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual $(BUILD)/fuzz
 BUILDS = builds
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
@@ -50,7 +52,7 @@ $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
 test: $(TESTS) $(EXAMPLES) ## every test; SSDGS_GOLDEN=folder reads the golden files there
 	@passed=0; failed=0; for t in $(TESTS) $(BUILDS); do \
 	  echo "== $$t"; log=$(BUILD)/$${t##*/}.log; \
-	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; *) $(RUN) $$t;; esac >$$log 2>&1; code=$$?; \
+	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; */fuzz) $(RUN) $$t tests/fuzz/seeds/*/*;; *) $(RUN) $$t;; esac >$$log 2>&1; code=$$?; \
 	  cat $$log; p=0; f=1; \
 	  line=$$(sed -n '$$s/^\([0-9][0-9]*\) passed, \([0-9][0-9]*\) failed$$/p=\1 f=\2/p' $$log); \
 	  if [ -n "$$line" ]; then eval "$$line"; fi; \
@@ -83,6 +85,9 @@ test-c99: ## tests with -std=c99
 test-matrix: ## tests with every compiler and machine at hand (an hour); others are named
 	sh tests/matrix.sh $(BUILD)
 
+fuzz: $(BUILD)/fuzzers/all ## fuzzes each target for FUZZ_SECONDS (1800); needs clang's libFuzzer; findings go to build/fuzzers
+	sh tests/fuzz/run.sh $(BUILD)/fuzzers $(FUZZ_SECONDS) $(FUZZ_TARGETS)
+
 clean: ## removes build/
 	rm -rf $(BUILD)
 help: ## this list
@@ -110,10 +115,18 @@ $(BUILD)/readme: tests/readme.c README.md $(HEADERS) | $(BUILD)
 	sed -n '/^\/\* readme example \*\//,/^```/{/^```/d;p;}' README.md >$(BUILD)/readme_example.c
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
+$(BUILD)/fuzz: tests/fuzz/fuzz.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $< -o $@ $(LDLIBS)
+# AVX-512 would be the kernels of AVX2 once more, and take long to build.
+$(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
+	mkdir -p $(BUILD)/fuzzers
+	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
+	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
+
 $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	for e in render train; do \
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
 .PHONY: all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
-	test-c99 test-matrix clean help
+	test-c99 test-matrix fuzz clean help

@@ -622,7 +622,8 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
-/* One iteration. A step with non-finite gradients changes nothing, is counted and returns SSDGS_ERR_NONFINITE. */
+/* One iteration. A step with non-finite gradients changes nothing, is counted and returns SSDGS_ERR_NONFINITE. One that runs
+   out of memory changes nothing and can be tried again; where only its density control does, it is done without. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
 /* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are skipped, ten in a
    row end the run. */
@@ -4135,10 +4136,10 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 #ifndef SSDGS_NO_STDIO
 #include <errno.h>
 #include <fcntl.h>
+#include <sys/stat.h>
 #ifdef _WIN32
 #include <io.h>
 #include <process.h>
-#include <sys/stat.h>
 #else
 #include <unistd.h>
 #if defined(__STRICT_ANSI__) && !defined(__cplusplus)
@@ -4726,17 +4727,30 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
 
 #ifndef SSDGS_NO_STDIO
 
+/* What is no regular file is not read, since that may never end, and not replaced: a folder, a device, a pipe. */
+static int ssdgs__irregular(const char *path) {
+#ifdef _WIN32
+    const DWORD kind = GetFileAttributesA(path);
+    return kind != INVALID_FILE_ATTRIBUTES && (kind & (FILE_ATTRIBUTE_DIRECTORY | FILE_ATTRIBUTE_DEVICE));
+#else
+    struct stat info;
+    return stat(path, &info) == 0 && !S_ISREG(info.st_mode);
+#endif
+}
+
 /* Reads a whole file in pieces; what the system says of its size is a hint. */
 static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes, size_t *size) {
     const uint64_t limit = (uint64_t)8 << 30;
     unsigned char *buffer = NULL, *larger;
     size_t room = 0, used = 0;
     ssdgs_result result = SSDGS_OK;
-    FILE *file = fopen(path, "rb");
+    FILE *file;
     long hint;
 
     *bytes = NULL;
     *size = 0;
+    if (ssdgs__irregular(path)) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
+    file = fopen(path, "rb");
     if (!file) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be opened (errno %d)", path, errno);
     hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
     rewind(file);
@@ -4818,6 +4832,7 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     writer->context = context;
     writer->path = path;
     writer->file = -1;
+    if (ssdgs__irregular(path)) return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
     writer->temporary = (char *)ssdgs__allocate(context, room + SSDGS__WRITER_BUFFER);
     if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
     writer->buffer = (unsigned char *)writer->temporary + room;
@@ -5784,7 +5799,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         longest = side > longest ? side : longest;
     }
     trainer->extent = 1.1 * (radius > longest ? radius : longest); /* one camera has no radius */
-    if (fresh) {
+    result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
+    if (fresh && !result) { /* the model stays as it was when that fails */
         if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.length_unit =
             (ssdgs_real)(0.5 * longest);
         for (i = 0; i < photo_count; i++) { /* I / d^2 at the object averages 1 */
@@ -5801,9 +5817,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         }
         model->settings.light_scale = (ssdgs_real)(irradiance > 0 ? 1 / irradiance : 1);
         ssdgs__globals_reset(model, o->seed);
-        return ssdgs__random_start(trainer);
     }
-    return ssdgs__trainer_grow(trainer, (size_t)model->count);
+    return result;
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
@@ -6107,10 +6122,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
     ssdgs__checkpoint_head head;
     ssdgs__checkpoint_io io;
     ssdgs__writer writer;
-    ssdgs_result result;
     if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__writer_open(&writer, trainer->context, path);
-    if (result) return result;
+    ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_describe(trainer, &head);
     io.writer = &writer;
     io.hash = UINT64_C(0xCBF29CE484222325);
@@ -6118,6 +6131,35 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
     ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
     ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
     return ssdgs__writer_close(&writer);
+}
+
+/* Whether what Adam and the density control rely on makes sense; Gaussians may be anything, as in a model. */
+static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const unsigned char *at) {
+    const size_t planes = (size_t)head->count * SSDGS_CHANNELS, shared = (size_t)head->global_count;
+    const size_t sizes[7] = {planes, shared, planes, shared, planes, shared, (size_t)head->count * SSDGS__STATISTICS};
+    size_t k;
+    int part, i, j;
+    for (part = 0; part < 7; part++)
+        for (k = 0; k < sizes[part]; k++, at += sizeof(ssdgs_real)) {
+            ssdgs_real x;
+            memcpy(&x, at, sizeof x);
+            if (part && (!ssdgs__finite(x) || (part / 2 == 2 && x < 0))) return 0; /* 4, 5: second moments */
+        }
+    for (i = 0; i < head->photo_count; i++, at += sizeof(uint32_t)) {
+        uint32_t photo;
+        memcpy(&photo, at, sizeof photo);
+        if (photo >= (uint32_t)head->photo_count) return 0;
+    }
+    for (i = 0; i < head->photo_count; i++, at += sizeof(ssdgs__correction)) {
+        ssdgs__correction c;
+        memcpy(&c, at, sizeof c);
+        for (j = 0; j < 9; j++)
+            if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
+                !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0) return 0;
+        for (j = 0; j < 2; j++)
+            if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
+    }
+    return 1;
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
@@ -6146,7 +6188,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         reason = "it belongs to other settings";
     else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
              (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
-             head.iteration < 0 || head.skipped < 0) reason = "its counts are out of range";
+             head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 || head.skipped > head.iteration)
+        reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
@@ -6155,19 +6198,14 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";
-        for (i = 0; i < head.photo_count && !reason; i++) {
-            uint32_t photo;
-            memcpy(&photo, bytes + size - 8 - (size_t)head.photo_count * (sizeof photo + sizeof(ssdgs__correction)) + (size_t)i *
-                   sizeof photo, sizeof photo);
-            if (photo >= (uint32_t)head.photo_count) reason = "its order of photographs is broken";
-        }
+        else if (!ssdgs__checkpoint_sound(&head, bytes + sizeof head)) reason = "its values are out of range";
+        else if (ssdgs__settings_check(context, &head.settings)) reason = "its settings are out of range";
     }
     if (reason) {
         ssdgs__release(context, bytes);
         return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
     }
-    result = ssdgs__settings_check(context, &head.settings);
-    if (!result) result = ssdgs__trainer_grow(trainer, (size_t)head.count);
+    result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
         if (head.isa != own.isa && context->logger.write)
             context->logger.write(context->logger.user, SSDGS_OK,

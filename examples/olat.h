@@ -116,7 +116,10 @@ static int olat__read_file(const char *path, unsigned char **data, size_t *size,
 static int olat__write_file(const char *path, const unsigned char *data, size_t size, char *error) {
     size_t done = 0, room = strlen(path) + 40;
     int file = -1, attempt, reason = 0;
-    char *name = (char *)malloc(room);
+    struct stat info;
+    char *name;
+    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode)) return olat__fail(error, "%s: is not a regular file", olat__tail(path));
+    name = (char *)malloc(room);
     if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
     for (attempt = 0; file < 0 && attempt < 100 && (attempt == 0 || errno == EEXIST); attempt++) {
         snprintf(name, room, "%s.tmp.%ld.%d", path, (long)getpid(), attempt);

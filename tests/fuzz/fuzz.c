@@ -1,0 +1,675 @@
+/* Everything that reads what others wrote, and every number a caller may set, under any bytes at all. Two ways to build it:
+     build/fuzz FILE...              runs each file once, as the target that its folder is named after: seeds and past findings
+     -DLIBFUZZER -fsanitize=fuzzer   libFuzzer, as the target that the program is named after (`make fuzz`)
+   A finding ends the program. */
+#define SSDGS_IMPLEMENTATION
+#include "../../ssdgs.h"
+#include "../../examples/olat.h"
+
+#define HOLDS(condition) ((condition) ? (void)0 : broken(__LINE__, #condition))
+
+static void broken(int line, const char *what) {
+    fprintf(stderr, "fuzz.c:%d: does not hold: %s\n", line, what);
+    abort();
+}
+
+static char folder[1000]; /* the program's: files are written there */
+
+static const char *put_file(const char *name, const void *bytes, size_t size) {
+    static char path[1100];
+    FILE *file;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    file = fopen(path, "wb");
+    HOLDS(file && fwrite(bytes, 1, size, file) == size && !fclose(file));
+    return path;
+}
+
+/* A copy with no byte to spare, so that the address sanitizer sees the first one read beyond. */
+static unsigned char *copy_of(const unsigned char *bytes, size_t size) {
+    unsigned char *copy = (unsigned char *)calloc(size ? size : 1, 1);
+    HOLDS(copy);
+    if (size) memcpy(copy, bytes, size);
+    return copy;
+}
+
+/* ---- bytes to values: 0, and what lies beyond the end, leave the default, so that few bytes make a scene ---- */
+
+typedef struct input {
+    const unsigned char *at, *end;
+    int tame; /* 1: every number drawn was within -1000 .. 1000, where nothing overflows */
+} input;
+
+static input defaults_only(void) {
+    static const unsigned char none[1] = {0};
+    input in = {none, none, 1};
+    return in;
+}
+
+static int draw(input *in) { return in->at < in->end ? *in->at++ : 0; }
+static int draw_below(input *in, int count) { return draw(in) % count; }
+
+/* Mostly within range of 0; some bytes stand for a number that has hurt others, one is followed by any 32 bits. */
+static ssdgs_real draw_real(input *in, double otherwise, double range) {
+    static const double edges[63] = {
+        0, -0.0, 1, -1, 0.5, 2, 1e-45, -1e-45, 1.2e-38, 1e-30, 1e-20, -1e-20, 1e-15, 1e-10, 1e-7, -1e-7, 1e-4, 1e-3, 0.01, -0.01,
+        4, 10, -10, 20, -20, 21, 50, -50, 88, -88, 89, -89, 100, -100, 104, 127, 128, 1e3, -1e3, 1e4, -1e4, 1e5, 1e6, -1e6,
+        16777216, 1e8, -1e8, 2147483648.0, 4294967296.0, 1e10, -1e10, 1e13, 1e15, -1e15, 1e18, 1e19, -1e19, 1e20, 1e25, 1e30,
+        -1e30, 3.4e38, -3.4e38
+    };
+    const int byte = draw(in);
+    uint32_t bits = 0;
+    float value;
+    int i;
+    if (byte == 0) return (ssdgs_real)otherwise;
+    if (byte < 192) return (ssdgs_real)((byte - 96) / 95.0 * range);
+    value = (float)edges[byte < 255 ? byte - 192 : 0];
+    for (i = 0; byte == 255 && i < 4; i++) bits |= (uint32_t)draw(in) << 8 * i;
+    if (byte == 255) memcpy(&value, &bits, sizeof value);
+    in->tame = in->tame && ssdgs__finite((ssdgs_real)value) && fabs((double)value) <= 1000;
+    return (ssdgs_real)value;
+}
+
+static ssdgs_context *draw_context(input *in) {
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 1;
+    desc.isa = (ssdgs_isa)draw_below(in, SSDGS_ISA_COUNT);
+    if (ssdgs_context_create(&desc, &context)) desc.isa = SSDGS_ISA_AUTO;
+    HOLDS(context || !ssdgs_context_create(&desc, &context));
+    return context;
+}
+
+static ssdgs_settings draw_settings(input *in) {
+    ssdgs_settings s = draw(in) & 1 ? ssdgs_settings_published() : ssdgs_settings_default();
+    int i, flags = draw(in);
+    s.terms ^= draw_below(in, 16);
+    s.baked = flags >> 7;
+    s.transfer ^= flags & 1;
+    s.per_channel_optics ^= flags >> 1 & 1;
+    s.depth_cue ^= flags >> 2 & 1;
+    s.transport ^= flags >> 3 & 1;
+    s.residual_shadow ^= flags >> 4 & 1;
+    s.shadow_on_scattering ^= flags >> 5 & 1;
+    s.light_blur ^= flags >> 6 & 1;
+    s.dipole = draw_below(in, 4);
+    s.asg = draw_below(in, 2);
+    s.scattering_layers = 2 + draw_below(in, 3);
+    s.scattering_width = 1 + draw_below(in, 20);
+    s.shadow_layers = draw_below(in, 4);
+    s.shadow_width = 1 + draw_below(in, 20);
+    s.light_map_size = 16 + draw_below(in, 64);
+    if (draw(in) == 1) s.light_map_size = 0;
+    s.light_bias = draw_real(in, (double)s.light_bias, 1);
+    s.pixel_variance = draw_real(in, (double)s.pixel_variance, 1);
+    s.eta = draw_real(in, (double)s.eta, 3);
+    s.length_unit = draw_real(in, (double)s.length_unit, 2);
+    s.light_scale = draw_real(in, (double)s.light_scale, 2);
+    for (i = 0; i < 3; i++) s.centre[i] = draw_real(in, (double)s.centre[i], 2);
+    return s;
+}
+
+/* NULL where the settings are refused. */
+static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most) {
+    const ssdgs_settings settings = draw_settings(in);
+    ssdgs_model *model = NULL;
+    ssdgs_real *value;
+    size_t at;
+    int i, c;
+    if (ssdgs_model_create(context, &settings, draw_below(in, most + 1), &model)) return NULL;
+    for (i = 0; i < model->count; i++)
+        for (c = 0; c < SSDGS_CHANNELS; c++) {
+            value = model->gaussians + (size_t)c * model->capacity + i;
+            *value = draw_real(in, (double)*value, c < SSDGS_ROTATION ? 1 : 6);
+        }
+    for (i = draw_below(in, 9); i > 0; i--) { /* shared values anywhere */
+        at = (size_t)draw(in) << 8;
+        at |= (size_t)draw(in);
+        model->globals[at % model->global_count] = draw_real(in, 0, 6);
+    }
+    return model;
+}
+
+static ssdgs_camera draw_camera(input *in, int side) {
+    ssdgs_real eye[3], target[3], up[3];
+    ssdgs_camera camera;
+    int i, width = 1 + draw_below(in, side), height = 1 + draw_below(in, side), flags = draw(in);
+    for (i = 0; i < 3; i++) {
+        eye[i] = draw_real(in, i == 1 ? -3 : i, 3);
+        target[i] = draw_real(in, 0, 1);
+        up[i] = draw_real(in, i == 2, 1);
+    }
+    camera = ssdgs_camera_look_at(eye, target, up, draw_real(in, 0.6, 3), width, height);
+    if (flags & 1) camera.near_plane = draw_real(in, 0, 4);
+    if (flags & 2) camera.cx = draw_real(in, 0, 20), camera.cy = draw_real(in, 0, 20);
+    if (flags & 4) camera.fx = draw_real(in, 10, 100), camera.fy = draw_real(in, 10, 100);
+    for (i = 0; flags & 8 && i < 12; i++) camera.view[i] = draw_real(in, (double)camera.view[i], 1);
+    return camera;
+}
+
+static ssdgs_light draw_light(input *in) {
+    ssdgs_light light;
+    double length = 0;
+    int i, kind = draw(in) & 3; /* 1: directional; 3: so, and of whatever length it was given */
+    memset(&light, 0, sizeof light);
+    light.kind = kind & 1 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
+    for (i = 0; i < 3; i++) {
+        light.position[i] = draw_real(in, i - 1, 3);
+        light.intensity[i] = draw_real(in, 9, 10);
+        length += (double)light.position[i] * (double)light.position[i];
+    }
+    for (i = 0; kind == 1 && length > 0 && i < 3; i++) light.position[i] = (ssdgs_real)((double)light.position[i] / sqrt(length));
+    return light;
+}
+
+static int all_finite(const ssdgs_real *values, size_t count) {
+    size_t i = 0;
+    while (i < count && ssdgs__finite(values[i])) i++;
+    return i == count;
+}
+
+static int model_finite(const ssdgs_model *model) {
+    int c, finite = all_finite(model->globals, model->global_count);
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        finite &= all_finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
+    return finite;
+}
+
+static uint64_t model_hash(const ssdgs_model *model) {
+    uint64_t hash = ssdgs__fold(1, model->globals, model->global_count * sizeof(ssdgs_real));
+    int c;
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count * sizeof(ssdgs_real));
+    return hash;
+}
+
+/* ---- rendering: no NaN from tame numbers, coverage within 0 and 1, the same bits from a context that kept results ---- */
+
+#define PLANES 8
+static const int plane_channels[PLANES] = {3, 1, 1, 3, 3, 3, 3, 1}; /* of ssdgs_image, in order */
+
+typedef struct picture {
+    ssdgs_camera camera;
+    ssdgs_light lights[2];
+    ssdgs_render_options options;
+    ssdgs_real *planes[PLANES];
+    int light_count, stride, wanted;
+} picture;
+
+static size_t plane_values(const picture *p, int plane) {
+    return (size_t)((p->camera.height - 1) * p->stride + p->camera.width) * (size_t)plane_channels[plane];
+}
+
+static void draw_picture(input *in, picture *p) {
+    ssdgs_render_options *o = &p->options;
+    int i;
+    memset(p, 0, sizeof *p);
+    p->camera = draw_camera(in, 40);
+    p->stride = p->camera.width + draw_below(in, 4);
+    p->wanted = ~draw(in);
+    p->light_count = (1 + draw(in)) % 3;
+    for (i = 0; i < p->light_count; i++) p->lights[i] = draw_light(in);
+    *o = draw(in) & 1 ? ssdgs_render_options_exact() : ssdgs_render_options_default();
+    o->terms ^= draw_below(in, 16);
+    o->antialias = draw(in) & 1;
+    o->bf16 = draw(in) & 1;
+    o->stop = draw_real(in, (double)o->stop, 1);
+    o->alpha_threshold = draw_real(in, (double)o->alpha_threshold, 1);
+    o->max_error = draw_real(in, (double)o->max_error, 1);
+    o->light_detail = draw_real(in, 1, 1);
+    if (o->light_detail > 1) o->light_detail = 1; /* larger maps cost time alone */
+    for (i = 0; i < 3; i++) o->background[i] = draw_real(in, 0.5, 1);
+}
+
+static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
+    ssdgs_render_stats stats;
+    ssdgs_image image;
+    int i;
+    for (i = 0; i < PLANES; i++)
+        p->planes[i] = p->wanted >> i & 1 ? (ssdgs_real *)calloc(plane_values(p, i), sizeof(ssdgs_real)) : NULL;
+    image.stride = p->stride;
+    image.color = p->planes[0];
+    image.alpha = p->planes[1];
+    image.depth = p->planes[2];
+    image.normal = p->planes[3];
+    image.diffuse = p->planes[4];
+    image.specular = p->planes[5];
+    image.scattering = p->planes[6];
+    image.shadow = p->planes[7];
+    return ssdgs_render_ex(model, &p->camera, p->lights, p->light_count, &p->options, &image, &stats);
+}
+
+static void drop_picture(picture *p) {
+    int i;
+    for (i = 0; i < PLANES; i++) free(p->planes[i]);
+}
+
+static int is_nan(ssdgs_real value) { return !ssdgs__finite(value) && !(value > 1) && !(value < -1); }
+
+static void check_picture(const picture *p, int tame) {
+    size_t i;
+    int plane;
+    for (plane = 0; plane < PLANES; plane++)
+        for (i = 0; p->planes[plane] && i < plane_values(p, plane); i++) {
+            if (tame) HOLDS(!is_nan(p->planes[plane][i]));
+            if (plane == 1) HOLDS(p->planes[plane][i] >= 0 && p->planes[plane][i] <= 1);
+        }
+}
+
+static void fuzz_render(const unsigned char *data, size_t size) {
+    input in = {data, data + size, 1};
+    ssdgs_context *context = draw_context(&in), *other = NULL;
+    ssdgs_model *model = draw_model(&in, context, 12), *twin = NULL;
+    ssdgs_context_desc desc;
+    ssdgs_result result;
+    picture p, again;
+    int i, frames = model ? 1 + draw_below(&in, 3) : 0;
+    for (i = 0; i < frames; i++) {
+        draw_picture(&in, &p);
+        again = p;
+        result = take_picture(model, &p);
+        if (!result) check_picture(&p, in.tame);
+        if (!result && i == frames - 1 && i > 0) {
+            memset(&desc, 0, sizeof desc);
+            desc.threads = 1;
+            desc.isa = (ssdgs_isa)context->isa;
+            HOLDS(!ssdgs_context_create(&desc, &other) && !ssdgs_model_create(other, &model->settings, model->count, &twin));
+            memcpy(twin->globals, model->globals, model->global_count * sizeof(ssdgs_real));
+            memcpy(twin->gaussians, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof(ssdgs_real));
+            HOLDS(!take_picture(twin, &again));
+            for (i = 0; i < PLANES; i++)
+                if (p.planes[i]) HOLDS(!memcmp(p.planes[i], again.planes[i], plane_values(&p, i) * sizeof(ssdgs_real)));
+            drop_picture(&again);
+            i = frames;
+        }
+        drop_picture(&p);
+    }
+    ssdgs_model_destroy(twin);
+    ssdgs_context_destroy(other);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* ---- training: a step leaves every parameter finite, or changes none ---- */
+
+#define SIDE 16
+
+static ssdgs_train_options draw_options(input *in) {
+    ssdgs_train_options o = ssdgs_train_options_default();
+    ssdgs_rate *rates[12];
+    int i, flags = draw(in), rate = draw(in), rate_count = rate ? 12 : 0;
+    o.seed = (uint64_t)draw(in);
+    o.iterations = 1 + draw(in);
+    if (flags & 128) o.iterations *= 1000;
+    o.schedule = draw_below(in, 4);
+    o.random_background = ~flags & 1;
+    o.refine_camera = flags >> 1 & 1;
+    o.refine_light = flags >> 2 & 1;
+    o.initial_points = draw_below(in, 40);
+    o.max_gaussians = 1 + draw_below(in, 64);
+    o.densify_every = 1 + draw_below(in, 4);
+    o.densify_from = draw_below(in, 4);
+    o.opacity_reset_every = draw_below(in, 4);
+    o.dssim = draw_real(in, 0.2, 1);
+    o.densify_gradient = draw_real(in, 0, 1);
+    o.densify_size = draw_real(in, 0.01, 1);
+    o.densify_shadow = draw_real(in, 0, 1);
+    o.prune_opacity = draw_real(in, 0.005, 1);
+    o.prune_weight = draw_real(in, 0, 1);
+    for (i = 0; i < 3; i++) {
+        o.background[i] = draw_real(in, 0.5, 1);
+        o.bounds_min[i] = draw_real(in, -0.5, 1);
+        o.bounds_max[i] = draw_real(in, 0.5, 1);
+    }
+    rates[0] = &o.position, rates[1] = &o.opacity, rates[2] = &o.scale, rates[3] = &o.rotation, rates[4] = &o.color;
+    rates[5] = &o.asg, rates[6] = &o.frame, rates[7] = &o.material, rates[8] = &o.shadow, rates[9] = &o.scattering;
+    rates[10] = &o.camera_rate, rates[11] = &o.light_rate;
+    for (i = 0; i < rate_count; i++) {
+        rates[i]->start = draw_real(in, (double)rates[i]->start, 1);
+        rates[i]->end = draw_real(in, (double)rates[i]->end, 1);
+    }
+    return o;
+}
+
+static void draw_photo(input *in, ssdgs_photo *photo, uint16_t pixels[SIDE * SIDE * 4]) {
+    unsigned char *bytes = (unsigned char *)pixels;
+    size_t i, size;
+    unsigned pattern[4];
+    memset(photo, 0, sizeof *photo);
+    photo->camera = draw_camera(in, SIDE);
+    photo->light = draw_light(in);
+    photo->format = draw(in) & 1 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
+    photo->pixels = pixels;
+    for (i = 0; i < 4; i++) pattern[i] = (unsigned)draw(in);
+    size = (size_t)(photo->camera.width * photo->camera.height) * (photo->format == SSDGS_PIXELS_RGBA16 ? 8 : 4);
+    for (i = 0; i < size; i++) bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
+}
+
+static void step_holds(ssdgs_trainer *trainer) {
+    const int finite = model_finite(trainer->model);
+    const uint64_t before = model_hash(trainer->model);
+    ssdgs_train_stats stats;
+    const ssdgs_result result = ssdgs_trainer_step(trainer, &stats);
+    if (result) HOLDS(model_hash(trainer->model) == before);
+    else if (finite) HOLDS(model_finite(trainer->model));
+}
+
+static void fuzz_train(const unsigned char *data, size_t size) {
+    static uint16_t pixels[2][SIDE * SIDE * 4];
+    input in = {data, data + size, 1};
+    ssdgs_context *context = draw_context(&in);
+    const ssdgs_train_options options = draw_options(&in);
+    const int photo_count = 1 + draw_below(&in, 2);
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_photo photos[2];
+    ssdgs_model *model;
+    int i, steps = 1 + draw_below(&in, 3);
+    for (i = 0; i < photo_count; i++) draw_photo(&in, photos + i, pixels[i]);
+    model = draw_model(&in, context, 8);
+    if (model && !ssdgs_trainer_create(model, photos, photo_count, &options, &trainer)) {
+        trainer->iteration = draw_below(&in, options.iterations); /* each term joins at its time */
+        while (steps-- > 0) step_holds(trainer);
+        HOLDS(model->count <= (options.max_gaussians > 40 ? options.max_gaussians : 40));
+    }
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* ---- checkpoints: one made here, then bytes of it changed (place, value: 3 + 1 bytes each), perhaps cut or lengthened ---- */
+
+static void fuzz_checkpoint(const unsigned char *data, size_t size) {
+    static uint16_t pixels[SIDE * SIDE * 4];
+    static unsigned char *saved, *bytes;
+    static size_t saved_size;
+    input in = {data, data + size, 1}, defaults = defaults_only();
+    ssdgs_context *context = draw_context(&defaults);
+    ssdgs_settings settings = draw_settings(&defaults);
+    ssdgs_train_options options = draw_options(&defaults);
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_photo photo;
+    uint64_t before;
+    size_t length;
+    const int flags = draw(&in), cut = draw(&in);
+    const char *path;
+    int i, same, sound;
+    options.iterations = 2;
+    options.refine_camera = options.refine_light = 1;
+    options.initial_points = 3;
+    options.densify_until = 0;
+    draw_photo(&defaults, &photo, pixels);
+    HOLDS(!ssdgs_model_create(context, &settings, 0, &model) && !ssdgs_trainer_create(model, &photo, 1, &options, &trainer));
+    if (!saved) {
+        unsigned char *read = NULL;
+        HOLDS(!ssdgs_trainer_step(trainer, NULL));
+        path = put_file("fuzz.checkpoint", "", 0);
+        HOLDS(!ssdgs_trainer_save(trainer, path) && !ssdgs__read_file(context, path, &read, &saved_size));
+        saved = copy_of(read, saved_size);
+        ssdgs__release(context, read);
+    }
+    bytes = (unsigned char *)calloc(saved_size + 128, 1);
+    HOLDS(bytes);
+    memcpy(bytes, saved, saved_size);
+    length = cut < 128 ? saved_size - (flags & 2 ? (size_t)cut * saved_size / 128 : (size_t)cut) : saved_size + (size_t)cut - 128;
+    while (in.end - in.at >= 4) {
+        size_t at = (size_t)draw(&in) << 16;
+        at |= (size_t)draw(&in) << 8;
+        at |= (size_t)draw(&in);
+        bytes[at % (saved_size + 128)] = (unsigned char)draw(&in);
+    }
+    if (!(flags & 1) && length >= 8) { /* else the checksum stays wrong */
+        const uint64_t hash = ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, length - 8);
+        memcpy(bytes + length - 8, &hash, sizeof hash);
+    }
+    same = length == saved_size && !memcmp(bytes, saved, length);
+    path = put_file("fuzz.checkpoint", bytes, length);
+    free(bytes);
+    before = model_hash(model);
+    sound = !ssdgs_trainer_load(trainer, path);
+    HOLDS(sound ? same || !(flags & 1) : !same && model_hash(model) == before); /* refused: as if nothing had been */
+    for (i = 0; sound && i < 2; i++) ssdgs_trainer_step(trainer, NULL);         /* whatever it then computes */
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* ---- model files: whatever is accepted is finite, and renders ---- */
+
+static void fuzz_ply(const unsigned char *data, size_t size) {
+    input defaults = defaults_only();
+    unsigned char *copy = copy_of(data, size);
+    ssdgs_context *context = draw_context(&defaults);
+    ssdgs_load_stats stats;
+    ssdgs_model *model;
+    picture p;
+    if (!ssdgs_model_load_memory(context, copy, size, &model, &stats)) {
+        HOLDS(model_finite(model));
+        draw_picture(&defaults, &p);
+        p.options.light_detail = (ssdgs_real)0.1;
+        if (model->global_count < 20000 && !take_picture(model, &p)) check_picture(&p, 1);
+        if (model->global_count < 20000) drop_picture(&p);
+        ssdgs_model_destroy(model);
+    } else HOLDS(!model && ssdgs_error_message(context)[0]);
+    ssdgs_context_destroy(context);
+    free(copy);
+}
+
+/* ---- images: as they are, and with every checksum mended ---- */
+
+static void read_png(const unsigned char *bytes, size_t size) {
+    ssdgs_pixels format;
+    int width, height;
+    void *pixels;
+    char error[512] = "";
+    if (olat_decode_png(bytes, size, &width, &height, &format, &pixels, error)) HOLDS(!pixels && error[0]);
+    else HOLDS(width > 0 && height > 0 && pixels);
+    free(pixels);
+}
+
+static void fuzz_png(const unsigned char *data, size_t size) {
+    unsigned char *copy = copy_of(data, size);
+    size_t at = 8, length;
+    if (size > 24 && olat__be32(data + 16) > 2048) copy[16] = copy[17] = 0, copy[18] &= 7; /* a large image is slow to clear */
+    if (size > 24 && olat__be32(data + 20) > 2048) copy[20] = copy[21] = 0, copy[22] &= 7;
+    read_png(copy, size);
+    for (; size >= 12 && at <= size - 12 && (length = olat__be32(copy + at)) <= size - at - 12; at += 12 + length)
+        olat__put_be32(copy + at + 8 + length, olat__crc32(copy + at + 4, length + 4));
+    read_png(copy, size);
+    free(copy);
+}
+
+/* The pixels behind the checksum of the compressed data: 13 bytes of header, a byte of palette size, palette, rows. */
+static void fuzz_unfilter(const unsigned char *data, size_t size) {
+    olat__png png;
+    unsigned char header[13] = {0}, palette[768] = {0};
+    size_t used, raw = 0;
+    int pass, width, height, colors;
+    memset(&png, 0, sizeof png);
+    if (size < 14) return;
+    memcpy(header, data, 13);
+    header[0] = header[1] = header[4] = header[5] = 0;
+    header[2] &= 1;
+    header[6] &= 1;
+    if (olat__png_header(&png, header, 13)) return;
+    colors = 1 + data[13];
+    used = size - 14 < 3 * (size_t)colors ? size - 14 : 3 * (size_t)colors;
+    memcpy(palette, data + 14, used);
+    if (png.color == 3 && olat__png_palette(&png, palette, 3 * (size_t)colors)) return;
+    if (!(png.color & 4)) olat__png_transparency(&png, palette, png.color == 3 ? 1 : 2 * (size_t)png.channels);
+    for (pass = png.first_pass; pass < png.end_pass; pass++) {
+        const size_t row = olat__png_pass(&png, pass, &width, &height);
+        raw += (size_t)height * (row + 1);
+    }
+    png.raw = (unsigned char *)calloc(raw, 1);
+    png.out = (unsigned char *)malloc((size_t)png.width * (size_t)png.height * (png.depth == 16 ? 8 : 4));
+    HOLDS(png.raw && png.out);
+    size -= 14 + used;
+    memcpy(png.raw, data + 14 + used, size < raw ? size : raw);
+    olat__png_unfilter(&png);
+    free(png.raw);
+    free(png.out);
+}
+
+/* Two bytes of capacity, then the stream; what comes out is packed, and unpacked again. */
+static void fuzz_inflate(const unsigned char *data, size_t size) {
+    olat__inflater z, y;
+    unsigned char *copy, *packed, *back;
+    uint32_t *table;
+    const char *problem;
+    if (size < 2) return;
+    copy = copy_of(data + 2, size - 2);
+    memset(&z, 0, sizeof z);
+    z.in = copy;
+    z.size = size - 2;
+    z.capacity = (size_t)data[0] << 8 | data[1];
+    z.out = (unsigned char *)malloc(z.capacity + !z.capacity);
+    problem = olat__inflate(&z);
+    HOLDS(z.length <= z.capacity && z.at <= z.size);
+    if (!problem || z.length == z.capacity) { /* whatever the checksum says */
+        table = (uint32_t *)calloc(65536, sizeof *table);
+        packed = (unsigned char *)malloc(z.length + z.length / 8 + 128);
+        back = (unsigned char *)malloc(z.length + 1);
+        memset(&y, 0, sizeof y);
+        y.size = olat__deflate(z.out, z.length, packed, table);
+        y.in = packed;
+        y.out = back;
+        y.capacity = z.length;
+        HOLDS(!olat__inflate(&y) && !memcmp(back, z.out, z.length));
+        free(table);
+        free(packed);
+        free(back);
+    }
+    free(z.out);
+    free(copy);
+}
+
+/* ---- JSON and datasets ---- */
+
+/* Every node but the root is a child of one container that counts it. */
+static void fuzz_json(const unsigned char *data, size_t size) {
+    char error[512] = "", path[] = "fuzz.json";
+    olat__json j;
+    int i, child, seen = 1;
+    memset(&j, 0, sizeof j);
+    j.text = (char *)malloc(size + 1);
+    HOLDS(j.text);
+    if (size) memcpy(j.text, data, size);
+    j.text[size] = 0;
+    j.path = path;
+    j.error = error;
+    j.end = j.text + size;
+    olat__json_parse(&j);
+    HOLDS(j.failed == (error[0] != 0));
+    for (i = 0; !j.failed && i < j.count; i++) {
+        const olat__node *node = j.nodes + i;
+        int children = 0;
+        HOLDS(node->type != OLAT__NUMBER || isfinite(node->number));
+        HOLDS(node->type != OLAT__STRING || (node->text >= j.text && node->text + node->text_length < j.end));
+        for (child = node->child; child; child = j.nodes[child].next, children++, seen++) HOLDS(j.nodes[child].parent == i);
+        HOLDS(children == node->size);
+    }
+    HOLDS(j.failed || seen == j.count);
+    free(j.nodes);
+    free(j.text);
+}
+
+/* JSON, then, after a NUL, the image it may call fuzz_image.png. What is accepted can be trained on. */
+static void fuzz_dataset(const unsigned char *data, size_t size) {
+    const unsigned char *nul = (const unsigned char *)(size ? memchr(data, 0, size) : NULL);
+    const size_t text = nul ? (size_t)(nul - data) : size;
+    input defaults = defaults_only();
+    ssdgs_context *context = draw_context(&defaults);
+    char error[512] = "";
+    olat_dataset set;
+    ssdgs_photo *photos;
+    int i, images;
+    put_file("fuzz_transforms.json", data, text);
+    put_file("fuzz_image.png", nul ? nul + 1 : data, nul ? size - text - 1 : 0);
+    for (images = 0; images < 2; images++) {
+        if (olat_load(folder, "fuzz_transforms.json", images ? 0 : OLAT_NO_IMAGES, &set, error)) {
+            HOLDS(error[0] && !set.count && !set.frames);
+            continue;
+        }
+        HOLDS((photos = olat_photos(&set)) != NULL);
+        for (i = 0; i < set.count; i++) {
+            HOLDS(!ssdgs__camera_check(context, &photos[i].camera) && !ssdgs__lights_check(context, &photos[i].light, 1));
+            HOLDS(!images || photos[i].pixels);
+        }
+        free(photos);
+        olat_free(&set);
+    }
+    ssdgs_context_destroy(context);
+}
+
+/* ---- which target, and both ways to start ---- */
+
+typedef struct target {
+    const char *name;
+    void (*run)(const unsigned char *data, size_t size);
+} target;
+static const target targets[] = {{"png", fuzz_png}, {"unfilter", fuzz_unfilter}, {"inflate", fuzz_inflate}, {"json", fuzz_json},
+                                 {"dataset", fuzz_dataset}, {"ply", fuzz_ply}, {"checkpoint", fuzz_checkpoint},
+                                 {"render", fuzz_render}, {"train", fuzz_train}};
+
+/* The target that is a name in the path, the last of those. */
+static const target *find_target(const char *path) {
+    const target *found = NULL;
+    size_t i, length;
+    while (*path) {
+        length = strcspn(path, "/\\");
+        for (i = 0; i < sizeof targets / sizeof *targets; i++)
+            if (strlen(targets[i].name) == length && !memcmp(path, targets[i].name, length)) found = targets + i;
+        path += length + (path[length] != 0);
+    }
+    return found;
+}
+
+static void find_folder(const char *program) {
+    size_t length = strlen(program);
+    while (length > 0 && program[length - 1] != '/' && program[length - 1] != '\\') length--;
+    snprintf(folder, sizeof folder, "%.*s", length > 1 ? (int)length - 1 : 1, length ? program : ".");
+}
+
+#ifdef LIBFUZZER
+static const target *chosen;
+
+int LLVMFuzzerInitialize(int *argc, char ***argv);
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerInitialize(int *argc, char ***argv) {
+    (void)argc;
+    find_folder(**argv);
+    chosen = find_target(**argv);
+    HOLDS(chosen);
+    return 0;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    chosen->run(data, size);
+    return 0;
+}
+#else
+int main(int argc, char **argv) {
+    char error[512];
+    unsigned char *data;
+    size_t size;
+    int i, passed = 0, failed = argc < 2;
+    find_folder(argv[0]);
+    for (i = 1; i < argc; i++) {
+        const target *found = find_target(argv[i]);
+        if (!found || olat__read_file(argv[i], &data, &size, error)) {
+            printf("%s: no target's file, or not to be read\n", argv[i]);
+            failed++;
+            continue;
+        }
+        printf("%s\n", argv[i]);
+        fflush(stdout); /* a finding ends the program here */
+        found->run(data, size);
+        free(data);
+        passed++;
+    }
+    printf("%d passed, %d failed\n", passed, failed);
+    return failed != 0;
+}
+#endif
