@@ -5871,7 +5871,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs__correction *correction;
     ssdgs_real background[3];
     double t, gradient[9], until;
-    int learns[SSDGS__GROUPS], frozen[2], terms, photo, j;
+    int learns[SSDGS__GROUPS], frozen[2], moves[2], terms, photo, j;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
     o = &trainer->options;
@@ -5888,14 +5888,20 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, frozen,
                                    o->dssim, &values);
     if (result) return result;
-    result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
+    ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
+    for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+    moves[0] = o->refine_camera && t >= 5e3;
+    moves[1] = o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
+    for (j = 0; j < 9 && !result; j++)
+        if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
+            result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of photograph %d's %s "
+                                 "is not finite", trainer->iteration, photo, j > 5 ? "light" : "camera");
+    if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
     if (!result) {
-        ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
-        for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-        if (o->refine_camera && t >= 5e3)
+        if (moves[0])
             ssdgs__correction_step(correction, gradient, 0, ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
-        if (o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT)
+        if (moves[1])
             ssdgs__correction_step(correction, gradient, 1, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
     }
     ssdgs__model_changed(trainer->model);
@@ -5942,18 +5948,30 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 }
 
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
-    int sizes[SSDGS_MAX_LAYERS + 1], layers;
-    size_t per_gaussian, first[SSDGS__GLOBAL_GROUPS + 1], activations = SSDGS_CHANNELS + SSDGS__ROWS + 2;
+    ssdgs__block_layout layout;
+    size_t per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
+    ssdgs_frame frame;
+    double across;
     if (!settings || !options || width < 1 || height < 1) return 0;
-    layers = ssdgs__network_sizes(settings, 0, sizes);
-    activations += ssdgs__output_rows(sizes, layers);
-    layers = ssdgs__network_sizes(settings, 1, sizes);
-    activations += ssdgs__output_rows(sizes, layers);
+    memset(&frame, 0, sizeof frame);
+    frame.settings = *settings;
+    frame.terms = settings->terms;
+    frame.training = frame.light_count = 1;
+    layout = ssdgs__layout(&frame);
     ssdgs__global_groups(settings, first);
-    /* parameters, gradient and two moments with a quarter of slack, splat records of two views, instances, activations of half */
-    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 16 + 8 + activations / 2 + 3 * (SSDGS__SUMS + 4)) + 160;
-    return per_gaussian * (size_t)options->max_gaussians + first[SSDGS__GLOBAL_GROUPS] * sizeof(ssdgs_real) * (4 + SSDGS__SLOTS) +
-           (size_t)width * (size_t)height * 36 * sizeof(ssdgs_real);
+    n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
+    points = options->initial_points > 0 && (size_t)options->initial_points < n ? (size_t)options->initial_points : n;
+    /* tiles of random points, six standard deviations wide, where the bounds fill the image; later about three */
+    across = 6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
+    instances = (size_t)((double)points * across * across);
+    instances = 2 * n + (instances > 3 * n ? instances : 3 * n);
+    per_instance = sizeof(ssdgs_real) * SSDGS__SUMS + sizeof(ssdgs_tile_entry) + 12;
+    /* parameters and two moments with a quarter of slack, gradients, splat records of two views, activations */
+    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + layout.size / SSDGS__BLOCK) + 160;
+    fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
+        6 * first[SSDGS__GLOBAL_GROUPS] + 36 * ((size_t)width + 48) * ((size_t)height + 10);
+    fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
+    return fixed + fixed / 8;
 }
 
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
@@ -6356,7 +6374,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VAND(m, n) ((__mmask16)((m) & (n)))
 #define VBITS(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvtps_epi32(a))
+#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC))
 #define VLDEXP(x, n) _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
 #define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 
@@ -7895,7 +7913,7 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
         varies = VLT(zero, vi);
         vi = VMAX(vi, zero);
         vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
-        cov = VFNMA(e[0], e[1], e[4]);
+        cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]), zero); /* what does not vary does so with nothing */
         a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
         a2 = VFMA(VSET(2), cov, c2);
         b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
@@ -7958,10 +7976,11 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
 }
 
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
-   Gradients below 1e-18 count as 0: their squares are not representable; nor do moments linger as slow subnormals. */
+   Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that flushes subnormals
+   finds the same. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
     V g = VLOAD(gradient), m, v;
-    g = VSEL(VLT(VABS(g), VSET(1e-18)), VSET(0), g);
+    g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), g);
     m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
     v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
     m = VSEL(VLT(VABS(m), VSET(1e-30)), VSET(0), m);
