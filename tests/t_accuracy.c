@@ -90,8 +90,8 @@ static double srgb_encode(double x) { return x < 0.0031308 ? 12.92 * x : 1.055 *
 static double srgb_decode(double x) { return x < 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4); }
 
 /* A function holds from low to high. Below and above it takes the value there, or is not called (SAME, NONE). Its errors count
-   in units in the last place: of the value, or of `least` where the value is smaller. The bounds are the worst seen in one float
-   of 67, on any instruction set, rounded up: without FMA pi / 2 runs out of bits beyond 1e4, and the powers multiply log's error. */
+   in units in the last place: of the value, or of `least` where the value is smaller. The bounds are the worst seen in one of 67
+   floats, on any instruction set, rounded up: without FMA pi / 2 runs out of bits beyond 1e4, and powers multiply log's error. */
 enum { NONE = 0, SAME_BELOW = 1, SAME_ABOVE = 2, SAME = 3 };
 static const struct law {
     const char *name;

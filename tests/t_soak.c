@@ -997,6 +997,6 @@ int main(int argc, char **argv) {
         printf("row %d %s %s\n", rows[i].number, test_failed == failed ? "passed" : "failed", rows[i].name);
         passed += test_failed == failed;
     }
-    printf("figure soak_rows_passed %d\nfigure soak_rows_total %d\n", passed, count);
+    printf("figure stress_rows_passed %d\nfigure stress_rows_total %d\n", passed, count);
     TEST_END();
 }

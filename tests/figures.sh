@@ -1,0 +1,84 @@
+#!/bin/sh
+# sh tests/figures.sh BUILD FUZZ_SECONDS FUZZ_TARGET...: runs the tests at their longest and writes BUILD/figures/FIGURES.md and
+# BUILD/figures.json from what they print ("figure KEY VALUE", "row NN passed|failed NAME"). Hours; a part whose log is there
+# already is not repeated: delete it to have it again. What the machine lacks (clang's libFuzzer, gcovr) is left out and named.
+set -u
+build=$1 seconds=$2
+shift 2
+targets="$*" out=$build/figures
+mkdir -p "$out"
+
+# part NAME TITLE COMMAND...: the log is there once the command has ended
+part() {
+    name=$1 title=$2 log=$out/$1.log
+    shift 2
+    if [ ! -f "$log" ]; then
+        echo "$name: $*" >&2
+        "$@" >"$log.part" 2>&1
+        echo "exit $?" >>"$log.part"
+        mv "$log.part" "$log"
+    fi
+    printf '\n## %s\n\n`%s`\n' "$title" "$*"
+    # rows of the catalogue, then figures
+    awk '
+        /^row [0-9]+ (passed|failed) / {
+            if (!rows++) printf "\n| row | | |\n| --- | --- | --- |\n"
+            what = $0; sub(/^row [0-9]+ [a-z]+ /, "", what)
+            printf "| %s | %s | %s |\n", $2, what, $3
+        }
+        /^figure / { key[++n] = $2; value[n] = $3 }
+        /^hash / { hash[++m] = $0 }
+        /^[0-9]+ passed, [0-9]+ failed$/ { last = $0 }
+        /: ([0-9]+ passed, [0-9]+ failed|absent.*|no result.*)$/ { line[++k] = $0 }
+        /^exit / { code = $2 }
+        END {
+            if (n) printf "\n| figure | |\n| --- | --- |\n"
+            for (i = 1; i <= n; i++) printf "| %s | %s |\n", key[i], value[i]
+            if (m) printf "\n"
+            for (i = 1; i <= m; i++) printf "    %s\n", hash[i]
+            if (k) printf "\n"
+            for (i = 1; i <= k; i++) printf "- %s\n", line[i]
+            if (last) printf "\n%s.\n", last
+            if (code != 0) printf "\nEnded with exit status %s.\n", code
+        }' "$log"
+}
+
+absent() { printf '\n## %s\n\nNot measured: %s is missing.\n' "$1" "$2"; }
+
+coverage() { # of all tests together, on the kernels of AVX2
+    make -j2 test BUILD="$build/coverage" CC=gcc CFLAGS='-O0 --coverage -DSSDGS_NO_AVX512' LDLIBS='-lm -lpthread --coverage' BUILDS= &&
+        gcovr -r . --object-directory "$build/coverage" --filter ssdgs.h --filter examples/olat.h --branches --json-summary-pretty \
+            --merge-mode-functions=separate >"$out/coverage.json" &&
+        sed -n 's/^ *"branch_percent": \([0-9.]*\).*/figure branch_coverage_percent \1/p' "$out/coverage.json" | tail -n 1
+}
+
+cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
+{
+    cat <<TEXT
+# Figures
+
+Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q). Rows are those of the stress
+catalogue; every program's first comment says what it measures and against what.
+TEXT
+    part golden 'Golden values and gradients, float' "$build/t_golden"
+    part golden_64 'The same sources in double' "$build/t_golden_64"
+    part accuracy 'Elementary and shading functions' "$build/t_accuracy" full
+    part brute 'Both passes against brute force' "$build/t_brute" full
+    part gradient_64 'The whole backward pass against central differences, in double' "$build/t_gradient_64"
+    part stress 'Stress: geometry, rasteriser, light, shading' "$build/t_stress"
+    part soak 'Stress: training, determinism' "$build/t_soak" full
+    part faults 'Faults and hostile files' "$build/t_faults" full
+    part mutants 'Mutants of the backward passes' sh tests/mutants.sh "$build/mutants"
+    if [ -x "$build/fuzzers/all" ]; then part fuzz 'Fuzzing' sh tests/fuzz/run.sh "$build/fuzzers" "$seconds" $targets
+    else absent Fuzzing "clang's libFuzzer"; fi
+    if command -v gcovr >/dev/null; then part coverage 'Coverage of ssdgs.h and examples/olat.h' coverage
+    else absent Coverage gcovr; fi
+    part matrix 'Compilers and machines' sh tests/matrix.sh "$build"
+} >"$out/FIGURES.md"
+
+# The same figures; of a key that several programs print, the sum.
+sed -n 's/^figure //p' "$out"/*.log | awk '
+    { if (!($1 in sum)) key[++n] = $1; sum[$1] = $1 in sum ? sum[$1] + $2 : $2 }
+    END { printf "{\n"; for (i = 1; i <= n; i++) printf "  \"%s\": %s%s\n", key[i], sum[key[i]], i < n ? "," : ""; printf "}\n" }
+' >"$build/figures.json"
+echo "$out/FIGURES.md, $build/figures.json"
