@@ -1,5 +1,6 @@
-/* Training under stress: spoiled gradients, degenerate photographs and cameras, explosion, extinction, soak, foreign FPU and
-   locale states; one hash per instruction set whatever the threads. A row per case of the catalogue; `t_soak full` goes deeper. */
+/* Training under stress: spoiled gradients, degenerate photographs and cameras, explosion, extinction, soak, foreign states of
+   FPU and locale; one hash per instruction set whatever the threads. A row per case; `t_soak full` goes deeper, `t_soak full 61`
+   runs one row. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -11,6 +12,15 @@
 #if defined(__unix__) || defined(__APPLE__)
 #include <pthread.h>
 #define POSIX_THREADS 1
+static pthread_mutex_t counting = PTHREAD_MUTEX_INITIALIZER; /* checks are counted by several threads at a time */
+static int locked_check(int ok, int line, const char *what) {
+    pthread_mutex_lock(&counting);
+    test_check(ok, __FILE__, line, what);
+    pthread_mutex_unlock(&counting);
+    return ok;
+}
+#undef CHECK
+#define CHECK(condition) locked_check(!!(condition), __LINE__, #condition)
 #else
 #define POSIX_THREADS 0
 #endif
@@ -59,6 +69,7 @@ static double largest_parameter(ssdgs_model *model) {
     }
     return most;
 }
+#define NAME(isa) ssdgs_isa_string((ssdgs_isa)(isa))
 #define ALL_FINITE(model) (largest_parameter(model) < 1e30)
 
 typedef struct meter { size_t live, peak, calls; } meter;
@@ -108,11 +119,13 @@ static ssdgs_model *new_truth(ssdgs_context *context) {
     for (i = 0; i < TRUTH; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(11, (uint64_t)(64 * i + c)) - 1;
-            v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(c < 3 ? 0.35 * u : c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY
-                                                                       ? 0.4 * u - 2.4 : c == SSDGS_OPACITY ? 2 + u : u);
+            const int scale = c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY;
+            v.gaussians[(size_t)c * v.stride + (size_t)i] =
+                (ssdgs_real)(c < 3 ? 0.35 * u : scale ? 0.4 * u - 2.4 : c == SSDGS_OPACITY ? 2 + u : u);
         }
-    for (i = 0; i < (int)(v.scattering_count + v.shadow_count); i++) /* networks that have something to say */
-        (i < (int)v.scattering_count ? v.scattering : v.shadow - v.scattering_count)[i] += (ssdgs_real)(0.2 * ssdgs__uniform(12, (uint64_t)i) - 0.1);
+    for (i = 0; i < (int)v.scattering_count; i++) /* networks that have something to say */
+        v.scattering[i] += (ssdgs_real)(0.2 * ssdgs__uniform(12, (uint64_t)i) - 0.1);
+    for (i = 0; i < (int)v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(13, (uint64_t)i) - 0.1);
     return model;
 }
 
@@ -143,9 +156,9 @@ static void make_photos(int side) {
         CHECK(!ssdgs_render_ex(truth, &photos[i].camera, &photos[i].light, 1, &exact, &image, NULL));
         for (j = 0; j < side * side; j++)
             for (c = 0; c < 4; c++) {
-                const double a = (double)alpha[j] > 1e-4 ? (double)alpha[j] : 1e-4;
-                const double x = c == 3 ? (double)alpha[j] : (double)ssdgs_srgb_encode((ssdgs_real)((double)color[3 * j + c] / a));
-                pixels[i][4 * j + c] = (uint16_t)(65535 * (x < 1 ? x : 1) + 0.5);
+                const ssdgs_real a = alpha[j] > (ssdgs_real)1e-4 ? alpha[j] : (ssdgs_real)1e-4;
+                const ssdgs_real x = c == 3 ? alpha[j] : ssdgs_srgb_encode(color[3 * j + c] / a);
+                pixels[i][4 * j + c] = (uint16_t)(65535 * (x < 1 ? (double)x : 1) + 0.5);
             }
     }
     ssdgs_model_destroy(truth);
@@ -192,7 +205,8 @@ static ssdgs_train_stats steps(training *t, int count) {
     ssdgs_train_stats stats;
     int i, good = 0;
     memset(&stats, 0, sizeof stats);
-    for (i = 0; i < count; i++) good += !ssdgs_trainer_step(t->trainer, &stats) && test_finite(stats.loss) && test_finite(stats.psnr);
+    for (i = 0; i < count; i++)
+        good += !ssdgs_trainer_step(t->trainer, &stats) && test_finite(stats.loss) && test_finite(stats.psnr);
     if (!CHECK(good == count)) printf("    %d of %d steps: %s\n", good, count, ssdgs_error_message(t->context));
     return stats;
 }
@@ -200,18 +214,19 @@ static ssdgs_train_stats steps(training *t, int count) {
 /* ---- 54: one value of one gradient ---- */
 
 enum { VIEW_GRADIENT = SSDGS__GROUPS, LIGHT_GRADIENT, SPOILS };
-typedef struct spoiler { int group, from, until, frame; ssdgs_real value; } spoiler;
+typedef struct spoiler { int group, from, until, spared, frame; ssdgs_real value; } spoiler;
 
-/* The CPU's backward, then a value of a group's gradient is overwritten in the frames from .. until. */
+/* The CPU's backward, then a value of a group's gradient is overwritten in the frames from .. until but one. */
 static ssdgs_result spoil_gradient(void *user, ssdgs_frame *frame) {
     spoiler *s = (spoiler *)user;
     const ssdgs_result result = ssdgs_stage_cpu(frame, SSDGS_STAGE_PROJECT_BACKWARD);
-    if (s->frame >= s->from && s->frame < s->until) {
+    if (s->frame >= s->from && s->frame < s->until && s->frame != s->spared) {
         size_t first[SSDGS__GLOBAL_GROUPS + 1];
         ssdgs__global_groups(&frame->settings, first);
         if (s->group == VIEW_GRADIENT) frame->view_gradient[7] = s->value;
         else if (s->group == LIGHT_GRADIENT) frame->light_gradient[2] = s->value;
-        else if (s->group >= SSDGS__PLANE_GROUPS) frame->global_gradient[first[s->group - SSDGS__PLANE_GROUPS + 1] - 1] = s->value;
+        else if (s->group >= SSDGS__PLANE_GROUPS)
+            frame->global_gradient[first[s->group - SSDGS__PLANE_GROUPS + 1] - 1] = s->value; /* the group's last */
         else frame->gradient[(size_t)ssdgs__group_plane[s->group] * frame->gaussians.stride + 17] = s->value;
     }
     s->frame++;
@@ -242,7 +257,7 @@ static void row_54(void) {
     hook.user = &s;
     memset(&s, 0, sizeof s);
     for (group = -1; group < SPOILS; group++)
-        for (i = 0; i < (group < 0 ? 1 : 3); i++) {
+        for (i = 0; i < (group < 0 || SLOW > 1 ? 1 : 3); i++) {
             training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, &hook), NULL, NULL, &o, PHOTOS);
             ssdgs_train_stats stats;
             uint64_t before;
@@ -270,14 +285,15 @@ static void row_54(void) {
             finish(&t);
         }
     CHECK(after != undisturbed);
-    for (i = 9; i <= 10; i++) { /* nine refusals in a row are got over, ten end the run */
+    for (i = 9; i <= 10; i++) { /* nine refusals in a row, a step and a tenth are got over, ten in a row end the run */
         training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, &hook), NULL, NULL, &o, PHOTOS);
         s.group = SSDGS__G_OPACITY;
         s.frame = 0;
         s.from = 1;
-        s.until = 1 + i;
+        s.until = i == 9 ? 12 : 11;
+        s.spared = i == 9 ? 10 : 0;
         CHECK(ssdgs_trainer_run(t.trainer, NULL, NULL) == (i == 9 ? SSDGS_OK : SSDGS_ERR_NONFINITE));
-        CHECK(t.trainer->iteration == (i == 9 ? 12 : 11) && t.trainer->skipped == i && ALL_FINITE(t.model));
+        CHECK(t.trainer->iteration == s.until && t.trainer->skipped == 10 && ALL_FINITE(t.model));
         finish(&t);
     }
 }
@@ -313,8 +329,9 @@ static double ssim_oracle(const ssdgs_real *image, const ssdgs_real *reference, 
 
 /* Photographs of one colour, of none, and smaller than the window of SSIM; trained a little under every term. */
 static void row_55(void) {
-    static const struct { int width, height, rgb, alpha; } cases[8] = {{1, 1, 128, 255}, {1, 1, 255, 0}, {2, 1, 0, 255}, {5, 7, 255, 255},
-                                                                      {16, 16, 0, 255}, {16, 16, 255, 255}, {16, 16, 90, 0}, {1, 16, 7, 128}};
+    static const struct { int width, height, rgb, alpha; } cases[8] = {
+        {1, 1, 128, 255}, {1, 1, 255, 0}, {2, 1, 0, 255}, {5, 7, 255, 255},
+        {16, 16, 0, 255}, {16, 16, 255, 255}, {16, 16, 90, 0}, {1, 16, 7, 128}};
     static unsigned char flat[16 * 16 * 4];
     static ssdgs_real image[3 * 16 * 16], reference[3 * 16 * 16], gradient[3 * 16 * 16];
     const ssdgs_train_options o = short_run(20);
@@ -373,12 +390,13 @@ static void row_56(void) {
             double here = 0;
             if (!context) continue;
             for (j = 0; j < 3 * LARGEST; j++)
-                image[j] = (ssdgs_real)(i < 4 ? constants[i] : i == 4 ? ssdgs__uniform(31, (uint64_t)j) : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
+                image[j] = (ssdgs_real)(i < 4 ? constants[i] : i == 4 ? ssdgs__uniform(31, (uint64_t)j)
+                                                                      : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
             CHECK(!ssdgs__loss(context, &memory, image, image, SIDE, SIDE, 1, gradient, &values));
             for (j = 0; j < 3 * LARGEST; j++) here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
             here *= 3 * LARGEST;
             if (!CHECK(fabs(values.ssim - 1) < 1e-7) || !CHECK(here < (i == 3 ? 1e-2 : 6e-4)))
-                printf("    %s, image %d: SSIM - 1 = %g, gradient %g\n", ssdgs_isa_string((ssdgs_isa)isa), i, values.ssim - 1, here);
+                printf("    %s, image %d: SSIM - 1 = %g, gradient %g\n", NAME(isa), i, values.ssim - 1, here);
             worst = fabs(values.ssim - 1) > worst ? fabs(values.ssim - 1) : worst;
             steepest = here > steepest ? here : steepest;
             CHECK(values.l1 <= 0 && values.mse <= 0);
@@ -462,7 +480,7 @@ static void row_59(void) {
         o.densify_gradient = 0;
         o.densify_every = 3;
         o.initial_points = 20;
-        o.max_gaussians = side == 16 ? 600 : 300;
+        o.max_gaussians = side > 16 ? 300 : full ? 3000 : 600;
         announced = ssdgs_train_memory(&settings, &o, side, side);
         t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
         for (i = 0; i < o.iterations; i++) {
@@ -471,7 +489,8 @@ static void row_59(void) {
             CHECK(t.model->count <= o.max_gaussians);
         }
         CHECK(most > o.max_gaussians * 3 / 4 && ALL_FINITE(t.model));
-        printf("    %d Gaussians of %d, %lu bytes at most, %lu announced\n", most, o.max_gaussians, (unsigned long)m.peak, (unsigned long)announced);
+        printf("    %d Gaussians of %d, %lu bytes at most, %lu announced\n", most, o.max_gaussians, (unsigned long)m.peak,
+               (unsigned long)announced);
         CHECK((double)m.peak < 1.3 * (double)announced && (double)m.peak > 0.6 * (double)announced); /* "about" */
         worst = (double)m.peak / (double)announced > worst ? (double)m.peak / (double)announced : worst;
         finish(&t);
@@ -491,8 +510,8 @@ static void row_59(void) {
 /* A hundred times every rate: a bad model, but a model. */
 static void row_60(void) {
     ssdgs_train_options o = short_run(full ? 2000 : 300 / SLOW);
-    ssdgs_rate *const rates[12] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material, &o.shadow,
-                                   &o.scattering, &o.camera_rate, &o.light_rate};
+    ssdgs_rate *const rates[12] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material,
+                                   &o.shadow, &o.scattering, &o.camera_rate, &o.light_rate};
     training t;
     int i;
     make_photos(16);
@@ -530,9 +549,10 @@ static void row_61(void) {
         calls = m.calls;
         steps(&t, o.iterations / 4);
         CHECK(m.live <= live + live / 10); /* buffers still meet larger frames; 8 bytes a step would be more */
-        CHECK(m.calls - calls <= (size_t)o.iterations / 4 / 100 * 6 + 12); /* density control's own, nothing a step */
+        CHECK(m.calls - calls <= (size_t)o.iterations / 4 / 5); /* density control's own and what grows, nothing a step */
     }
-    printf("    %d Gaussians, %lu bytes live, largest parameter %g\n", t.model->count, (unsigned long)m.live, largest_parameter(t.model));
+    printf("    %d Gaussians, %lu bytes live, largest parameter %g\n", t.model->count, (unsigned long)m.live,
+           largest_parameter(t.model));
     CHECK(t.model->count > 25 && t.model->count <= 50 && largest_parameter(t.model) < (full ? 150 : 25));
     finish(&t);
     CHECK(m.live == 0);
@@ -544,56 +564,46 @@ static void row_62(void) {
         {SSDGS_DIFFUSE_TERM, 5e3}, {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM, 9e3},
         {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM, 16e3}};
     ssdgs_train_options o = short_run(120);
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], i, c;
-    int phase, all;
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_real *globals, was[SSDGS_CHANNELS];
+    ssdgs_model_view v;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], last, i, c;
+    training t;
+    int phase, all, moved = 0;
     make_photos(16);
     o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
     for (phase = 0; phase < 3; phase++) {
         const int count = (int)(phases[phase].until / 60e3 * o.iterations);
         uint64_t hash[2];
         for (all = 0; all < 2; all++) {
-            ssdgs_settings settings = ssdgs_settings_default();
-            training t;
-            if (!all) settings.terms = phases[phase].terms;
+            settings.terms = all ? SSDGS_ALL_TERMS : phases[phase].terms;
             t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
             steps(&t, count);
             hash[all] = hash_model(t.model);
             steps(&t, 10); /* the next term joins, if there is one */
-            CHECK((hash_model(t.model) != hash[0]));
+            CHECK(hash_model(t.model) != hash[0]);
             finish(&t);
         }
         CHECK(hash[0] == hash[1]);
     }
-    for (phase = 0; phase < PHOTOS; phase++) photos[phase].light = photos[0].light; /* one light, neither gloss nor depth */
-    {
-        ssdgs_settings settings = ssdgs_settings_default();
-        ssdgs_real *globals;
-        ssdgs_model_view v;
-        training t;
-        int still = 1;
-        settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-        t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
-        v = ssdgs_model_get(t.model);
-        {
-            const ssdgs_real start_specular = v.gaussians[SSDGS_SPECULAR * v.stride], start_scattering = v.gaussians[SSDGS_SCATTERING * v.stride];
-            const ssdgs_real start_weight = v.gaussians[SSDGS_ASG_WEIGHT * v.stride];
-            globals = (ssdgs_real *)malloc(t.model->global_count * sizeof *globals);
-            memcpy(globals, t.model->globals, t.model->global_count * sizeof *globals);
-            steps(&t, 120);
-            v = ssdgs_model_get(t.model);
-            for (i = 0; i < (size_t)v.count; i++)
-                for (c = 0; c < 3; c++) still = still && !memcmp(v.gaussians + (SSDGS_SPECULAR + c) * v.stride + i, &start_specular, sizeof start_specular) &&
-                    !memcmp(v.gaussians + (SSDGS_SCATTERING + c) * v.stride + i, &start_scattering, sizeof start_scattering) &&
-                    !memcmp(v.gaussians + (SSDGS_ASG_WEIGHT + c) * v.stride + i, &start_weight, sizeof start_weight);
-        }
-        ssdgs__global_groups(&t.model->settings, first);
-        CHECK(still && !memcmp(globals, t.model->globals, first[SSDGS__SHADOW_NET] * sizeof *globals));
-        CHECK(memcmp(globals + first[SSDGS__SHADOW_NET], t.model->globals + first[SSDGS__SHADOW_NET],
-                     (t.model->global_count - first[SSDGS__SHADOW_NET]) * sizeof *globals));
-        CHECK(ALL_FINITE(t.model));
-        free(globals);
-        finish(&t);
-    }
+    for (i = 0; i < PHOTOS; i++) photos[i].light = photos[0].light; /* one light, neither gloss nor depth */
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
+    globals = (ssdgs_real *)malloc(t.model->global_count * sizeof *globals);
+    memcpy(globals, t.model->globals, t.model->global_count * sizeof *globals);
+    for (c = 0; c < SSDGS_CHANNELS; c++) was[c] = ssdgs_model_get(t.model).gaussians[c * t.model->capacity];
+    steps(&t, o.iterations);
+    v = ssdgs_model_get(t.model);
+    for (c = SSDGS_SPECULAR; c < SSDGS_MATERIAL; c++) /* every Gaussian's start is the same */
+        for (i = 0; i < (size_t)v.count && (c < SSDGS_FRAME || c >= SSDGS_ASG_WEIGHT); i++)
+            moved += memcmp(v.gaussians + c * v.stride + i, &was[c], sizeof was[c]) != 0;
+    ssdgs__global_groups(&t.model->settings, first);
+    last = first[SSDGS__SHADOW_NET];
+    CHECK(moved == 0 && !memcmp(globals, t.model->globals, last * sizeof *globals));
+    CHECK(memcmp(globals + last, t.model->globals + last, (t.model->global_count - last) * sizeof *globals));
+    CHECK(ALL_FINITE(t.model));
+    free(globals);
+    finish(&t);
 }
 
 /* ---- 63, 64: poses ---- */
@@ -632,7 +642,8 @@ static double weighted_view(const ssdgs_photo *photo, const double value[9], con
 
 static void row_63(void) {
     static const double pi = 3.14159265358979323846, seam = 0.03162277660168379; /* where the series take over */
-    const double angles[12] = {0, 1e-300, 1e-160, 1e-12, 1e-6, 1e-3, seam * (1 - 1e-9), seam * (1 + 1e-9), 1, pi, 2 * pi - 1e-6, 2 * pi};
+    const double angles[12] = {0, 1e-300, 1e-160, 1e-12, 1e-6, 1e-3, seam * (1 - 1e-9), seam * (1 + 1e-9),
+                               1, pi, 2 * pi - 1e-6, 2 * pi};
     ssdgs_train_options o = short_run(12);
     double worst = 0, slope = 0;
     int a, axis, i;
@@ -641,7 +652,8 @@ static void row_63(void) {
         for (axis = 0; axis < 4; axis++) {
             double value[9], e[9], jacobian[9], want[9], integral[9], d[6], scale = 0;
             ssdgs_real weight[12];
-            for (i = 0; i < 9; i++) value[i] = i < 6 && i >= 3 ? axis == 3 ? ssdgs__uniform(41, (uint64_t)i) - 0.5 : i - 3 == axis : 0.1 * i;
+            for (i = 0; i < 9; i++)
+                value[i] = i < 3 || i > 5 ? 0.1 * i : axis == 3 ? ssdgs__uniform(41, (uint64_t)i) - 0.5 : i - 3 == axis;
             for (i = 3; i < 6; i++) scale += value[i] * value[i];
             for (i = 3; i < 6; i++) value[i] *= angles[a] / sqrt(scale);
             for (i = 0; i < 12; i++) weight[i] = (ssdgs_real)(ssdgs__uniform(42, (uint64_t)i) - 0.5);
@@ -669,7 +681,7 @@ static void row_63(void) {
             }
         }
     printf("figure rotation_series_error %.2g\nfigure pose_gradient_error %.2g\n", worst, slope);
-    CHECK(worst < 1e-12);
+    CHECK(worst < 5e-14); /* rounding at two pi, and at the seam */
     CHECK(slope < 1e-10);
     for (a = 9; a < 12; a++) { /* a pose turned that far: the trainer goes on, a whole turn is none */
         ssdgs_camera camera;
@@ -711,7 +723,8 @@ static void row_64(void) {
     static const char *const names[3] = {"pose_centre_left", "pose_angle_left", "light_left"};
     static ssdgs_photo truth[PHOTOS];
     ssdgs_train_options o = short_run(500 * (full ? PHOTOS : 2));
-    ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material, &o.shadow, &o.scattering};
+    ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material,
+                                   &o.shadow, &o.scattering};
     double before[3] = {0, 0, 0}, after[3] = {0, 0, 0};
     training t;
     uint64_t hash;
@@ -722,7 +735,7 @@ static void row_64(void) {
     for (i = 0; i < 10; i++) rates[i]->start = rates[i]->end = 0; /* a moving model could take the disturbance over */
     without_density_control(&o);
     o.refine_camera = o.refine_light = 1;
-    o.camera_rate.start = o.light_rate.start = (ssdgs_real)0.01; /* a disturbance away in a few steps, then the default's fine end */
+    o.camera_rate.start = o.light_rate.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
     for (i = 0; i < count; i++) {
         double value[9], length[3] = {0, 0, 0};
         for (c = 0; c < 9; c++) {
@@ -805,11 +818,11 @@ static void row_66(void) {
             known[isa] = 1;
         }
         if (!known[isa]) continue;
-        printf("hash %s %016llx %016llx %016llx\n", ssdgs_isa_string((ssdgs_isa)isa), (unsigned long long)first[isa].render,
+        printf("hash %s %016llx %016llx %016llx\n", NAME(isa), (unsigned long long)first[isa].render,
                (unsigned long long)first[isa].light, (unsigned long long)first[isa].training);
         for (other = SSDGS_ISA_SCALAR; other < isa; other++)
             if (known[other] && same_hashes(first[isa], first[other])) {
-                printf("    %s agrees with %s\n", ssdgs_isa_string((ssdgs_isa)isa), ssdgs_isa_string((ssdgs_isa)other));
+                printf("    %s agrees with %s\n", NAME(isa), NAME(other));
                 break;
             }
         groups += other == isa;
@@ -857,12 +870,14 @@ static void row_67(void) {
             if (!own) own = new_context(isa, 3, NULL, NULL);
             h = hash_all(own, &o, STEPS);
             set_flush(0);
-            if (!CHECK(same_hashes(h, plain))) printf("    %s, flushed: render %d, light %d, training %d\n", ssdgs_isa_string((ssdgs_isa)isa),
-                                                      h.render == plain.render, h.light == plain.light, h.training == plain.training);
+            if (!CHECK(same_hashes(h, plain)))
+                printf("    %s, flushed: render %d, light %d, training %d\n", NAME(isa), h.render == plain.render,
+                       h.light == plain.light, h.training == plain.training);
             if (!i) ssdgs_context_destroy(own);
         }
         ssdgs_context_destroy(context);
         for (i = (int)(sizeof modes / sizeof *modes) - 1; i >= 0; i--) {
+            /* these two round as the mode says inside exp and sin, too: half a step outside of their polynomials' range */
             const int nearest = modes[i].mode == FE_TONEAREST, follows = isa == SSDGS_ISA_SCALAR || isa == SSDGS_ISA_SSE2;
             double most = 0;
             ssdgs_model *truth;
@@ -877,8 +892,8 @@ static void row_67(void) {
                 const double d = fabs((double)color[!nearest][j] - (double)color[0][j]);
                 most = test_finite(d) ? d > most ? d : most : HUGE_VAL;
             }
-            if (!CHECK(most < (follows ? 3e-3 : 1e-5)) || !CHECK(fabs(h.psnr - plain.psnr) < 1))
-                printf("    %s, rounding %s: off by %g, %g dB for %g\n", ssdgs_isa_string((ssdgs_isa)isa), modes[i].name, most, h.psnr, plain.psnr);
+            if (!CHECK(most < (follows ? 5e-3 : 1e-5)) || !CHECK(fabs(h.psnr - plain.psnr) < 1))
+                printf("    %s, rounding %s: off by %g, %g dB for %g\n", NAME(isa), modes[i].name, most, h.psnr, plain.psnr);
             worst[!follows] = most > worst[!follows] ? most : worst[!follows];
             ssdgs_model_destroy(truth);
             ssdgs_context_destroy(context);
@@ -901,12 +916,13 @@ static uint64_t hash_file(const char *path) {
 
 /* A locale with a decimal comma changes no byte written and no number read. */
 static void row_68(void) {
-    static const char *const locales[] = {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8", "ru_RU.UTF-8",
-                                          "German_Germany.1252", "de-DE"};
+    static const char *const locales[] = {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8",
+                                          "ru_RU.UTF-8", "German_Germany.1252", "de-DE"};
     static const char ascii[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
         "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\n"
-        "property float rot_1\nproperty float rot_2\nproperty float rot_3\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n"
-        "end_header\n0.25 -1.5e-1 2.125 0.5 -2.75 -3 -3.5 0.5 0.5 -0.5 0.5 0.5 0.25 0.75\n";
+        "property float rot_1\nproperty float rot_2\nproperty float rot_3\n"
+        "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nend_header\n"
+        "0.25 -1.5e-1 2.125 0.5 -2.75 -3 -3.5 0.5 0.5 -0.5 0.5 0.5 0.25 0.75\n";
     static const char *const paths[2] = {"build/t_soak.ply", "build/t_soak.ckpt"};
     const ssdgs_train_options o = short_run(12);
     uint64_t hash[2][3];
@@ -982,11 +998,21 @@ static void row_69(void) {
 
 int main(int argc, char **argv) {
     static const struct { int number; const char *name; void (*run)(void); } rows[] = {
-        {54, "a gradient that is not finite", row_54}, {55, "degenerate photographs", row_55}, {56, "SSIM of an image and itself", row_56},
-        {57, "one photograph, one camera", row_57}, {58, "few points, coincident points", row_58}, {59, "explosion, extinction", row_59},
-        {60, "rates times 100", row_60}, {61, "soak", row_61}, {62, "terms that never join", row_62}, {63, "pose series", row_63},
-        {64, "disturbed poses and lights come back", row_64}, {66, "one hash for any threads", row_66},
-        {67, "flushed subnormals, other roundings", row_67}, {68, "decimal comma", row_68}, {69, "contexts side by side", row_69}};
+        {54, "a gradient that is not finite", row_54},
+        {55, "degenerate photographs", row_55},
+        {56, "SSIM of an image and itself", row_56},
+        {57, "one photograph, one camera", row_57},
+        {58, "few points, coincident points", row_58},
+        {59, "explosion, extinction", row_59},
+        {60, "rates times 100", row_60},
+        {61, "soak", row_61},
+        {62, "terms that never join", row_62},
+        {63, "pose series", row_63},
+        {64, "disturbed poses and lights come back", row_64},
+        {66, "one hash for any threads", row_66},
+        {67, "flushed subnormals, other roundings", row_67},
+        {68, "decimal comma", row_68},
+        {69, "contexts side by side", row_69}};
     const int count = (int)(sizeof rows / sizeof *rows);
     int i, passed = 0;
     full = argc > 1 && !strcmp(argv[1], "full");
