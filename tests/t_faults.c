@@ -192,10 +192,10 @@ static void make_photos(void) {
     options.seed = 2;
     options.iterations = 40;
     options.initial_points = POINTS;
-    options.max_gaussians = 150;
+    options.max_gaussians = 300;
     options.densify_from = options.densify_every = DENSE;
     options.opacity_reset_every = 13;
-    options.densify_gradient = (ssdgs_real)1e-6;
+    options.densify_gradient = (ssdgs_real)1e-4;
     options.refine_camera = options.refine_light = 1;
 }
 
@@ -522,8 +522,11 @@ static bytes slurp(const char *path) {
 }
 
 static void spill(const char *path, const void *data, size_t size) {
-    FILE *stream = fopen(path, "wb");
-    const int good = stream && fwrite(data, 1, size, stream) == size;
+    FILE *stream;
+    int good;
+    remove(path); /* some file systems flush what is overwritten, which takes long */
+    stream = fopen(path, "wb");
+    good = stream && fwrite(data, 1, size, stream) == size;
     if (!CHECK(stream && !fclose(stream) && good)) exit(1);
 }
 
@@ -770,7 +773,16 @@ static void test_checkpoints(void) {
     head h;
     size_t n, parameters = sizeof h, moments, squares, statistics, order, corrections, k;
     uint64_t before, sum;
+    ssdgs_real most = 0;
     int i, wrong = 0;
+    with_steps(14); /* all that training knows comes back: by now every statistic counts */
+    before = held();
+    for (i = 0; i < model->count; i++) most = trainer->half_shadow[i] > most ? trainer->half_shadow[i] : most;
+    CHECK(most > 0 && trainer->corrections[0].steps[1] > 0 && !ssdgs_trainer_save(trainer, file_path));
+    end_world();
+    with_trainer();
+    CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == before);
+    end_world();
     with_trainer();
     before = held();
     memcpy(&h, whole.data, sizeof h);
@@ -783,10 +795,8 @@ static void test_checkpoints(void) {
     CHECK(whole.size == corrections + PHOTOS * sizeof(ssdgs__correction) + 8);
     for (k = 0; k < whole.size && wrong < 9; k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
         const unsigned char was = whole.data[k];
-        for (i = 0; i < (full ? 8 : 1); i++) {
-            whole.data[k] = (unsigned char)(was ^ 1 << (full ? i : (int)draw_below(8)));
-            wrong += !run_refused(whole.data, whole.size, before);
-        }
+        whole.data[k] = (unsigned char)(was ^ 1 << draw_below(8));
+        wrong += !run_refused(whole.data, whole.size, before);
         whole.data[k] = was;
         wrong += !run_refused(whole.data, k, before); /* cut */
     }
@@ -919,7 +929,7 @@ static void test_damaged_models(void) {
         const unsigned char was = whole.data[k];
         for (i = 1; i < 256; i += full ? 1 : 1 + (int)draw_below(200)) {
             whole.data[k] = (unsigned char)(was ^ i);
-            if (!taken_or_refused(whole.data, whole.size, full || draw() < 0.3))
+            if (!taken_or_refused(whole.data, whole.size, draw() < (full ? 0.05 : 0.3)))
                 wrong++, printf("byte %lu of %lu, %d instead of %d\n", (unsigned long)k, (unsigned long)whole.size, was ^ i, was);
         }
         whole.data[k] = was;
@@ -932,7 +942,11 @@ static void test_damaged_models(void) {
 }
 
 #define PLY "ply\nformat binary_little_endian 1.0\n"
-#define XYZ "property float x\nproperty float y\nproperty float z\n"
+#define ROW /* all that a plain file needs, 56 bytes: nothing but the count can be wrong */ \
+    "property float x\nproperty float y\nproperty float z\n" \
+    "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n" \
+    "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n" \
+    "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n"
 
 /* start, then `repeated` so many times (a format for the number; "" is a byte 0), then end. */
 static bytes repeat(const char *start, const char *repeated, int times, const char *end) {
@@ -951,31 +965,34 @@ static bytes repeat(const char *start, const char *repeated, int times, const ch
 /* Headers that promise too much: what is allocated follows the file's size, not its word. */
 static void test_hostile_headers(void) {
     static const struct { const char *start, *repeated; int times; const char *end; } attacks[] = {
-        {PLY "element vertex 9223372036854775808\n" XYZ "end_header\n", "", 0, ""},
-        {PLY "element vertex 18446744073709551615\n" XYZ "end_header\n", "x", 40, ""},
-        {PLY "element vertex -1\n" XYZ "end_header\n", "x", 40, ""},
-        {PLY "element vertex 1e999\n" XYZ "end_header\n", "x", 40, ""},
-        {PLY "element vertex 1e3\n" XYZ "end_header\n", "x", 12000, ""},
-        {PLY "element vertex 1537228672809129302\n" XYZ "end_header\n", "x", 24, ""}, /* x 12 = 8 modulo 2^64 */
-        {PLY "element vertex 357913942\n" XYZ "end_header\n", "x", 24, ""},           /* x 12 = 8 modulo 2^32 */
-        {PLY "element vertex 0x7fffffff\n" XYZ "end_header\n", "x", 24, ""},
+        {PLY "element vertex 9223372036854775808\n" ROW "end_header\n", "", 0, ""},
+        {PLY "element vertex 18446744073709551615\n" ROW "end_header\n", "x", 40, ""},
+        {PLY "element vertex -1\n" ROW "end_header\n", "x", 40, ""},
+        {PLY "element vertex 1e999\n" ROW "end_header\n", "x", 40, ""},
+        {PLY "element vertex 1e3\n" ROW "end_header\n", "x", 12000, ""},
+        {PLY "element vertex 2305843009213693952\n" ROW "end_header\n", "x", 99, ""}, /* x 56 = 0 modulo 2^64 */
+        {PLY "element vertex 536870912\n" ROW "end_header\n", "x", 99, ""},           /* x 56 = 0 modulo 2^32 */
+        {PLY "element vertex 268435455\n" ROW "end_header\n", "x", 5600, ""},
+        {PLY "element vertex 101\n" ROW "end_header\n", "x", 5600, ""},
+        {PLY "element vertex 0x7fffffff\n" ROW "end_header\n", "x", 24, ""},
         {PLY "element vertex 268435457\nend_header\n", "x", 24, ""}, {PLY "element vertex 4294967296\nend_header\n", "x", 24, ""},
-        {PLY "element face 4294967295\nproperty list uchar int x\nelement vertex 1\n" XYZ "end_header\n", "\0", 1000, ""},
+        {PLY "element face 4294967295\nproperty list uchar int x\nelement vertex 1\n" ROW "end_header\n", "\0", 1000, ""},
         {PLY "element face 1\nproperty list uint int x\nend_header\n\377\377\377\377", "x", 1000, ""},
         {PLY "element face 1\nproperty list int int x\nend_header\n\377\377\377\377", "x", 1000, ""},
-        {"ply\nformat ascii 1.0\nelement vertex 999999999999\n" XYZ "end_header\n", "1 ", 3000, "\n"},
-        {PLY "element vertex 1\n" XYZ "comment ", "x", 1 << 20, "\nend_header\n"}, {"", "x", 1 << 20, ""},
+        {"ply\nformat ascii 1.0\nelement vertex 999999999999\n" ROW "end_header\n", "1 ", 3000, "\n"},
+        {PLY "element vertex 1\n" ROW "comment ", "x", 1 << 20, "\nend_header\n"}, {"", "x", 1 << 20, ""},
         {PLY "element vertex 1\nproperty float ", "x", 1 << 20, "\nend_header\n"},
         {PLY "element ", "v", 1 << 20, " 1\nend_header\n"},
         {PLY "element vertex 1\n", "property float p\n", 100000, "end_header\n"},
         {PLY "element vertex 1\n", "property uchar p%05d\n", 100000, "end_header\n"},
         {PLY, "element e%05d 0\n", 100000, "end_header\n"},
-        {PLY "element vertex 1\n" XYZ, "comment on and on\n", 100000, "end_header\n"}, {PLY, "\n", 100000, "end_header\n"},
-        {PLY "element vertex 1\n" XYZ, "", 0, ""}, {PLY "element vertex 1\n" XYZ "end_heade", "r", 1, ""},
-        {PLY "element vertex 1\n" XYZ "\nend_header\n", "x", 12, ""}
+        {PLY "element vertex 1\n" ROW, "comment on and on\n", 100000, "end_header\n"}, {PLY, "\n", 100000, "end_header\n"},
+        {PLY "element vertex 1\n" ROW, "", 0, ""}, {PLY "element vertex 1\n" ROW "end_heade", "r", 1, ""},
+        {PLY "element vertex 1\n" ROW "\nend_header\n", "x", 12, ""}
     };
     size_t a;
     with_context();
+    memory.limit = (size_t)1 << 26;
     for (a = 0; a < sizeof attacks / sizeof *attacks; a++) {
         const bytes b = repeat(attacks[a].start, attacks[a].repeated, attacks[a].times, attacks[a].end);
         memory.peak = memory.bytes;
@@ -985,6 +1002,7 @@ static void test_hostile_headers(void) {
         bad_inputs++;
         free(b.data);
     }
+    memory.limit = 0;
     end_world();
 }
 
