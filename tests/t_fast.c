@@ -286,6 +286,21 @@ static void test_dead_neurons(void) {
     }
 }
 
+/* However far out a coordinate is, its sines and cosines are none of them beyond 1. */
+static void test_far_out(void) {
+    static ssdgs_real in[SSDGS__BLOCK], out[9 * SSDGS__BLOCK];
+    int isa, i;
+    for (i = 0; i < SSDGS__BLOCK; i++) in[i] = (ssdgs_real)((i & 1 ? -1 : 1) * pow(10, i / 2));
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        const ssdgs__kernels *table = ssdgs__table(isa);
+        double most = 0;
+        if (!table) continue;
+        table->encode(out, in, NULL, 1, 1, 4);
+        for (i = SSDGS__BLOCK; i < 9 * SSDGS__BLOCK; i++) most = fabs((double)out[i]) <= most ? most : fabs((double)out[i]);
+        CHECK(most > 0.9 && most < 1.01);
+    }
+}
+
 /* Frozen networks get no gradient, and take none from anybody else. */
 static void test_frozen(void) {
     ssdgs_context *context = NULL;
@@ -327,6 +342,7 @@ int main(void) {
     test_spent_budget();
     test_presets();
     test_dead_neurons();
+    test_far_out();
     test_frozen();
     TEST_END();
 }

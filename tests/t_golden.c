@@ -557,6 +557,9 @@ static void test_loss(void) {
     rows = (double *)malloc(3 * pixels * sizeof *rows);
     for (i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
     CHECK_L2(rows, gold(&file, "grad_image", NULL), 3 * pixels, gradient_bound(), "loss: grad_image");
+    CHECK(!ssdgs__loss(context, &memory, target, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)0.2, gradient, &values));
+    for (i = 0; i < 3 * pixels; i++) rows[i] = 0; /* equal images pull at nothing, where one grey level makes 1e-4 */
+    CHECK_NEAR(gradient, rows, 3 * pixels, real64 ? 1e-15 : 1e-8, 0, "loss: gradient of equal images");
     free(rows);
     free(image);
     free(target);

@@ -16,7 +16,7 @@ typedef struct scene {
     ssdgs_settings settings;
     ssdgs_render_options options;
     ssdgs_light lights[2];
-    int light_count;
+    int light_count, wall;
 } scene;
 
 static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
@@ -36,6 +36,16 @@ static void fill(ssdgs_model *model) {
         }
     }
     for (i = 0; i < model->global_count; i++) model->globals[i] += 0.3 * (2 * draw(at++) - 1);
+}
+
+/* One Gaussian behind the others, so wide and opaque that its alpha reaches its bound in some pixels. */
+static void build_wall(ssdgs_model *model) {
+    int c;
+    for (c = 0; c < 3; c++) {
+        model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity] = c == 1 ? 0.4 : 0;
+        model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] = c == 1 ? -2 : 1;
+    }
+    model->gaussians[SSDGS_OPACITY * model->capacity] = 12;
 }
 
 /* A smooth objective of the image: its product with fixed weights. */
@@ -112,6 +122,7 @@ static void run(const scene *s) {
     memcpy(lights, s->lights, sizeof lights);
     if (!CHECK(!ssdgs_model_create(context, &s->settings, COUNT, &model))) exit(1);
     fill(model);
+    if (s->wall) build_wall(model);
     stride = model->capacity;
     objective(s, model, &camera, lights, NULL, &frame, 1);
     gradient = (ssdgs_real *)malloc(stride * SSDGS_CHANNELS * sizeof *gradient);
@@ -253,6 +264,71 @@ static void test_shared_sums(void) {
     ssdgs_model_destroy(model);
 }
 
+/* To move all Gaussians is to move the camera the other way; there are enough of them for several tasks. */
+static void test_moved_camera(void) {
+    enum { MANY = 2500 };
+    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    ssdgs_model *model = NULL;
+    ssdgs_frame frame;
+    size_t i;
+    int c, j;
+    if (!CHECK(!ssdgs_model_create(context, NULL, MANY, &model))) exit(1);
+    for (i = 0; i < MANY; i++)
+        for (c = 0; c < 3; c++) {
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + i] = 0.8 * draw(3 * i + (size_t)c) - 0.4;
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + i] = -3 - draw(10000 + 3 * i + (size_t)c);
+        }
+    if (ssdgs__frame_begin(&frame, model, &camera, NULL, 0, NULL, 0, 1)) exit(1);
+    if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE)) exit(1);
+    for (i = 0; i < 4 * MANY; i++) frame.color[i] = draw(20000 + i);
+    if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE)) exit(1);
+    for (i = 0; i < 4 * SIDE * SIDE; i++) frame.pixel_gradient[i] = draw(40000 + i) - 0.5;
+    if (ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
+    for (c = 0; c < 3; c++) {
+        double moved = 0, camera_moved = 0;
+        for (i = 0; i < MANY; i++) moved += frame.gradient[(size_t)(SSDGS_POSITION + c) * frame.gaussians.stride + i];
+        for (j = 0; j < 3; j++) camera_moved += camera.view[4 * j + c] * frame.view_gradient[4 * j + 3];
+        CHECK(fabs(moved) > 0.1 && fabs(moved - camera_moved) < 1e-10 * fabs(moved));
+    }
+    ssdgs_model_destroy(model);
+}
+
+/* Where formulas have no value: an empty footprint's visibility, the half vector of opposite directions, the logits of 0 and 1. */
+static void test_edges(void) {
+    static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    ssdgs_model *model = NULL;
+    ssdgs_model_view v;
+    ssdgs_frame frame;
+    ssdgs_light light;
+    int i, c, j;
+    memset(&light, 0, sizeof light);
+    light.position[1] = 2;
+    for (c = 0; c < 3; c++) light.intensity[c] = 1;
+    if (!CHECK(!ssdgs_model_create(context, NULL, 2, &model))) exit(1);
+    v = ssdgs_model_get(model);
+    v.gaussians[SSDGS_OPACITY * v.stride] = -8; /* too faint for the light's map: nothing is known to be in its way */
+    memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);
+    if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 1, 1)) exit(1);
+    if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
+    CHECK(frame.visibility[0] == 1);
+    for (i = 0; i < 2; i++) {
+        frame.seen[i] = 1;
+        frame.visibility[i] = i;
+    }
+    if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
+    for (i = 0; i < 8; i++) frame.color_gradient[i] = 1;
+    memset(frame.view_gradient, 0, sizeof frame.view_gradient);
+    if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
+    for (i = 0; i < 2; i++) {
+        CHECK(fabs(frame.shadow[4 * i] - (i ? 0.99 : 0.01)) < 1e-12);
+        for (c = 0; c < 3; c++) CHECK(frame.specular[4 * i + c] == 0);
+        for (j = 0; j < 8; j++) CHECK(frame.gradient[(size_t)(SSDGS_ASG_WEIGHT + j) * frame.gaussians.stride + (size_t)i] == 0);
+    }
+    ssdgs_model_destroy(model);
+}
+
 /* A photograph with transparency on a background: the gradient goes through the blending of stored values. */
 static void test_photo(int transfer) {
     static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
@@ -352,6 +428,8 @@ int main(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
     test_shared_sums();
+    test_moved_camera();
+    test_edges();
     test_photo(SSDGS_TRANSFER_SRGB);
     test_photo(SSDGS_TRANSFER_NONE);
     test_compose();
@@ -376,14 +454,15 @@ int main(void) {
     run(&base);
     s = base, s.name = "transport", s.settings.transport = 1;
     run(&s);
-    s = base, s.name = "antialias", s.options.antialias = 1;
+    s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
     run(&s);
-    s = base, s.name = "angular ASG, Burley", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;
+    s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;
+    s.options.stop = 0.4;
     run(&s);
     s = base, s.name = "printed dipole, scalar optics, plain shadow network", s.settings.dipole = SSDGS_DIPOLE_PRINTED;
-    s.settings.per_channel_optics = s.settings.residual_shadow = s.settings.depth_cue = 0;
+    s.settings.per_channel_optics = s.settings.residual_shadow = s.settings.depth_cue = 0, s.settings.shadow_on_scattering = 1;
     run(&s);
-    s = base, s.name = "released dipole, shadow on scattering, no shadow network", s.settings.dipole = SSDGS_DIPOLE_RELEASED;
+    s = base, s.name = "released dipole, shadow on scattering, no shadow network, a wall", s.settings.dipole = SSDGS_DIPOLE_RELEASED, s.wall = 1;
     s.settings.shadow_on_scattering = 1, s.settings.shadow_layers = 0;
     run(&s);
     s = base, s.name = "directional and point light", s.light_count = 2, s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;

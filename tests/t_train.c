@@ -600,6 +600,145 @@ static void test_learning(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Every parameter takes Adam's steps at its group's rate, by its group's clock; what is frozen or not in use stands still. */
+static void test_adam(void) {
+    enum { MANY = 70, STEPS = 6, ALL = SSDGS_ALL_TERMS };
+    static const double times[STEPS] = {0, 1, 45e3, 45001, 70e3, 95e3}; /* of 100,000 */
+    static const struct { int rate, terms; double from, over; } learning[SSDGS__GROUPS] = { /* rate: in the order of the options */
+        {0, ALL, 0, 1e5}, {3, ALL, 0, 1e5}, {2, ALL, 0, 1e5}, {1, ALL, 0, 1e5}, {4, SSDGS_DIFFUSE_TERM, 0, 1e5},
+        {4, SSDGS_SPECULAR_TERM, 0, 1e5}, {4, SSDGS_SCATTERING_TERM, 0, 1e5}, {6, ALL, 40e3, 50e3},
+        {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {7, SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM, 50e3, 50e3},
+        {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
+        {9, SSDGS_SCATTERING_TERM, 50e3, 50e3}, {8, SSDGS_SHADOW_TERM, 50e3, 50e3}};
+    ssdgs_train_options options = short_run(100000);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_rate rates[10];
+    ssdgs_real *gradient[STEPS], *start;
+    double worst = 0;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], stride, planes, values, i;
+    int step, g, learns[SSDGS__GROUPS], terms[STEPS];
+    for (g = 0; g < 10; g++) {
+        rates[g].start = (ssdgs_real)(0.01 * (g + 1));
+        rates[g].end = (ssdgs_real)(0.002 * (10 - g));
+    }
+    memcpy(&options.position, rates, sizeof rates);
+    settings.asg = SSDGS_ASG_ANGULAR; /* so that there is a sigma */
+    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_model_create(context, &settings, MANY, &model));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    ssdgs__global_groups(&settings, first);
+    stride = trainer->stride;
+    planes = SSDGS_CHANNELS * stride;
+    values = planes + model->global_count;
+    start = (ssdgs_real *)malloc(values * sizeof *start);
+    memcpy(start, model->gaussians, planes * sizeof *start);
+    memcpy(start + planes, model->globals, model->global_count * sizeof *start);
+    for (step = 0; step < STEPS; step++) {
+        ssdgs_frame frame;
+        memset(&frame, 0, sizeof frame);
+        frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
+        frame.global_gradient = frame.gradient + planes;
+        for (i = 0; i < values; i++) { /* of all sizes: those below 1e-18 count as 0 */
+            const double u = ssdgs__uniform((uint64_t)step, i);
+            gradient[step][i] = (ssdgs_real)((u < 0.4 ? u - 0.9 : u + 0.1) * (i % 16 < 15 ? pow(10, -(double)(i % 16)) : 8e-19));
+        }
+        for (g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
+        terms[step] = step & 1 ? ALL : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+        CHECK(!ssdgs__adam_step(trainer, &frame, times[step], terms[step], learns));
+    }
+    for (i = 0; i < values; i++) {
+        double mean = 0, square = 0, value = (double)start[i];
+        int clock = 0;
+        if (i < planes && i % stride >= MANY) continue;
+        for (g = 0; g < SSDGS__PLANE_GROUPS && i / stride >= (size_t)ssdgs__group_plane[g + 1];) g++;
+        while (i >= planes && i - planes >= first[g - SSDGS__PLANE_GROUPS + 1]) g++;
+        for (step = 0; step < STEPS; step++) {
+            const double slope = fabs((double)gradient[step][i]) < 1e-18 ? 0 : (double)gradient[step][i];
+            const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0 ? 0 : past > 1 ? 1 : past;
+            const ssdgs_rate rate = rates[learning[g].rate];
+            if ((g + step) % 3 == 0 || !(learning[g].terms & terms[step])) continue;
+            clock++;
+            mean = 0.9 * mean + 0.1 * slope;
+            square = 0.999 * square + 0.001 * slope * slope;
+            value -= (g ? 1 : trainer->extent) * pow((double)rate.start, 1 - x) * pow((double)rate.end, x) *
+                     mean / (1 - pow(0.9, clock)) / (sqrt(square / (1 - pow(0.999, clock))) + 1e-15);
+        }
+        value = fabs(value - (double)(i < planes ? model->gaussians[i] : model->globals[i - planes]));
+        worst = value <= worst ? worst : value;
+    }
+    if (!CHECK(worst < 4e-6)) printf("    Adam: off by %.3g\n", worst); /* six roundings of values up to 4 */
+    for (step = 0; step < STEPS; step++) free(gradient[step]);
+    free(start);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Photographs of a model itself under cameras and lights disturbed in different ways: a run in which nothing else learns brings
+   each of them back. */
+static void test_refinement(void) {
+    enum { MANY = 300 };
+    static unsigned char pictures[PHOTOS][SIDE * SIDE * 4];
+    static ssdgs_real image[SIDE * SIDE * 3];
+    ssdgs_train_options options = short_run(360);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_real background[3] = {0, 0, 0};
+    ssdgs_photo disturbed[PHOTOS];
+    ssdgs_metrics metrics;
+    double off[2][2] = {{0, 0}, {0, 0}}; /* before, after: cameras, lights */
+    int i, c, p;
+    settings.terms = SSDGS_DIFFUSE_TERM;
+    settings.light_scale = (ssdgs_real)0.05;
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
+    for (i = 0; i < MANY; i++)
+        for (c = 0; c < 3; c++) {
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)(ssdgs__uniform(6, (uint64_t)(3 * i + c)) - 0.5);
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
+            model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity + (size_t)i] = (ssdgs_real)(3 * ssdgs__uniform(7, (uint64_t)(3 * i + c)));
+            model->gaussians[(size_t)(SSDGS_FRAME + c) * model->capacity + (size_t)i] = (ssdgs_real)(2 * ssdgs__uniform(8, (uint64_t)(3 * i + c)) - 1);
+        }
+    for (p = 0; p < PHOTOS; p++) {
+        const double way = p & 1 ? -1 : 1;
+        CHECK(!ssdgs_evaluate(model, photos + p, background, image, &metrics));
+        ssdgs_to_bytes(image, SIDE * SIDE * 3, SSDGS_TRANSFER_NONE, pictures[p]);
+        for (i = SIDE * SIDE; i-- > 0;) {
+            memmove(pictures[p] + 4 * i, pictures[p] + 3 * i, 3);
+            pictures[p][4 * i + 3] = 255;
+        }
+        disturbed[p] = photos[p];
+        disturbed[p].pixels = pictures[p];
+        disturbed[p].camera.view[3] += (ssdgs_real)(0.02 * way);
+        disturbed[p].camera.view[7] -= (ssdgs_real)(0.02 * way);
+        disturbed[p].light.position[p % 3] += (ssdgs_real)(0.3 * way);
+    }
+    memset(&options.position, 0, 10 * sizeof options.position);
+    options.camera_rate.start = options.camera_rate.end = (ssdgs_real)2e-3;
+    options.light_rate.start = options.light_rate.end = (ssdgs_real)2e-2;
+    options.densify_until = 0;
+    CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer) && !ssdgs_trainer_run(trainer, NULL, NULL));
+    for (p = 0; p < PHOTOS; p++) {
+        ssdgs_photo now;
+        CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
+        for (i = 0; i < 3; i++) {
+            off[0][0] += fabs((double)(disturbed[p].camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
+            off[0][1] += fabs((double)(disturbed[p].light.position[i] - photos[p].light.position[i]));
+            off[1][0] += fabs((double)(now.camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
+            off[1][1] += fabs((double)(now.light.position[i] - photos[p].light.position[i]));
+        }
+    }
+    if (!CHECK(off[1][0] < 0.2 * off[0][0] && off[1][1] < 0.4 * off[0][1]))
+        printf("    cameras off by %g of %g, lights by %g of %g\n", off[1][0], off[0][0], off[1][1], off[0][1]);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 /* The schedules switch terms and freezes at the paper's iterations, scaled to the run. */
 static void test_schedule(void) {
     ssdgs_train_options o = ssdgs_train_options_default();
@@ -684,7 +823,7 @@ static void test_isolation(void) {
         if (ssdgs_context_create(&desc, &context)) continue;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < 4; i++) model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + i)] = (ssdgs_real)NAN;
+        for (i = 0; i < 4; i++) model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + 5 * i)] = (ssdgs_real)NAN;
         for (i = 0; i < 5; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
         image.color = color;
         render.stop = (ssdgs_real)0.3; /* so that some entries of a tile are not seen */
@@ -747,7 +886,7 @@ static void test_density(void) {
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
     memset(&correction, 0, sizeof correction);
-    for (i = 0; i < 9; i++) gradient[i] = 1;
+    for (i = 0; i < 9; i++) gradient[i] = 0.5 * (i + 1);
     for (i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3);
     before = correction.value[6];
     ssdgs__correction_step(&correction, gradient, 1, 1e-3);
@@ -784,7 +923,7 @@ static void test_prune_weight(void) {
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
     int i, pass;
-    options.densify_gradient = 1e30f;
+    options.densify_gradient = 1;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
     for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
@@ -793,6 +932,7 @@ static void test_prune_weight(void) {
         for (i = 0; i < MANY; i++) {
             model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
             trainer->screen_count[i] = i == LIGHT ? 0 : 4;
+            trainer->screen_gradient[i] = 3; /* in four photographs: too little to make more of it */
             trainer->contribution[i] = trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
         }
         trainer->iteration = pass ? 50 : 40;
@@ -834,13 +974,16 @@ static void test_half_shadow(void) {
         trainer->screen_count[i] = 3;
         trainer->contribution[i] = 100;
         trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
+        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + (size_t)i] = trainer->square[(size_t)c * trainer->stride + (size_t)i] = 1;
     }
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 3);
     p = model->gaussians;
     stride = model->capacity;
     ssdgs__rotation_scalar(raw, q, r);
-    for (half = 0, i = 0; i < 3; i++) { /* Morton order: the first is still the first */
+    for (half = 0, i = 0; i < 3; i++) { /* Morton order: the first is still the first; halves start without momentum */
+        for (c = 0; c < SSDGS_CHANNELS; c++) CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i && trainer->square[(size_t)c * stride + (size_t)i] == !i);
+        CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 && trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
         if (i == 0) continue;
         for (c = 0; c < 3; c++) {
             const double x = (double)p[(size_t)c * stride + (size_t)i];
@@ -860,6 +1003,9 @@ static void test_half_shadow(void) {
         CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) < 1e-6);
     }
     CHECK(fabs(length / 4 + 0.75 * 0.75 * scale[1] * scale[1] - scale[1] * scale[1]) < 1e-7);
+    p[SSDGS_OPACITY * stride] = -6;
+    ssdgs__reset_opacity(trainer); /* lowers what is above 0.01 */
+    CHECK(p[SSDGS_OPACITY * stride] == -6 && fabs((double)p[SSDGS_OPACITY * stride + 1] - log(0.01 / 0.99)) < 1e-6);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     CHECK(!ssdgs_model_create(context, NULL, 200, &model)); /* of many, the few with the most */
@@ -875,11 +1021,12 @@ static void test_half_shadow(void) {
     for (i = 0, c = 0; i < 204; i++) c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
     CHECK(c == 8);
     for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a pixel; two photographs */
-        ssdgs_real splat[SSDGS__SPLAT] = {3, 4}, lit = (ssdgs_real)0.2;
+        ssdgs_real splat[SSDGS__SPLAT] = {4, (ssdgs_real)1.5}, lit = (ssdgs_real)0.2;
         uint32_t first = 0;
         ssdgs_frame frame;
         memset(&frame, 0, sizeof frame);
-        frame.camera.width = frame.camera.height = 2;
+        frame.camera.width = 2;
+        frame.camera.height = 4;
         frame.terms = i == 1 ? SSDGS_DIFFUSE_TERM : SSDGS_ALL_TERMS;
         frame.shaded_count = 1;
         frame.shaded = &first;
@@ -900,6 +1047,7 @@ static void test_half_shadow(void) {
 
 int main(void) {
     make_photos();
+    test_adam();
     test_same_bits();
     test_resume();
     test_refused_step();
@@ -915,6 +1063,7 @@ int main(void) {
     test_prune_weight();
     test_half_shadow();
     test_learning();
+    test_refinement();
     test_schedule();
     TEST_END();
 }

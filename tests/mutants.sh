@@ -1,0 +1,80 @@
+#!/bin/sh
+# usage: [CC=cc] sh tests/mutants.sh BUILD [first] [last]: do the tests notice wrong gradients? Each line of tests/mutants.txt changes
+# a copy of ssdgs.h in one place; a mutant is caught where one of its section's tests fails. A line that fits nothing or does not
+# compile is an error. Exits 0 when all are caught, after about half an hour on one core.
+set -u
+list=tests/mutants.txt header=ssdgs.h first=${2:-1} last=${3:-99999} number=0 caught=0 total=0 errors=0
+mkdir -p "$1/mutants/tests" "$1/mutants/build" && work=$(cd "$1/mutants" && pwd) || exit 2
+SSDGS_GOLDEN=${SSDGS_GOLDEN:-$PWD/tests/golden}
+export SSDGS_GOLDEN MUTANT
+
+cc=${CC:-cc} quick=$(command -v tcc || echo "$cc -O0") # where compiling takes longer than running
+cp tests/t_*.c "$work/tests"
+# the first failed check ends a program
+sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests/test.h"
+
+# apply: $header with $MUTANT, "function: old ==> new" or "function#2: old ==> new" for the second place, as the copy's ssdgs.h.
+# A function, by its name without F(), ends where a line begins with }.
+apply() {
+    awk 'BEGIN {
+            colon = index(ENVIRON["MUTANT"], ": "); arrow = index(ENVIRON["MUTANT"], " ==> ")
+            name = substr(ENVIRON["MUTANT"], 1, colon - 1); new = substr(ENVIRON["MUTANT"], arrow + 5)
+            old = substr(ENVIRON["MUTANT"], colon + 2, arrow - colon - 2)
+            if (hash = index(name, "#")) { wanted = substr(name, hash + 1) + 0; name = substr(name, 1, hash - 1) }
+        }
+        $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
+        inside {
+            for (at = 1; found = index(substr($0, at), old); at += found - 1 + length(put)) {
+                put = ++places == (wanted ? wanted : 1) ? new : old
+                $0 = substr($0, 1, at + found - 2) put substr($0, at + found - 1 + length(old))
+            }
+        }
+        /^}/ || /^[A-Za-z].*[;}]$/ { inside = 0 }
+        { print }
+        END { exit !(arrow && old != new && (wanted ? places >= wanted : places == 1)) }' "$header" >"$work/ssdgs.h"
+}
+
+# runs NAME: builds a test of the copy, those named _64 in double, and runs it; 2 when it does not compile. Ten minutes of CPU
+# time end what hangs.
+runs() {
+    case $1 in
+        t_gradient_64) compile="$cc -O1 -DSSDGS_REAL64" ;;
+        *_64) compile="$quick -DSSDGS_REAL64" ;;
+        t_train) compile="$cc -O1 -DSSDGS_NO_AVX2" ;;
+        *) compile="$cc -O0 -DSSDGS_NO_AVX2" ;;
+    esac
+    nice $compile "$work/tests/${1%_64}.c" -o "$work/$1" -lm -lpthread >"$work/log" 2>&1 || return 2
+    (cd "$work" && ulimit -t 600 && nice "./$1" >log 2>&1) 2>/dev/null || return 1
+}
+
+# notices TEST...: leaves the first test that fails in $by, or nothing.
+notices() {
+    for by in "$@"; do
+        runs "$by"
+        case $? in 1) return ;; 2) by=error; return ;; esac
+    done
+    by=
+}
+
+cp "$header" "$work/ssdgs.h"
+notices $(sed -n 's/^tests: //p' "$list" | tr ' ' '\n' | sort -u)
+[ -z "$by" ] || { echo "$by: fails without any mutant"; cat "$work/log"; exit 2; }
+while IFS= read -r MUTANT; do
+    case $MUTANT in
+        '#'* | '') continue ;;
+        'tests: '*) tests=${MUTANT#tests: }; continue ;;
+    esac
+    number=$((number + 1))
+    if [ $number -lt "$first" ] || [ $number -gt "$last" ]; then continue; fi
+    by=error
+    if apply; then notices $tests; fi
+    case $by in
+        '') what=SURVIVED ;;
+        error) what=ERROR errors=$((errors + 1)) ;;
+        *) what="caught by $by" caught=$((caught + 1)) ;;
+    esac
+    total=$((total + 1))
+    printf 'mutant %03d %s : %s\n' $number "$what" "$MUTANT"
+done <"$list"
+printf 'figure mutants_caught %d\nfigure mutants_total %d\n' $caught $total
+[ $errors -eq 0 ] && [ $caught -eq $total ]
