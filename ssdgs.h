@@ -85,8 +85,8 @@ WHAT IT COMPUTES
   by less than light_bias casts no shadow. transport = 1 lets the scattering network see besides what true dipole
   transport brings to x from where the light enters.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
-  channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S, no bias; both passes add 0.3 px^2,
-  where the default adds 0.1 for the camera and keeps to a floor for the light.
+  channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S, no bias; both passes add
+  0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
@@ -7458,13 +7458,13 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 
 /* One lane set of the geometry; both directions of the pass run through it. */
 typedef struct F(geometry) {
-    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3], woh,
-        fresnel;
+    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3],
+        missing, fresnel; /* missing: 1 - wo.h */
     VM half;
 } F(geometry);
 
 SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const R *gauss) {
-    V x[3], raw[4], d2, e2, h2, missing;
+    V x[3], raw[4], d2, e2, h2;
     int i;
     for (i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
     for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
@@ -7489,10 +7489,10 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const
     g->inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
     for (i = 0; i < 3; i++) g->h[i] = VMUL(g->h[i], g->inverse_h);
     for (i = 0; i < 3; i++) g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
-    g->woh = VDOT3(g->wo[0], g->wo[1], g->wo[2], g->h[0], g->h[1], g->h[2]);
-    missing = VMAX(VSET(0), VMIN(VSET(1), VSUB(VSET(1), g->woh))); /* where wi is nearly -wo, h is rounding and wo.h any number */
-    h2 = VMUL(missing, missing);
-    g->fresnel = VFMA(VSET(1 - SSDGS__F0), VMUL(VMUL(h2, h2), missing), VSET(SSDGS__F0));
+    g->missing = VSUB(VSET(1), VDOT3(g->wo[0], g->wo[1], g->wo[2], g->h[0], g->h[1], g->h[2]));
+    g->missing = VMAX(VSET(0), VMIN(VSET(1), g->missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
+    h2 = VMUL(g->missing, g->missing);
+    g->fresnel = VFMA(VSET(1 - SSDGS__F0), VMUL(VMUL(h2, h2), g->missing), VSET(SSDGS__F0));
 }
 
 /* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma (angular).
@@ -7598,8 +7598,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-        missing2 = VMAX(VSET(0), VMIN(VSET(1), VSUB(VSET(1), g.woh)));
-        missing2 = VMUL(missing2, missing2);
+        missing2 = VMUL(g.missing, g.missing);
         dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
         for (i = 0; i < 3; i++) {
             dh[i] = VFMA(dwoh, g.wo[i], VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
