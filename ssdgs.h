@@ -938,7 +938,7 @@ typedef struct ssdgs__kernels {
     void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*dense)(const ssdgs__product *);
     int (*live_rows)(const ssdgs_real *, int, uint16_t *);
-    void (*transpose)(const ssdgs_real *, int, size_t, ssdgs_real *);
+    void (*transpose)(const ssdgs_real *, int, size_t, size_t, ssdgs_real *);
     void (*dense_bf16)(const ssdgs__product *, const uint32_t *, uint32_t *); /* NULL where there is none */
     void (*row_sums)(ssdgs_real *, size_t, const ssdgs_real *, const uint16_t *, int);
     void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
@@ -2703,7 +2703,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.dnet = l.dvisibility + b;
     l.dnet2 = l.dnet + b * (size_t)(l.widest + 1);
     l.transposed = l.dnet2 + b * (size_t)(l.widest + 1);
-    l.scratch = l.transposed + b * (size_t)(l.widest + 16);
+    l.scratch = l.transposed + b * (size_t)(l.widest + 32);
     return l;
 }
 
@@ -2908,14 +2908,14 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
         weights -= (in + 1) * out;
         if (slot_gradient) {
             slot_gradient -= out * (padded + 16);
-            k->transpose(layer_in, sizes[layer], padded, transposed);
+            k->transpose(layer_in, sizes[layer], padded, padded + 16, transposed);
             p.out = slot_gradient; /* dW += d x^T */
             p.out_stride = padded + 16;
             p.a = d;
             p.a_row = SSDGS__BLOCK;
             p.a_k = 1;
             p.b = transposed;
-            p.b_stride = padded;
+            p.b_stride = padded + 16;
             p.rows = live_out;
             p.row_list = outs;
             p.columns = (int)padded;
@@ -7253,7 +7253,18 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
    run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
 typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth, multiplied out before the inner loop */
 
-SSDGS__FI void F(dense_tile)(const ssdgs__product *p, const F(offsets) *depth, const int rows, const int vectors,
+/* The body for a tile's number of rows, 6 at most: a constant in it. */
+#define SSDGS__BY_HEIGHT(rows, tile, ...)   \
+    switch (rows) {                         \
+        case 6: tile(6, __VA_ARGS__); break; \
+        case 5: tile(5, __VA_ARGS__); break; \
+        case 4: tile(4, __VA_ARGS__); break; \
+        case 3: tile(3, __VA_ARGS__); break; \
+        case 2: tile(2, __VA_ARGS__); break; \
+        default: tile(1, __VA_ARGS__);       \
+    }
+
+SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(offsets) *depth, const int vectors,
                              const uint16_t *row, int column) {
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
@@ -7300,12 +7311,7 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) *depth
     for (; left; left--) {
         const int rows = (p->rows - row + left - 1) / left;
         const uint16_t *list = p->row_list + row;
-        if (rows == 6) F(dense_tile)(p, depth, 6, vectors, list, column);
-        else if (rows == 5) F(dense_tile)(p, depth, 5, vectors, list, column);
-        else if (rows == 4) F(dense_tile)(p, depth, 4, vectors, list, column);
-        else if (rows == 3) F(dense_tile)(p, depth, 3, vectors, list, column);
-        else if (rows == 2) F(dense_tile)(p, depth, 2, vectors, list, column);
-        else F(dense_tile)(p, depth, 1, vectors, list, column);
+        SSDGS__BY_HEIGHT(rows, F(dense_tile), p, depth, vectors, list, column);
         row += rows;
     }
 }
@@ -7339,12 +7345,12 @@ SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
     return n;
 }
 
-/* (count, BLOCK) -> (BLOCK, stride), columns from count to stride 0; stride is a multiple of 4. */
-SSDGS__FN void F(transpose)(const R *rows, int count, size_t stride, R *out) {
+/* (count, BLOCK) -> (BLOCK, padded) in rows of stride, columns from count on 0; padded is a multiple of 4. */
+SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stride, R *out) {
     const R *end = rows + count * SSDGS__BLOCK;
     R last[4 * SSDGS__BLOCK];
     size_t i, s;
-    for (i = 0; i < stride; i += 4, rows += 4 * SSDGS__BLOCK) {
+    for (i = 0; i < padded; i += 4, rows += 4 * SSDGS__BLOCK) {
         const R *from = rows;
         if (end < rows + 4 * SSDGS__BLOCK) {
             for (s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
@@ -7355,18 +7361,10 @@ SSDGS__FN void F(transpose)(const R *rows, int count, size_t stride, R *out) {
 }
 
 #if SSDGS__ISA == SSDGS__ISA_AVX512 && SSDGS__BF16
-#define SSDGS__BF16_FN static SSDGS__ATTRIBUTE("avx512f,avx512bf16")
-#define SSDGS__BF16_FI static SSDGS__INLINE SSDGS__ATTRIBUTE("avx512f,avx512bf16")
+#define SSDGS__BF16_FN static SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
+#define SSDGS__BF16_FI static SSDGS__INLINE SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
 
-/* The high halves of a and b, rounded to nearest even, as pairs (a low). */
-SSDGS__BF16_FI __m512i F(bf16_pairs)(__m512i a, __m512i b) {
-    const __m512i one = _mm512_set1_epi32(1), half = _mm512_set1_epi32(0x7FFF);
-    a = _mm512_add_epi32(a, _mm512_add_epi32(half, _mm512_and_si512(_mm512_srli_epi32(a, 16), one)));
-    b = _mm512_add_epi32(b, _mm512_add_epi32(half, _mm512_and_si512(_mm512_srli_epi32(b, 16), one)));
-    return _mm512_or_si512(_mm512_srli_epi32(a, 16), _mm512_and_si512(b, _mm512_set1_epi32((int)0xFFFF0000u)));
-}
-
-SSDGS__BF16_FI void F(dense_bf16_tile)(const ssdgs__product *p, const uint32_t *a, const uint32_t *b, const int rows, int row) {
+SSDGS__BF16_FI void F(dense_bf16_tile)(const int rows, const ssdgs__product *p, const uint32_t *a, const uint32_t *b, int row) {
     __m512 sum[6][4];
     const int pairs = (p->depth + 1) / 2;
     int i, v, k;
@@ -7385,20 +7383,25 @@ SSDGS__BF16_FI void F(dense_bf16_tile)(const ssdgs__product *p, const uint32_t *
             VSTORE(p->out + (size_t)(row + i) * p->out_stride + 16 * v, p->relu ? VMAX(sum[i][v], VSET(0)) : sum[i][v]);
 }
 
+static const uint16_t ssdgs__interleaved[32] = {0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23,
+                                                8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31};
+
 /* A layer's forward in bf16 with sums in float: twice the throughput. weights: (rows, pairs) from pack_weights;
    pairs: room for the packed inputs. */
 SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weights, uint32_t *pairs) {
-    int k, v, row;
+    int k, v, row, rows, left;
+    const __m512i order = _mm512_loadu_si512(ssdgs__interleaved);
     for (k = 0; k < p->depth; k += 2)
         for (v = 0; v < SSDGS__BLOCK; v += 16) {
-            const __m512i low = _mm512_loadu_si512(p->b + k * SSDGS__BLOCK + v);
-            const __m512i high = k + 1 < p->depth ? _mm512_loadu_si512(p->b + (k + 1) * SSDGS__BLOCK + v)
-                : _mm512_setzero_si512();
-            _mm512_storeu_si512(pairs + k / 2 * SSDGS__BLOCK + v, F(bf16_pairs)(low, high));
+            const V even = VLOAD(p->b + k * SSDGS__BLOCK + v);
+            const V odd = k + 1 < p->depth ? VLOAD(p->b + (k + 1) * SSDGS__BLOCK + v) : VSET(0);
+            _mm512_storeu_si512(pairs + k / 2 * SSDGS__BLOCK + v,
+                                _mm512_permutexvar_epi16(order, (__m512i)_mm512_cvtne2ps_pbh(odd, even)));
         }
-    for (row = 0; row + 6 <= p->rows; row += 6) F(dense_bf16_tile)(p, weights, pairs, 6, row);
-    for (; row + 2 <= p->rows; row += 2) F(dense_bf16_tile)(p, weights, pairs, 2, row);
-    for (; row < p->rows; row++) F(dense_bf16_tile)(p, weights, pairs, 1, row);
+    for (left = (p->rows + 5) / 6, row = 0; left; left--, row += rows) {
+        rows = (p->rows - row + left - 1) / left;
+        SSDGS__BY_HEIGHT(rows, F(dense_bf16_tile), p, weights, pairs, row);
+    }
 }
 #define SSDGS__DENSE_BF16 F(dense_bf16)
 #else

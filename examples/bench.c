@@ -251,7 +251,7 @@ static network make_network(ssdgs_model *model) {
             for (i = 0; at < end; i++, at++)
                 n.weights[at] = i < products ? (ssdgs_real)((ssdgs__uniform(3, at) - 0.5) / n.sizes[l - 1]) : 2;
         }
-        widest = (size_t)n.sizes[l] + 16 > widest ? (size_t)n.sizes[l] + 16 : widest;
+        widest = (size_t)n.sizes[l] + 32 > widest ? (size_t)n.sizes[l] + 32 : widest;
     }
     n.output_gradient = take(model->context, widest * SSDGS__BLOCK * (5 + (size_t)n.layers));
     n.d = n.output_gradient + widest * SSDGS__BLOCK;

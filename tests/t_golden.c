@@ -486,7 +486,7 @@ static void test_network(const char *name, int shadow, int residual, int default
         drows = reals(SSDGS__ROWS * BLOCK);
         dnet = reals((size_t)(l.widest + 1) * BLOCK);
         spare = reals((size_t)(l.widest + 1) * BLOCK);
-        transposed = reals((size_t)(l.widest + 16) * BLOCK);
+        transposed = reals((size_t)(l.widest + 32) * BLOCK);
         dvisibility = reals(BLOCK);
         dother = reals((size_t)(l.widest + 1) * BLOCK);
         dweights = reals(count);
