@@ -176,10 +176,11 @@ GPU HOOK
 
 DETERMINISM
   The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
-  sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that never stopped. This holds
-  on one instruction set and one build: FMA rounds once where SSE2 rounds twice. Checkpoints name their instruction set;
-  loading one on another goes on, and tells the log. The implementation turns the compiler's own fusing of products
-  and sums off.
+  sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that never stopped. One build
+  gives the same bits on AVX2 and AVX-512, and the same on SSE2 and scalar code; between the two they differ, as FMA
+  rounds once where SSE2 rounds twice. A checkpoint that changes sides goes on, and tells the log. Builds agree as far as
+  their C libraries do (density control calls exp and log) and no -ffast-math or x87 is in play: the implementation turns the
+  compiler's own fusing of products and sums off.
 
 ERRORS
   Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
@@ -6053,7 +6054,7 @@ static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* F
 
 typedef struct ssdgs__checkpoint_head {
     char magic[8];
-    uint32_t byte_order, version, real_size, isa;
+    uint32_t byte_order, version, real_size, fused; /* products and sums rounded once: FMA */
     uint64_t inputs;     /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
@@ -6097,7 +6098,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->byte_order = 0x01020304u;
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
-    head->isa = (uint32_t)trainer->context->isa;
+    head->fused = trainer->context->isa >= SSDGS_ISA_AVX2;
     /* ints, then reals: no padding but at the end */
     head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
                                offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
@@ -6225,9 +6226,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     }
     result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
-        if (head.isa != own.isa && context->logger.write)
+        if (head.fused != own.fused && context->logger.write)
             context->logger.write(context->logger.user, SSDGS_OK,
-                                  "the checkpoint was written with another instruction set: the run goes on, not bit for bit");
+                                  "the checkpoint was written by code that rounds otherwise (FMA or none): the run goes on, not bit for bit");
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
@@ -6417,40 +6418,42 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define VABS(a) VMAX(a, VNEG(a))
 #define VDOT3(ax, ay, az, bx, by, bz) VFMA(az, bz, VFMA(ay, by, VMUL(ax, bx)))
 
-/* Sum of the lanes, in a fixed tree. */
-SSDGS__FI R F(sum)(V v) {
-#if SSDGS__VW == 1
-    return v;
-#else
-    R lane[SSDGS__VW];
+/* Sums over lanes are sums of sixteen, SSDGS__NV vectors of them, by halves whatever the width: all instruction sets that fuse
+   products and sums give the same bits, and so do all that do not. */
+SSDGS__FI R F(sum)(const V *v) {
+    R lane[16];
     int n, i;
-    VSTORE(lane, v);
-    for (n = SSDGS__VW / 2; n > 0; n /= 2)
+    for (i = 0; i < SSDGS__NV; i++) VSTORE(lane + i * SSDGS__VW, v[i]);
+    for (n = 8; n > 0; n /= 2)
         for (i = 0; i < n; i++) lane[i] += lane[i + n];
     return lane[0];
-#endif
 }
 
-/* out[0..3] += the lane sums of a, b, c, d. */
-SSDGS__FI void F(sum4)(R *out, V a, V b, V c, V d) {
+/* out[0..3] += the sums of a, b, c, d. */
+SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
 #if SSDGS__ISA == SSDGS__ISA_AVX512
-    __m512 ab = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
-    __m512 cd = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
-    __m512 abcd = _mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE));
-    __m512 half = _mm512_add_ps(abcd, _mm512_shuffle_f32x4(abcd, abcd, 0x4E));
-    __m128 sum = _mm_add_ps(_mm512_castps512_ps128(half), _mm512_extractf32x4_ps(half, 1));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+    __m512 ab = _mm512_add_ps(_mm512_shuffle_f32x4(*a, *b, 0x44), _mm512_shuffle_f32x4(*a, *b, 0xEE));
+    __m512 cd = _mm512_add_ps(_mm512_shuffle_f32x4(*c, *d, 0x44), _mm512_shuffle_f32x4(*c, *d, 0xEE));
+    __m512 abcd = _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xDD));
+    abcd = _mm512_add_ps(abcd, _mm512_permute_ps(abcd, 0x4E));
+    abcd = _mm512_add_ps(abcd, _mm512_permute_ps(abcd, 0xB1));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm512_castps512_ps128(_mm512_maskz_compress_ps(0x8421, abcd))));
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
-    __m256 ab = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-    __m256 cd = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-    __m256 abcd = _mm256_add_ps(_mm256_shuffle_ps(ab, cd, 0x44), _mm256_shuffle_ps(ab, cd, 0xEE));
-    __m128 sum = _mm_add_ps(_mm256_castps256_ps128(abcd), _mm256_extractf128_ps(abcd, 1));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+    const __m256 a1 = _mm256_add_ps(a[0], a[1]), b1 = _mm256_add_ps(b[0], b[1]);
+    const __m256 c1 = _mm256_add_ps(c[0], c[1]), d1 = _mm256_add_ps(d[0], d[1]);
+    __m256 ab = _mm256_add_ps(_mm256_permute2f128_ps(a1, b1, 0x20), _mm256_permute2f128_ps(a1, b1, 0x31));
+    __m256 cd = _mm256_add_ps(_mm256_permute2f128_ps(c1, d1, 0x20), _mm256_permute2f128_ps(c1, d1, 0x31));
+    __m256 acbd = _mm256_add_ps(_mm256_unpacklo_ps(ab, cd), _mm256_unpackhi_ps(ab, cd));
+    acbd = _mm256_add_ps(acbd, _mm256_permute_ps(acbd, 0x4E));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm_unpacklo_ps(_mm256_castps256_ps128(acbd), _mm256_extractf128_ps(acbd, 1))));
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
-    __m128 ab = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
-    __m128 cd = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
-    __m128 sum = _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), sum));
+    const __m128 a1 = _mm_add_ps(_mm_add_ps(a[0], a[2]), _mm_add_ps(a[1], a[3]));
+    const __m128 b1 = _mm_add_ps(_mm_add_ps(b[0], b[2]), _mm_add_ps(b[1], b[3]));
+    const __m128 c1 = _mm_add_ps(_mm_add_ps(c[0], c[2]), _mm_add_ps(c[1], c[3]));
+    const __m128 d1 = _mm_add_ps(_mm_add_ps(d[0], d[2]), _mm_add_ps(d[1], d[3]));
+    const __m128 ab = _mm_add_ps(_mm_unpacklo_ps(a1, b1), _mm_unpackhi_ps(a1, b1));
+    const __m128 cd = _mm_add_ps(_mm_unpacklo_ps(c1, d1), _mm_unpackhi_ps(c1, d1));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab))));
 #else
     out[0] += F(sum)(a);
     out[1] += F(sum)(b);
@@ -6724,12 +6727,14 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
 /* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity). Adds to the gradient planes; view_slot (12) is overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
                                    const R *splat, R *gradient, size_t gradient_stride, R *view_slot) {
-    V view_sum[12];
+    V view_sum[12][SSDGS__NV];
     size_t i;
     int j, l;
-    for (j = 0; j < 12; j++) view_sum[j] = VSET(0);
+    for (j = 0; j < 12; j++)
+        for (l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
     for (i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
+        const size_t v = i / SSDGS__VW % SSDGS__NV;
         R lane[6][SSDGS__VW], any = 0;
         V g[6], total, inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3];
         for (l = 0; l < SSDGS__VW; l++)
@@ -6797,16 +6802,16 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
             dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);
             for (j = 0; j < 3; j++) {
-                view_sum[4 * l + j] = VFMA(scaled, du[l][j], view_sum[4 * l + j]);
-                view_sum[8 + j] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j]);
+                view_sum[4 * l + j][v] = VFMA(scaled, du[l][j], view_sum[4 * l + j][v]);
+                view_sum[8 + j][v] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j][v]);
             }
         }
         for (j = 0; j < 3; j++) {
             R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
             V dx = VDOT3(dt[0], dt[1], dt[2], VSET(k->view[j]), VSET(k->view[4 + j]), VSET(k->view[8 + j]));
             VSTORE(d, VADD(VLOAD(d), dx));
-            for (l = 0; l < 3; l++) view_sum[4 * j + l] = VFMA(dt[j], p.x[l], view_sum[4 * j + l]);
-            view_sum[4 * j + 3] = VADD(view_sum[4 * j + 3], dt[j]);
+            for (l = 0; l < 3; l++) view_sum[4 * j + l][v] = VFMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
+            view_sum[4 * j + 3][v] = VADD(view_sum[4 * j + 3][v], dt[j]);
         }
     }
     for (j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
@@ -6994,8 +6999,10 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     R transmittance[16][16], met[16][16]; /* met: sum of blend weight x distance */
     F(batch) applied, sampled;
+    V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
     int micro, v, i;
+    for (v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
@@ -7003,7 +7010,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         }
     while (sampling < tile->count || (flux && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
-        R lanes[SSDGS__BATCH][3][SSDGS__VW], energy[SSDGS__BATCH][SSDGS__VW]; /* the sums before the lanes are added up */
+        V lanes[SSDGS__BATCH][3][SSDGS__NV], energy[SSDGS__BATCH][SSDGS__NV]; /* the sums before the lanes are added up */
         R history[2][SSDGS__BATCH][16]; /* transmittance and met, before the first applied and after each; 63 at most */
         int samples = 0, applies = 0;
         while (sampling < tile->count || (flux && applying < tile->count)) {
@@ -7027,8 +7034,9 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         F(batch_transpose)(&applied, applies);
         F(batch_transpose)(&sampled, samples);
         for (i = 0; i < samples; i++)
-            for (v = 0; v < 2 + cue; v++) VSTORE(lanes[i][v], VSET(0));
-        for (i = 0; flux && i < applies; i++) VSTORE(energy[i], VSET(0));
+            for (v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
+        for (i = 0; flux && i < applies; i++)
+            for (v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
         for (micro = 0; micro < 16; micro++) {
             const uint64_t entries = applied.entries[micro];
             uint64_t left;
@@ -7051,38 +7059,34 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             for (left = entries; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const V distance = VSET(applied.record[index][6]);
-                V sum = flux ? VLOAD(energy[index]) : one;
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
                     alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     if (cue || flux) w = VMUL(alpha, t[v]);
-                    if (flux) sum = VFMA(omega[v], w, sum);
+                    if (flux) energy[index][v] = VFMA(omega[v], w, energy[index][v]);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
                     if (!cue) continue;
                     b[v] = VFMA(w, distance, b[v]);
                     VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
                 }
-                if (flux) VSTORE(energy[index], sum);
             }
             for (left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left), then = ssdgs__highest_bit((entries & nearer[index]) << 1);
                 const V distance = VSET(sampled.record[index][6]);
-                V sum[3];
-                SSDGS__UNROLL for (v = 0; v < 2 + cue; v++) sum[v] = VLOAD(lanes[index][v]);
+                V (*sum)[SSDGS__NV] = lanes[index];
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
                     V dx, dy, raw;
                     VM drawn;
                     (void)F(alpha)(sampled.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
-                    sum[0] = VFMA(raw, past, sum[0]);
-                    sum[1] = VADD(sum[1], raw);
-                    if (cue) sum[2] = VFMA(raw, VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
-                                           sum[2]);
+                    sum[0][v] = VFMA(raw, past, sum[0][v]);
+                    sum[1][v] = VADD(sum[1][v], raw);
+                    if (cue) sum[2][v] = VFMA(raw, VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
+                                              sum[2][v]);
                 }
-                SSDGS__UNROLL for (v = 0; v < 2 + cue; v++) VSTORE(lanes[index][v], sum[v]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
@@ -7090,9 +7094,8 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             }
         }
         for (i = 0; i < samples; i++)
-            F(sum4)(sums + (size_t)sampled.place[i] * 4, VLOAD(lanes[i][0]), VLOAD(lanes[i][1]),
-                    cue ? VLOAD(lanes[i][2]) : VSET(0), VSET(0));
-        for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(VLOAD(energy[i]));
+            F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
+        for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
 }
 
@@ -7184,8 +7187,7 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                 const int index = ssdgs__lowest_bit(left);
                 const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
                 R *out = sums + (size_t)batch.place[index] * SSDGS__SUMS;
-                V sum[12];
-                for (i = 0; i < 12; i++) sum[i] = zero;
+                V sum[12][SSDGS__NV];
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w, shade, behind, g, gx, gy, before_it = t[v];
                     VM drawn;
@@ -7200,16 +7202,17 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                     g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
                     gx = VMUL(g, dx);
                     gy = VMUL(g, dy);
-                    sum[0] = VADD(sum[0], g);
-                    sum[1] = VADD(sum[1], gx);
-                    sum[2] = VADD(sum[2], gy);
-                    sum[3] = VFMA(gx, dx, sum[3]);
-                    sum[4] = VFMA(gx, dy, sum[4]);
-                    sum[5] = VFMA(gy, dy, sum[5]);
-                    sum[6] = VADD(sum[6], w);
-                    sum[8] = VFMA(w, dc[0][v], sum[8]);
-                    sum[9] = VFMA(w, dc[1][v], sum[9]);
-                    sum[10] = VFMA(w, dc[2][v], sum[10]);
+                    sum[0][v] = g;
+                    sum[1][v] = gx;
+                    sum[2][v] = gy;
+                    sum[3][v] = VMUL(gx, dx);
+                    sum[4][v] = VMUL(gx, dy);
+                    sum[5][v] = VMUL(gy, dy);
+                    sum[6][v] = w;
+                    sum[8][v] = VMUL(w, dc[0][v]);
+                    sum[9][v] = VMUL(w, dc[1][v]);
+                    sum[10][v] = VMUL(w, dc[2][v]);
+                    sum[7][v] = sum[11][v] = zero;
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
@@ -7596,7 +7599,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
                 push = VMUL(VMUL(dlobe, weight), lobe);
                 for (i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
                 for (i = 0; i < 12; i++) {
-                    R *sum = lane_sums + (6 + 12 * j + i) * 16;
+                    R *sum = lane_sums + (6 + 12 * j + i) * 16 + s % 16;
                     VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
                 }
             }
@@ -7631,8 +7634,9 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             const V to_light = k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
             const V to_eye = VMUL(VFNMA(g.wo[i], missing2, dwo[i]), g.inverse_eye);
             VSTORE(out, VSUB(VLOAD(out), VADD(to_light, to_eye)));
-            VSTORE(lane_sums + i * 16, VADD(VLOAD(lane_sums + i * 16), to_light));
-            VSTORE(lane_sums + (3 + i) * 16, VADD(VLOAD(lane_sums + (3 + i) * 16), to_eye));
+            out = lane_sums + i * 16 + s % 16;
+            VSTORE(out, VADD(VLOAD(out), to_light));
+            VSTORE(out + 48, VADD(VLOAD(out + 48), to_eye));
         }
     }
 }
@@ -7882,7 +7886,7 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
 SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch, R *d_mean, R *d_square,
                            R *d_product, R sums[3]) {
     const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
-    V total[3];
+    V total[3][SSDGS__NV];
     int x, t, m;
     for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[5];
@@ -7899,8 +7903,9 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
         }
         for (m = 0; m < 5; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
     }
-    for (m = 0; m < 3; m++) total[m] = zero;
+    for (m = 0; m < 3 * SSDGS__NV; m++) total[m / SSDGS__NV][m % SSDGS__NV] = zero;
     for (x = 0; x < width; x += SSDGS__VW) {
+        const int v = x / SSDGS__VW % SSDGS__NV;
         V e[5], mi, mj, vi, vj, cov, a1, a2, b1, b2, inverse, ssim, by_cov, by_var, diff, by_mean;
         const VM inside = VLT(VLOAD(ssdgs__count), VSET(width - x));
         VM varies;
@@ -7930,9 +7935,9 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
         VSTORE(d_square + x, VSEL(inside, by_var, zero));
         VSTORE(d_product + x, VSEL(inside, by_cov, zero));
         diff = VSEL(inside, VSUB(VLOAD(image + x), VLOAD(reference + x)), zero);
-        total[0] = VADD(total[0], VSEL(inside, ssim, zero));
-        total[1] = VADD(total[1], VABS(diff));
-        total[2] = VFMA(diff, diff, total[2]);
+        total[0][v] = VADD(total[0][v], VSEL(inside, ssim, zero));
+        total[1][v] = VADD(total[1][v], VABS(diff));
+        total[2][v] = VFMA(diff, diff, total[2][v]);
     }
     for (m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
 }

@@ -832,12 +832,12 @@ static void test_checkpoints(void) {
             {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}
         };
         for (k = 0; k <= sizeof lies / sizeof *lies; k++) {
-            const int last = k == sizeof lies / sizeof *lies; /* another instruction set: taken, and told */
+            const int last = k == sizeof lies / sizeof *lies; /* another rounding: taken, and told */
             unsigned char *lie = (unsigned char *)malloc(whole.size);
-            const int32_t word = last ? (int32_t)h.isa + 1 : lies[k].type == WORD ? (int32_t)lies[k].value : 0;
+            const int32_t word = last ? !h.fused : lies[k].type == WORD ? (int32_t)lies[k].value : 0;
             const ssdgs_real real = (ssdgs_real)(last ? 0 : lies[k].value);
             memcpy(lie, whole.data, whole.size);
-            if (last) memcpy(lie + offsetof(head, isa), &word, sizeof word);
+            if (last) memcpy(lie + offsetof(head, fused), &word, sizeof word);
             else if (lies[k].type == WORD) memcpy(lie + lies[k].at, &word, sizeof word);
             else if (lies[k].type == REAL) memcpy(lie + lies[k].at, &real, sizeof real);
             else memcpy(lie + lies[k].at, &lies[k].value, sizeof lies[k].value);
