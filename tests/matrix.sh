@@ -1,11 +1,13 @@
 #!/bin/sh
 # sh tests/matrix.sh BUILD [NAME...]: the tests with every compiler, option and machine at hand, or those named. Cross compilers,
-# emulators: Debian's packages. A line each, "NAME: N passed, N failed" or "NAME: absent"; figures at the end.
+# emulators: Debian's packages. A line each, "NAME: N passed, N failed" or "NAME: absent"; then, for code with FMA and without,
+# the hashes of a rendering, a light pass and a trained model, and what gave them; figures at the end.
 build=$1
 shift
 wanted=" $* "
 few='t_golden t_ply t_olat' # under an emulator: minutes
 mkdir -p "$build/matrix"
+: >"$build/matrix/hashes"
 tried=0 good=0
 
 # row NAME RUNNER TESTS CC CFLAGS: RUNNER starts a program, '' = the machine itself
@@ -23,6 +25,9 @@ row() {
     tried=$((tried + 1))
     case $line in *', 0 failed') good=$((good + 1)) ;; esac
     echo "$1: ${line:-no result, see $log}"
+    soak=$build/matrix/$1/t_soak
+    make "$soak" BUILD="$build/matrix/$1" CC="$4" CFLAGS="$5" >>"$log" 2>&1 && $2 "$soak" full 66 2>>"$log" |
+        sed -n -e 's/^hash s[a-z0-9]* /without /p' -e 's/^hash [an][a-z0-9]* /with /p' | sort -u | sed "s/\$/ $1/" >>"$build/matrix/hashes"
 }
 
 for level in -O0 -O2 -O3 -Os '-O2 -ffast-math' '-O2 -march=native'; do
@@ -47,6 +52,8 @@ for machine in aarch64:linux-gnu arm:linux-gnueabihf riscv64:linux-gnu s390x:lin
     row "${machine%%:*}" "qemu-$emulator" "$few" "${machine%%:*}-${machine##*:}-gcc -static" -O2
 done
 row emscripten node "$few" emcc '-O2 -s NODERAWFS=1 -s ALLOW_MEMORY_GROWTH=1'
+sort "$build/matrix/hashes" | awk '{ key = $1 " FMA " $2 " " $3 " " $4; if (key != last) printf "%shash %s:", last ? "\n" : "", key; last = key; printf " %s", $5 }
+    END { if (NR) print "" }'
 echo "figure compilers_passed $good"
 echo "figure compilers_tried $tried"
 [ $good -eq $tried ]
