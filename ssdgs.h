@@ -178,9 +178,9 @@ DETERMINISM
   The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
   sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that never stopped. One build
   gives the same bits on AVX2 and AVX-512 (so does NEON), and the same on SSE2 and scalar code; between the two they
-  differ, as FMA rounds once where SSE2 rounds twice. A checkpoint that changes sides goes on, and tells the log. Builds agree as far as
-  their C libraries do (density control calls exp and log) and no -ffast-math or x87 is in play: the implementation turns the
-  compiler's own fusing of products and sums off.
+  differ, as FMA rounds once where SSE2 rounds twice. A checkpoint that changes sides goes on, and tells the log.
+  Builds agree as far as their C libraries do (density control calls exp and log) and no -ffast-math or x87 is in
+  play: the implementation turns the compiler's own fusing of products and sums off.
 
 ERRORS
   Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
