@@ -46,7 +46,7 @@ done
 row tcc '' '' tcc ''
 row musl '' "$few" 'musl-gcc -static' -O2
 row i686 '' "$few" 'i686-linux-gnu-gcc -static' -O2
-row mingw wine64 "$few" x86_64-w64-mingw32-gcc '-O2 -static'
+row mingw wine "$few" x86_64-w64-mingw32-gcc '-O2 -static'
 for machine in aarch64:linux-gnu arm:linux-gnueabihf riscv64:linux-gnu s390x:linux-gnu powerpc64:linux-gnu; do
     emulator=$(echo "${machine%%:*}" | sed 's/^powerpc/ppc/')
     row "${machine%%:*}" "qemu-$emulator" "$few" "${machine%%:*}-${machine##*:}-gcc -static" -O2

@@ -129,6 +129,7 @@ static inline int gold_open(gold_file *file, const char *name)
     const char *folder = getenv("SSDGS_GOLDEN");
     char magic[8];
     uint32_t i, k, count;
+    size_t at;
     int ok;
     FILE *stream;
     file->count = 0;
@@ -146,6 +147,12 @@ static inline int gold_open(gold_file *file, const char *name)
         array->data = (double *)malloc(array->count * sizeof(double) + 1);
         file->count++;
         ok = ok && array->data && fread(array->data, sizeof(double), array->count, stream) == array->count;
+        for (at = 0; ok && at < array->count; at++) { /* lowest byte first in the file, whatever the machine */
+            const unsigned char *bytes = (const unsigned char *)(array->data + at);
+            uint64_t word = 0;
+            for (k = 8; k-- > 0;) word = word << 8 | bytes[k];
+            memcpy(array->data + at, &word, sizeof word);
+        }
     }
     if (stream) fclose(stream);
     if (!test_check(ok, file->path, 0, "a golden file that can be read")) gold_close(file);
