@@ -321,7 +321,7 @@ static int blend(const splat *p, int n, double x, double y, double (*color)[3], 
 
 typedef struct errors { double most, sum, count; int unsure, pixels; } errors;
 
-static void tell(errors *e, double error) {
+static void count_error(errors *e, double error) {
     e->most = error <= e->most ? e->most : error; /* NaN is the most */
     e->sum += error, e->count++;
 }
@@ -331,7 +331,7 @@ static void compare(const planes *got, double (*want)[5], const unsigned char *s
     for (i = 0; i < pixels; i++)
         for (c = 0; sure[i] && c < 5; c++) {
             const double value = (double)(c < 3 ? got->color[3 * i + c] : c < 4 ? got->alpha[i] : got->depth[i]);
-            tell(e, fabs(value - want[i][c]));
+            count_error(e, fabs(value - want[i][c]));
         }
 }
 
@@ -551,9 +551,9 @@ static void test_light(int rounds) {
             }
             for (i = 0; i < s.count; i++) {
                 if (truth.doubt[i]) continue;
-                tell(&v, fabs((double)frame.visibility[i] - truth.v[i]));
-                tell(&cue, fabs((double)frame.depth_cue[i] - truth.cue[i]));
-                if (truth.flux[i] > 1e-9) tell(&flux, fabs((double)frame.flux[i] / truth.flux[i] - 1));
+                count_error(&v, fabs((double)frame.visibility[i] - truth.v[i]));
+                count_error(&cue, fabs((double)frame.depth_cue[i] - truth.cue[i]));
+                if (truth.flux[i] > 1e-9) count_error(&flux, fabs((double)frame.flux[i] / truth.flux[i] - 1));
             }
             ssdgs_model_destroy(model);
             for (i = 0; i < s.count && !truth.doubt[i]; i++) {}

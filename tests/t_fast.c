@@ -251,10 +251,10 @@ static int all_rows(const ssdgs_real *rows, int count, uint16_t *list) {
 
 /* A network half of whose neurons are dead in the block gives the bits of one in which nothing is left out, both ways. */
 static void test_dead_neurons(void) {
-    enum { IN = 20, WIDE = 37, OUT = 3, WEIGHTS = (IN + 1) * WIDE + (WIDE + 1) * WIDE + (WIDE + 1) * OUT };
-    static const int sizes[4] = {IN, WIDE, WIDE, OUT};
-    static ssdgs_real weights[WEIGHTS], inputs[IN * SSDGS__BLOCK], outputs[2][(2 * WIDE + OUT) * SSDGS__BLOCK];
-    static ssdgs_real gradient[2][(32 + 16) * WIDE + (48 + 16) * (WIDE + OUT)], d[2][64 * SSDGS__BLOCK], spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
+    enum { INS = 20, WIDE = 37, OUTS = 3, WEIGHTS = (INS + 1) * WIDE + (WIDE + 1) * WIDE + (WIDE + 1) * OUTS };
+    static const int sizes[4] = {INS, WIDE, WIDE, OUTS};
+    static ssdgs_real weights[WEIGHTS], inputs[INS * SSDGS__BLOCK], outputs[2][(2 * WIDE + OUTS) * SSDGS__BLOCK];
+    static ssdgs_real gradient[2][(32 + 16) * WIDE + (48 + 16) * (WIDE + OUTS)], d[2][64 * SSDGS__BLOCK], spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
     static ssdgs_real sums[WEIGHTS];
     int isa, i, part;
     for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
@@ -264,8 +264,8 @@ static void test_dead_neurons(void) {
         ssdgs_real *dinputs[2];
         if (!table) continue;
         for (i = 0; i < WEIGHTS; i++) weights[i] = (ssdgs_real)(draw((uint64_t)i) - 0.5);
-        for (i = 0; i < IN * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
-        for (i = 0; i < WIDE; i += 2) weights[IN * WIDE + i] = weights[(IN + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
+        for (i = 0; i < INS * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
+        for (i = 0; i < WIDE; i += 2) weights[INS * WIDE + i] = weights[(INS + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
         for (part = 0; part < 2; part++) {
             k = *table;
             if (part) k.live_rows = all_rows;
@@ -273,16 +273,16 @@ static void test_dead_neurons(void) {
             memset(gradient[part], 0, sizeof gradient[part]);
             ssdgs__network_forward(&k, sizes, 3, weights, NULL, NULL, &lists, inputs, outputs[part]);
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
-            for (i = 0; i < OUT * SSDGS__BLOCK; i++) d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
+            for (i = 0; i < OUTS * SSDGS__BLOCK; i++) d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
             dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part], spare, transposed, &lists,
-                                                    IN, gradient[part]);
+                                                    INS, gradient[part]);
             if (dinputs[part] == spare) memcpy(d[part], spare, sizeof spare);
         }
         CHECK(!memcmp(outputs[0], outputs[1], sizeof outputs[0]));
         CHECK(!memcmp(gradient[0], gradient[1], sizeof gradient[0]));
-        CHECK(!memcmp(d[0], d[1], IN * SSDGS__BLOCK * sizeof d[0][0]));
+        CHECK(!memcmp(d[0], d[1], INS * SSDGS__BLOCK * sizeof d[0][0]));
         ssdgs__sum_slots(sizes, 3, gradient[0], 0, 1, 0, 1, sums);
-        CHECK(sums[IN * WIDE + 1] != 0 && sums[IN * WIDE] == 0);
+        CHECK(sums[INS * WIDE + 1] != 0 && sums[INS * WIDE] == 0);
     }
 }
 
