@@ -2916,7 +2916,7 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
             p.a_row = SSDGS__BLOCK;
             p.a_k = 1;
             p.b = transposed;
-            p.b_stride = padded + 16;
+            p.b_stride = padded + 16; /* multiples of 256 would share a few cache sets */
             p.rows = live_out;
             p.row_list = outs;
             p.columns = (int)padded;
@@ -6228,7 +6228,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     if (!result) {
         if (head.fused != own.fused && context->logger.write)
             context->logger.write(context->logger.user, SSDGS_OK,
-                                  "the checkpoint was written by code that rounds otherwise (FMA or none): the run goes on, not bit for bit");
+                                  "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
@@ -6444,8 +6444,10 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     __m256 ab = _mm256_add_ps(_mm256_permute2f128_ps(a1, b1, 0x20), _mm256_permute2f128_ps(a1, b1, 0x31));
     __m256 cd = _mm256_add_ps(_mm256_permute2f128_ps(c1, d1, 0x20), _mm256_permute2f128_ps(c1, d1, 0x31));
     __m256 acbd = _mm256_add_ps(_mm256_unpacklo_ps(ab, cd), _mm256_unpackhi_ps(ab, cd));
+    __m128 abcd;
     acbd = _mm256_add_ps(acbd, _mm256_permute_ps(acbd, 0x4E));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm_unpacklo_ps(_mm256_castps256_ps128(acbd), _mm256_extractf128_ps(acbd, 1))));
+    abcd = _mm_unpacklo_ps(_mm256_castps256_ps128(acbd), _mm256_extractf128_ps(acbd, 1));
+    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), abcd));
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
     const __m128 a1 = _mm_add_ps(_mm_add_ps(a[0], a[2]), _mm_add_ps(a[1], a[3]));
     const __m128 b1 = _mm_add_ps(_mm_add_ps(b[0], b[2]), _mm_add_ps(b[1], b[3]));
@@ -7257,8 +7259,8 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
 typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth, multiplied out before the inner loop */
 
 /* The body for a tile's number of rows, 6 at most: a constant in it. */
-#define SSDGS__BY_HEIGHT(rows, tile, ...)   \
-    switch (rows) {                         \
+#define SSDGS__BY_HEIGHT(rows, tile, ...)    \
+    switch (rows) {                          \
         case 6: tile(6, __VA_ARGS__); break; \
         case 5: tile(5, __VA_ARGS__); break; \
         case 4: tile(4, __VA_ARGS__); break; \
@@ -8060,6 +8062,7 @@ static const ssdgs__kernels F(kernels) = {
 #undef VABS
 #undef VDOT3
 #undef F
+#undef SSDGS__BY_HEIGHT
 #undef SSDGS__DENSE_BF16
 #undef SSDGS__FN
 #undef SSDGS__FI
