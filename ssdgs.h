@@ -6098,7 +6098,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->byte_order = 0x01020304u;
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
-    head->fused = trainer->context->isa >= SSDGS_ISA_AVX2;
+    head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
     /* ints, then reals: no padding but at the end */
     head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
                                offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
