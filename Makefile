@@ -88,6 +88,9 @@ test-matrix: ## tests with every compiler and machine at hand (an hour); others 
 fuzz: $(BUILD)/fuzzers/all ## fuzzes each target for FUZZ_SECONDS (1800); needs clang's libFuzzer; findings go to build/fuzzers
 	sh tests/fuzz/run.sh $(BUILD)/fuzzers $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
+mutants: ## changes the backward passes in each of the places that tests/mutants.txt lists: do the tests notice (an hour)
+	sh tests/mutants.sh $(BUILD)
+
 figures: $(TESTS) ## every test at its longest, mutants, fuzzing, coverage, compilers (a day) into tests/FIGURES.md
 	-command -v clang >/dev/null && $(MAKE) $(BUILD)/fuzzers/all
 	sh tests/figures.sh $(BUILD) $(FUZZ_SECONDS) $(FUZZ_TARGETS)
@@ -134,4 +137,4 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
 .PHONY: all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
-	test-c99 test-matrix fuzz figures clean help
+	test-c99 test-matrix fuzz mutants figures clean help

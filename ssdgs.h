@@ -457,7 +457,7 @@ typedef struct ssdgs_load_stats {
 
 #ifndef SSDGS_NO_STDIO
 /* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact.
-   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY. */
+   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
 #endif
@@ -4959,6 +4959,8 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
     ssdgs__ply_cursor cursor;
     int kind;
     if (!model || !path) return SSDGS_ERR_ARGUMENT;
+    if (!model->context->k->finite(model->globals, model->global_count)) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
+            "%s: not written, a parameter of the networks or the ASG is not finite, and no file may hold that", path);
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
     for (kind = 0; kind < SSDGS__PLY_KINDS; kind++) {

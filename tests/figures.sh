@@ -57,8 +57,9 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
     cat <<TEXT
 # Figures
 
-Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q). Rows are those of the stress
-catalogue; every program's first comment says what it measures and against what.
+Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q), of commit
+$(git rev-parse --short HEAD 2>/dev/null || echo unknown). Rows are those of the stress catalogue; every program's first comment says
+what it measures and against what.
 TEXT
     part golden 'Golden values and gradients, float' "$build/t_golden"
     part golden_64 'The same sources in double' "$build/t_golden_64"
@@ -69,7 +70,10 @@ TEXT
     part soak 'Stress: training, determinism' "$build/t_soak" full
     part faults 'Faults and hostile files' "$build/t_faults" full
     part mutants 'Mutants of the backward passes' sh tests/mutants.sh "$build/mutants"
-    if [ -x "$build/fuzzers/all" ]; then part fuzz 'Fuzzing' sh tests/fuzz/run.sh "$build/fuzzers" "$seconds" $targets
+    if [ -x "$build/fuzzers/all" ]; then
+        for target in $targets; do
+            part "fuzz_$target" "Fuzzing: $target" sh tests/fuzz/run.sh "$build/fuzzers" "$seconds" "$target"
+        done
     else absent Fuzzing "clang's libFuzzer"; fi
     if command -v gcovr >/dev/null; then part coverage 'Coverage of ssdgs.h and examples/olat.h' coverage
     else absent Coverage gcovr; fi

@@ -474,10 +474,16 @@ static void test_mending(void) {
     }
     free(file.data);
     ssdgs_model_destroy(back);
-    view.shadow[5] = from_bits(0x7fc00000u);
     file = saved(model);
+    memcpy(file.data + file.size - 4, "\0\0\300\177", 4); /* the last weight: NaN */
     CHECK(refused(file.data, file.size));
     free(file.data);
+    view.shadow[5] = from_bits(0x7fc00000u); /* what would be refused is not written: the old file stays */
+    CHECK(ssdgs_model_save(model, path) == SSDGS_ERR_NONFINITE && strstr(ssdgs_error_message(context), path));
+    file = slurp(path);
+    CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK);
+    free(file.data);
+    ssdgs_model_destroy(back);
     ssdgs_model_destroy(model);
 }
 
