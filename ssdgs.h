@@ -2001,7 +2001,8 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         size = 2 * radius / exp(b->log_scale);
         map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
     }
-    map = (int)((map * detail < 8192 ? map * detail : 8192) + 15) / 16 * 16;
+    size = map * detail < 8192 ? map * detail : 8192;
+    map = size < 16 ? 16 : ((int)size + 15) / 16 * 16;
     for (face = 0; face < faces; face++) {
         ssdgs_splat_view *v = views + face;
         double direction[3], eye[3], f;

@@ -1081,8 +1081,10 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(2, -2, 0, 1);
     static picture finest;
+    ssdgs_render_options coarse = ssdgs_render_options_default();
     double error[2][FINEST];
     int blur, step, sub, i;
+    coarse.light_detail = (ssdgs_real)0.01;
     for (sub = 0; sub < 2; sub++) {
         for (blur = SSDGS_BLUR_FLOOR; blur >= SSDGS_BLUR_ADD; blur--)
             for (step = FINEST; step >= -1; step--) { /* 512 .. 16, then 1, which is rounded up to 16 */
@@ -1092,6 +1094,10 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
                 model = cloud(settings, 300);
                 for (i = 0; sub && i < 300; i++) set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
                 show(model, &camera, &light, 1, NULL, step == FINEST && blur ? &finest : &a);
+                if (step < 0) { /* a hundredth of it too */
+                    show(model, &camera, &light, 1, &coarse, &a);
+                    CHECK(same(&a, &b));
+                }
                 ssdgs_model_destroy(model);
                 if (step == FINEST) continue;
                 if (step < 0) CHECK(same(&a, &b));
