@@ -1050,7 +1050,8 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     ssdgs_settings settings = full();
     ssdgs_model *model, *back = NULL;
     ssdgs_model_view v;
-    size_t i;
+    unsigned char *bytes;
+    size_t i, at, size;
     int k;
     for (k = 0; k < 2; k++) {
         settings.length_unit = (ssdgs_real)(k ? 2e-4 : 0.5);
@@ -1067,10 +1068,15 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     for (k = 0; k < 2; k++) {
         model = cloud(full(), 10);
         v = ssdgs_model_get(model);
-        (k ? v.shadow : v.scattering)[5] = (ssdgs_real)NOT_A_NUMBER;
-        CHECK(!ssdgs_model_save(model, path));
-        CHECK(ssdgs_model_load(context, path, &back, NULL) == SSDGS_ERR_FORMAT && !back);
+        (k ? v.shadow : v.scattering)[5] = 12345;
+        CHECK(!ssdgs_model_save(model, path) && !ssdgs__read_file(context, path, &bytes, &size));
+        for (i = 0, at = size; i + 4 <= size; i++) at = memcmp(bytes + i, "\0\344\100\106", 4) ? at : i; /* 12345 */
+        if (CHECK(at < size)) memcpy(bytes + at, "\0\0\300\177", 4);                              /* NaN */
+        CHECK(ssdgs_model_load_memory(context, bytes, size, &back, NULL) == SSDGS_ERR_FORMAT && !back);
         CHECK(strstr(ssdgs_error_message(context), k ? "shadow" : "scattering"));
+        ssdgs__release(context, bytes);
+        (k ? v.shadow : v.scattering)[5] = (ssdgs_real)NOT_A_NUMBER;
+        CHECK(ssdgs_model_save(model, path) == SSDGS_ERR_NONFINITE);
         remove(path);
         ssdgs_model_destroy(model);
     }
