@@ -657,6 +657,10 @@ typedef struct ssdgs_tile_entry {
     uint32_t gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
 } ssdgs_tile_entry;
 
+/* One Gaussian in one tile. A Gaussian's instances are neighbours, from number `first` on. */
+typedef struct ssdgs_instance { uint32_t place, mask; } ssdgs_instance; /* in tile_list; as there */
+typedef struct ssdgs_instances { uint32_t first, count; } ssdgs_instances;
+
 enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
@@ -679,12 +683,11 @@ typedef struct ssdgs_splat_view {
     /* SSDGS_STAGE_SORT */
     uint32_t *order;            /* (visible) Gaussians, nearest first, ties by index */
     int visible;
-    /* SSDGS_STAGE_BIN: an instance is one Gaussian in one tile; a Gaussian's instances are neighbours */
+    /* SSDGS_STAGE_BIN */
     size_t instance_room;       /* instance numbers in use, with gaps */
     size_t instances;           /* without the gaps */
-    uint32_t *first_instance;   /* (visible) per rank in order */
-    uint32_t *instance_count;   /* (visible) */
-    uint32_t *instance_place;   /* (instance_room) in tile_list */
+    ssdgs_instance *instance;   /* (instance_room) */
+    ssdgs_instances *of_gaussian; /* (n) none where not drawn */
     uint32_t *tile_start;       /* (tiles + 1) places in tile_list */
     ssdgs_tile_entry *tile_list; /* (instances) per tile, nearest first */
     /* SSDGS_STAGE_WALK, camera */
@@ -876,7 +879,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 
 #define SSDGS__BLOCK 64      /* Gaussians shaded together */
-#define SSDGS__AHEAD 12      /* ranks; their records lie anywhere in memory */
+#define SSDGS__AHEAD 12      /* ranks; what is theirs lies anywhere in memory */
 #define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
 #define SSDGS__SUMS SSDGS_SPLAT_SUMS
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
@@ -931,7 +934,7 @@ typedef struct ssdgs__kernels {
     void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *, ssdgs_real *);
     void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *,
                              ssdgs_real *, size_t, ssdgs_real *);
-    int (*bin)(const ssdgs_real *, ssdgs_real, const int *, int, uint32_t *, uint16_t *);
+    void (*bin)(const ssdgs_splat_view *, const uint16_t *, ssdgs_real, int, int, uint32_t);
     void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
@@ -1794,7 +1797,7 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, box, first, count, tile, mask, place, start, list, seen, needed, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed, sums, histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -1814,7 +1817,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 } ssdgs__bounds;
 
 typedef struct ssdgs__frame_memory {
-    ssdgs__buffer views, view_memory, seen, visibility, cue, light_sums, shaded, color, component[5], pixels, transmittance;
+    ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels, transmittance;
     ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, kept_lights, shadow_logit, shadow_known;
@@ -2388,29 +2391,46 @@ static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record,
     }
 }
 
-static void ssdgs__bin_range(const ssdgs_splat_view *v, int chunk, int *begin, int *end) {
-    const int size = (v->visible + SSDGS__BIN_CHUNKS - 1) / SSDGS__BIN_CHUNKS;
-    *begin = chunk * size < v->visible ? chunk * size : v->visible;
-    *end = *begin + size < v->visible ? *begin + size : v->visible;
+/* One of SSDGS__BIN_CHUNKS equal parts of `count` ranks or Gaussians. */
+static void ssdgs__bin_range(int count, int chunk, int *begin, int *end) {
+    const int size = (count + SSDGS__BIN_CHUNKS - 1) / SSDGS__BIN_CHUNKS;
+    *begin = chunk * size < count ? chunk * size : count;
+    *end = *begin + size < count ? *begin + size : count;
 }
 
-/* How many instances a chunk of ranks can have at most. */
+/* The boxes of a chunk of Gaussians, empty where not drawn, and how many instances there can be at most. */
 static void ssdgs__bin_room_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs_splat_view *v = frame->views + view;
-    uint16_t *boxes = (uint16_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->box.memory;
+    ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     uint64_t room = 0;
-    int begin, end, rank, box[4], i;
+    int begin, end, g;
     if (v->kept) return;
-    ssdgs__bin_range(v, chunk, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
-        if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
-        ssdgs__tile_box(v, v->record + (size_t)v->order[rank] * 8, boxes + 4 * (size_t)rank);
-        for (i = 0; i < 4; i++) box[i] = boxes[4 * (size_t)rank + (size_t)i];
-        room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
+    ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
+    for (g = begin; g < end; g++) {
+        uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
+        if (v->depth[g] >= 0) {
+            ssdgs__tile_box(v, v->record + 8 * (size_t)g, box);
+            room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
+        } else {
+            box[0] = box[1] = 1;
+            box[2] = box[3] = 0;
+        }
     }
-    ((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->chunk_room[chunk] = room;
+    m->chunk_room[chunk] = room;
+}
+
+/* The instances of a chunk of Gaussians, from its first number on: tiles for places. */
+static void ssdgs__bin_task(void *data, int index) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    int begin, end;
+    if (frame->views[view].kept) return;
+    ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
+    frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame), begin, end,
+                           (uint32_t)m->chunk_room[chunk]);
 }
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
@@ -2419,29 +2439,24 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
         (size_t)(v->tiles_x * v->tiles_y);
 }
 
-/* Instances of a chunk of ranks, from its first place on; counts them per tile. */
-static void ssdgs__bin_task(void *data, int index) {
+/* How many instances of a chunk of ranks each tile has, and which a rank's are: what ranks own lies anywhere in memory. */
+static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
-    ssdgs_splat_view *v = frame->views + view;
-    uint32_t *histogram = ssdgs__histogram(frame, view, chunk), *tile = (uint32_t *)m->tile.memory;
-    uint16_t *mask = (uint16_t *)m->mask.memory;
-    const uint16_t *boxes = (const uint16_t *)m->box.memory;
-    uint32_t at = (uint32_t)m->chunk_room[chunk];
-    const ssdgs_real threshold = ssdgs__log2_threshold(frame);
-    int begin, end, rank, box[4], count, i;
+    const ssdgs_splat_view *v = frame->views + view;
+    ssdgs_instances *of_rank = (ssdgs_instances *)m->of_rank.memory;
+    uint32_t *histogram = ssdgs__histogram(frame, view, chunk), i;
+    int begin, end, rank, ahead;
     if (v->kept) return;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
-    ssdgs__bin_range(v, chunk, &begin, &end);
+    ssdgs__bin_range(v->visible, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
-        const ssdgs_real *record = v->record + (size_t)v->order[rank] * 8;
-        if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->record + (size_t)v->order[rank + SSDGS__AHEAD] * 8);
-        for (i = 0; i < 4; i++) box[i] = boxes[4 * (size_t)rank + (size_t)i];
-        count = frame->context->k->bin(record, threshold, box, v->tiles_x, tile + at, mask + at);
-        v->first_instance[rank] = at;
-        v->instance_count[rank] = (uint32_t)count;
-        for (i = 0; i < count; i++) histogram[tile[at++]]++;
+        const ssdgs_instances of = v->of_gaussian[v->order[rank]];
+        of_rank[rank] = of;
+        if ((ahead = rank + SSDGS__AHEAD) < end) SSDGS__PREFETCH(v->instance + v->of_gaussian[v->order[ahead]].first);
+        if ((ahead += SSDGS__AHEAD) < end) SSDGS__PREFETCH(v->of_gaussian + v->order[ahead]);
+        for (i = of.first; i < of.first + of.count; i++) histogram[v->instance[i].place]++;
     }
 }
 
@@ -2468,43 +2483,46 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
 
 static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int view = index / SSDGS__BIN_CHUNKS;
+    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
-    const uint32_t *tile = (const uint32_t *)m->tile.memory;
-    const uint16_t *mask = (const uint16_t *)m->mask.memory;
-    ssdgs_splat_view *v = frame->views + view;
-    uint32_t *place = ssdgs__histogram(frame, view, index % SSDGS__BIN_CHUNKS), i;
+    const ssdgs_instances *of_rank = (const ssdgs_instances *)m->of_rank.memory;
+    const ssdgs_splat_view *v = frame->views + view;
+    uint32_t *place = ssdgs__histogram(frame, view, chunk), i;
     int begin, end, rank;
     if (v->kept) return;
-    ssdgs__bin_range(v, index % SSDGS__BIN_CHUNKS, &begin, &end);
-    for (rank = begin; rank < end; rank++)
-        for (i = v->first_instance[rank]; i < v->first_instance[rank] + v->instance_count[rank]; i++) {
-            const uint32_t at = place[tile[i]]++;
-            v->instance_place[i] = at;
+    ssdgs__bin_range(v->visible, chunk, &begin, &end);
+    for (rank = begin; rank < end; rank++) {
+        const ssdgs_instances of = of_rank[rank];
+        if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->instance + of_rank[rank + SSDGS__AHEAD].first);
+        for (i = of.first; i < of.first + of.count; i++) {
+            const uint32_t at = place[v->instance[i].place]++;
+            v->instance[i].place = at;
             v->tile_list[at].gaussian = v->order[rank];
-            v->tile_list[at].mask = mask[i];
+            v->tile_list[at].mask = v->instance[i].mask;
         }
+    }
 }
 
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
+    const size_t n = (size_t)frame->gaussians.count;
+    const int tasks = frame->view_count * SSDGS__BIN_CHUNKS;
     int i, chunk;
     for (i = 0; i < frame->view_count; i++) {
         uint16_t *box;
-        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t,
-                       4 * (size_t)frame->views[i].visible + 4);
+        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t, 4 * n + 4);
         (void)box;
     }
-    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_room_task, frame);
+    ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
-        uint32_t *histogram, *tile;
-        uint16_t *mask;
+        ssdgs_instances *of_rank;
+        uint32_t *histogram;
         uint64_t room = 0, chunk_room;
         if (v->kept) continue;
-        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first place */
+        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first number */
             chunk_room = m->chunk_room[chunk];
             m->chunk_room[chunk] = room;
             room += chunk_room;
@@ -2512,19 +2530,18 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         if (room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d",
                                                       v->width, v->height);
         v->instance_room = (size_t)room;
-        SSDGS__RESERVE(m->first, v->first_instance, uint32_t, v->visible + 1);
-        SSDGS__RESERVE(m->count, v->instance_count, uint32_t, v->visible + 1);
-        SSDGS__RESERVE(m->place, v->instance_place, uint32_t, v->instance_room + 1);
-        SSDGS__RESERVE(m->tile, tile, uint32_t, v->instance_room + 1);
-        SSDGS__RESERVE(m->mask, mask, uint16_t, v->instance_room + 1);
+        SSDGS__RESERVE(m->of_gaussian, v->of_gaussian, ssdgs_instances, n + 1);
+        SSDGS__RESERVE(m->of_rank, of_rank, ssdgs_instances, v->visible + 1);
+        SSDGS__RESERVE(m->instance, v->instance, ssdgs_instance, v->instance_room + 1);
         SSDGS__RESERVE(m->list, v->tile_list, ssdgs_tile_entry, v->instance_room + 1);
         SSDGS__RESERVE(m->start, v->tile_start, uint32_t, tiles + 1);
         SSDGS__RESERVE(m->histogram, histogram, uint32_t, tiles * SSDGS__BIN_CHUNKS);
-        (void)histogram, (void)tile, (void)mask;
+        (void)of_rank, (void)histogram;
     }
-    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_task, frame);
+    ssdgs__parallel(context, tasks, ssdgs__bin_task, frame);
+    ssdgs__parallel(context, tasks, ssdgs__bin_count_task, frame);
     ssdgs__parallel(context, frame->view_count, ssdgs__bin_offsets_task, frame);
-    ssdgs__parallel(context, frame->view_count * SSDGS__BIN_CHUNKS, ssdgs__bin_scatter_task, frame);
+    ssdgs__parallel(context, tasks, ssdgs__bin_scatter_task, frame);
     return SSDGS_OK;
 }
 
@@ -2571,59 +2588,52 @@ static void ssdgs__walk_task(void *data, int index) {
 
 typedef struct ssdgs__gather_job {
     const ssdgs_frame *frame;
-    const ssdgs_splat_view *view;
-    ssdgs_real *sums;
-    int light;
+    int light, first_view, end_view; /* the light's */
 } ssdgs__gather_job;
 
-/* Per Gaussian, the sums over its instances, in their order. */
+/* Per Gaussian, the sums over its instances in the light's views, in their order, and their ratios. */
 static void ssdgs__gather_light_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
-    const ssdgs_splat_view *v = job->view;
-    int begin, end, rank, i;
-    uint32_t instance;
-    ssdgs__bin_range(v, index, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
-        ssdgs_real *sum = job->sums + (size_t)v->order[rank] * 4;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++)
-            for (i = 0; i < 4; i++) sum[i] += v->tile_sums[(size_t)v->instance_place[instance] * 4 + (size_t)i];
-    }
-}
-
-/* The ratios of a chunk of Gaussians under a light. */
-static void ssdgs__visibility_task(void *data, int chunk) {
-    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
-    const size_t n = (size_t)job->frame->gaussians.count, begin = (size_t)chunk * SSDGS__CHUNK;
-    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n, first = n * (size_t)job->light;
-    size_t g;
+    const ssdgs_frame *frame = job->frame;
+    const size_t first = (size_t)frame->gaussians.count * (size_t)job->light;
+    int begin, end, g, view, c;
+    uint32_t i;
+    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
     for (g = begin; g < end; g++) {
-        const ssdgs_real *sum = job->sums + 4 * g;
-        job->frame->visibility[first + g] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
-        job->frame->depth_cue[first + g] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
-        if (job->frame->flux) job->frame->flux[first + g] = sum[3];
+        const size_t at = first + (size_t)g;
+        ssdgs_real sum[4] = {0, 0, 0, 0};
+        for (view = job->first_view; view < job->end_view; view++) {
+            const ssdgs_splat_view *v = frame->views + view;
+            const ssdgs_instances of = v->of_gaussian[g];
+            for (i = of.first; i < of.first + of.count; i++)
+                for (c = 0; c < 4; c++) sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
+        }
+        frame->visibility[at] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
+        frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
+        if (frame->flux) frame->flux[at] = sum[3];
     }
 }
 
 static void ssdgs__gather_camera_task(void *data, int index) {
-    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
-    const ssdgs_splat_view *v = job->view;
-    int begin, end, rank;
-    uint32_t instance;
-    ssdgs__bin_range(v, index, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
+    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs_splat_view *v = frame->views;
+    int begin, end, g;
+    uint32_t i;
+    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
+    for (g = begin; g < end; g++) {
+        const ssdgs_instances of = v->of_gaussian[g];
         unsigned seen = 0, needed = 0;
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
-            const uint32_t place = v->instance_place[instance];
+        for (i = of.first; i < of.first + of.count; i++) {
+            const uint32_t place = v->instance[i].place;
             seen |= v->tile_seen[place];
             needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
         }
-        job->frame->seen[v->order[rank]] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_GLIMPSED : 0);
+        frame->seen[g] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_GLIMPSED : 0);
     }
 }
 
 static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const size_t n = (size_t)frame->gaussians.count;
     ssdgs__gather_job job;
     int i, tiles = 0;
     for (i = 0; i < frame->view_count; i++) {
@@ -2637,21 +2647,15 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
         } else SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
     }
-    SSDGS__RESERVE(frame->memory->light_sums, job.sums, ssdgs_real, n * 4 + 4);
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
+    if (!frame->views->kept) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
     job.frame = frame;
-    job.view = frame->views;
-    if (!job.view->kept) {
-        memset(frame->seen, 0, n);
-        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, &job);
-    }
-    for (job.light = 0, i = 1; job.light < frame->light_count && i < frame->view_count && !frame->views[i].kept; job.light++) {
-        memset(job.sums, 0, n * 4 * sizeof(ssdgs_real));
-        for (; i < frame->view_count && frame->views[i].light == job.light; i++) {
-            job.view = frame->views + i;
-            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
-        }
-        ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__visibility_task, &job);
+    job.end_view = 1;
+    for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count && !frame->views[job.end_view].kept;
+         job.light++) {
+        job.first_view = job.end_view;
+        while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light) job.end_view++;
+        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
     }
     frame->memory->kept.camera_ready = frame->memory->kept.lights_ready = 1;
     return SSDGS_OK;
@@ -3518,15 +3522,19 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__tile tile = ssdgs__tile_of(job->frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
     ssdgs_real pixels[16 * 64];
-    int micro, lane, c;
+    int micro, row, c;
     job->frame->context->k->composite(&tile, job->color, pixels);
     for (micro = 0; micro < 16; micro++)
-        for (lane = 0; lane < 16; lane++) {
-            const int x = tile.x + 4 * (micro & 3) + (lane & 3), y = tile.y + 4 * (micro >> 2) + (lane >> 2);
+        for (row = 0; row < 4; row++) {
+            const int x = tile.x + 4 * (micro & 3), y = tile.y + 4 * (micro >> 2) + row, inside = v->width - x;
             const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
-            if (x >= v->width || y >= v->height) continue;
-            for (c = 0; c < 3; c++) job->pixels[plane * (size_t)c + at] = pixels[micro * 64 + c * 16 + lane];
-            job->transmittance[at] = pixels[micro * 64 + 48 + lane];
+            if (inside <= 0 || y >= v->height) continue;
+            for (c = 0; c < 4; c++) {
+                const ssdgs_real *from = pixels + micro * 64 + c * 16 + 4 * row;
+                ssdgs_real *to = c < 3 ? job->pixels + plane * (size_t)c + at : job->transmittance + at;
+                if (inside >= 4) memcpy(to, from, 4 * sizeof *to);
+                else memcpy(to, from, (size_t)inside * sizeof *to);
+            }
         }
 }
 
@@ -3569,16 +3577,19 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
     const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
-    int begin, end, rank, i;
-    uint32_t instance;
-    ssdgs__bin_range(v, index, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
-        const size_t g = v->order[rank];
-        const ssdgs_real *r = v->record + 8 * g, a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
-        ssdgs_real sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
+    int begin, end, i;
+    size_t g;
+    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
+    for (g = (size_t)begin; g < (size_t)end; g++) {
+        const ssdgs_instances of = v->of_gaussian[g];
+        const ssdgs_real *r = v->record + 8 * g;
+        ssdgs_real a, b, c, sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
+        uint32_t instance;
+        if (!of.count) continue;
+        a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
         memset(sum, 0, sizeof sum);
-        for (instance = v->first_instance[rank]; instance < v->first_instance[rank] + v->instance_count[rank]; instance++) {
-            const uint32_t place = v->instance_place[instance];
+        for (instance = of.first; instance < of.first + of.count; instance++) {
+            const uint32_t place = v->instance[instance].place;
             for (i = 0; v->tile_seen[place] && i < SSDGS__SUMS; i++) sum[i] += v->tile_sums[(size_t)place * SSDGS__SUMS + (size_t)i];
         }
         /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
@@ -6824,34 +6835,48 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
 
 /* ==== >>bin_kernel  which 4x4 micro-tiles an ellipse touches ==== */
 
-/* The tiles of a record's box with pixels where alpha may reach the threshold, row by row: their numbers and their micro-tiles
-   (lanes here). Over the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
-   the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. Returns how many. */
-SSDGS__FN int F(bin)(const R *record, R log2_threshold, const int *box, int tiles_x, uint32_t *tile, uint16_t *mask) {
+/* The instances of the Gaussians from begin to end, from number `at` on. Of a Gaussian's box they are the tiles with pixels where
+   alpha may reach the threshold, row by row, and their micro-tiles (lanes here). Over the rectangle of a micro-tile's pixel
+   centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on the sides that face the centre: nearest dx with the best dy
+   for it, or nearest dy with the best dx. */
+SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin, int end, uint32_t at) {
     const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
-    const V a = VSET(record[2] * margin), b = VSET(record[3]), c = VSET(record[4] * margin), zero = VSET(0), side = VSET(3);
-    const V best_x = VSET(-record[3] / (2 * record[2])), best_y = VSET(-record[3] / (2 * record[4]));
-    const V least = VSET(log2_threshold - record[5] - (R)1e-3);
-    const int wide = box[2] - box[0] + 1;
-    int left = wide * (box[3] - box[1] + 1), tx = box[0], ty = box[1], count = 0, v;
-    for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
-        unsigned touched = 0;
-        SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-            V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
-            V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
-            V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
-            V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
-            V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
-            V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
-            touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
+    const V zero = VSET(0), side = VSET(3);
+    int g, v;
+    for (g = begin; g < end; g++) {
+        const R *record = view->record + 8 * (size_t)g;
+        const uint16_t *box = boxes + 4 * (size_t)g;
+        ssdgs_instances *of = view->of_gaussian + g;
+        int left = (box[2] - box[0] + 1) * (box[3] - box[1] + 1), tx = box[0], ty = box[1];
+        V a, b, c, best_x, best_y, least;
+        of->first = at;
+        of->count = 0;
+        if (!left) continue;
+        a = VSET(record[2] * margin);
+        b = VSET(record[3]);
+        c = VSET(record[4] * margin);
+        best_x = VSET(-record[3] / (2 * record[2]));
+        best_y = VSET(-record[3] / (2 * record[4]));
+        least = VSET(log2_threshold - record[5] - (R)1e-3);
+        for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
+            unsigned touched = 0;
+            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
+                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
+                V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
+                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
+                V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
+                V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
+                touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
+            }
+            view->instance[at].place = (uint32_t)(ty * view->tiles_x + tx);
+            view->instance[at].mask = touched;
+            at += touched != 0;
+            ty += tx == box[2];
+            tx = tx == box[2] ? box[0] : tx + 1;
         }
-        tile[count] = (uint32_t)(ty * tiles_x + tx);
-        mask[count] = (uint16_t)touched;
-        count += touched != 0;
-        ty += tx == box[2];
-        tx = tx == box[2] ? box[0] : tx + 1;
+        of->count = at - of->first;
     }
-    return count;
 }
 
 /* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ====
