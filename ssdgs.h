@@ -769,7 +769,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
-#if __clang_major__ >= 12
+#if __clang_major__ >= 12 && !defined(__wasm__)
 #pragma float_control(precise, on, push)
 #endif
 #elif defined(__GNUC__) && !defined(__TINYC__)
@@ -6259,7 +6259,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #endif /* SSDGS_NO_TRAINER */
 
 #if defined(__clang__)
-#if __clang_major__ >= 12
+#if __clang_major__ >= 12 && !defined(__wasm__)
 #pragma float_control(pop)
 #endif
 #pragma STDC FP_CONTRACT DEFAULT
