@@ -1,7 +1,8 @@
 #!/bin/sh
 # sh tests/figures.sh BUILD FUZZ_SECONDS FUZZ_TARGET...: runs the tests at their longest and writes BUILD/figures/FIGURES.md and
 # BUILD/figures.json from what they print ("figure KEY VALUE", "row NN passed|failed NAME"). Hours; a part whose log is there
-# already is not repeated: delete it to have it again. What the machine lacks (clang's libFuzzer, gcovr) is left out and named.
+# already is not repeated: delete it to have it again. With - for FUZZ_SECONDS nothing is run, and what has no log is named. What
+# the machine lacks (clang's libFuzzer, gcovr) is left out and named.
 set -u
 build=$1 seconds=$2
 shift 2
@@ -12,9 +13,14 @@ mkdir -p "$out"
 part() {
     name=$1 title=$2 log=$out/$1.log
     shift 2
+    if [ ! -f "$log" ] && [ "$seconds" = - ]; then
+        printf '\n## %s\n\nNot measured yet.\n' "$title"
+        return
+    fi
     if [ ! -f "$log" ]; then
         echo "$name: $*" >&2
-        "$@" >"$log.part" 2>&1
+        echo "commit $(git rev-parse --short HEAD 2>/dev/null || echo unknown)" >"$log.part"
+        "$@" >>"$log.part" 2>&1
         echo "exit $?" >>"$log.part"
         mv "$log.part" "$log"
     fi
@@ -30,6 +36,7 @@ part() {
         /^hash / { hash[++m] = $0 }
         /^[0-9]+ passed, [0-9]+ failed$/ { last = $0 }
         /: ([0-9]+ passed, [0-9]+ failed|absent.*|no result.*)$/ { line[++k] = $0 }
+        /^commit / { commit = $2 }
         /^exit / { code = $2 }
         END {
             if (n) printf "\n| figure | |\n| --- | --- |\n"
@@ -38,7 +45,7 @@ part() {
             for (i = 1; i <= m; i++) printf "    %s\n", hash[i]
             if (k) printf "\n"
             for (i = 1; i <= k; i++) printf "- %s\n", line[i]
-            if (last) printf "\n%s.\n", last
+            printf "\nAt commit %s%s.\n", commit, last ? ": " last : ""
             if (code != 0) printf "\nEnded with exit status %s.\n", code
         }' "$log"
 }
@@ -57,9 +64,8 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
     cat <<TEXT
 # Figures
 
-Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q), of commit
-$(git rev-parse --short HEAD 2>/dev/null || echo unknown). Rows are those of the stress catalogue; every program's first comment says
-what it measures and against what.
+Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q). Rows are those of the stress
+catalogue; every program's first comment says what it measures and against what.
 TEXT
     part golden 'Golden values and gradients, float' "$build/t_golden"
     part golden_64 'The same sources in double' "$build/t_golden_64"

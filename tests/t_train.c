@@ -426,7 +426,7 @@ static void test_refusals(void) {
     desc.allocator.allocate = ssdgs__default_allocate;
     CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ARGUMENT);
     memset(&desc, 0, sizeof desc);
-    desc.isa = (ssdgs_isa)99;
+    desc.isa = SSDGS_ISA_COUNT;
     CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ISA);
     CHECK(!ssdgs_context_create(NULL, &context));
 #define REFUSED(code, call) do { CHECK((call) == (code)); CHECK(*ssdgs_error_message(context)); context->message[0] = 0; } while (0)
