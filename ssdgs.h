@@ -5669,31 +5669,38 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 /* ==== >>steps  the trainer's public functions ==== */
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
+    static const char *const names[12] = {"position", "opacity", "scale", "rotation", "color", "asg", "frame", "material", "shadow",
+        "scattering", "camera_rate", "light_rate"};
     const ssdgs_rate rates[12] = {o->position, o->opacity, o->scale, o->rotation, o->color, o->asg, o->frame, o->material,
-        o->shadow, o->scattering,
-                                  o->camera_rate, o->light_rate};
+        o->shadow, o->scattering, o->camera_rate, o->light_rate};
+    const ssdgs_real most = (ssdgs_real)1e30;
     int i;
     if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
             "train options: not made by ssdgs_train_options_default()");
-    if (o->iterations < 1 || o->iterations > 100000000) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            "train options: %d iterations", o->iterations);
-    if (o->max_gaussians < 1 || o->max_gaussians > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            "train options: max_gaussians = %d", o->max_gaussians);
-    if (o->densify_every < 1 || o->opacity_reset_every < 0 || o->schedule < 0 || o->schedule > SSDGS_SCHEDULE_MERGED)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: densify_every, opacity_reset_every or schedule is out of range");
-    if (!(o->dssim >= 0 && o->dssim <= 1) || !(o->prune_opacity > 0 && o->prune_opacity < 1) || !(o->densify_size > 0) || !(o->densify_shadow >= 0))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: dssim, prune_opacity, densify_size or densify_shadow is out of range");
-    if (!(o->prune_weight >= 0) || !ssdgs__finite(o->prune_weight)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            "train options: prune_weight is negative or not finite");
-    if (!(o->densify_gradient >= 0)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            "train options: densify_gradient is negative");
+#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", o, field, low, high)
+    SSDGS__RANGE(iterations, 1, 100000000);
+    SSDGS__RANGE(schedule, 0, SSDGS_SCHEDULE_MERGED);
+    SSDGS__RANGE(max_gaussians, 1, SSDGS__MAX_GAUSSIANS);
+    SSDGS__RANGE(densify_every, 1, 2000000000);
+    SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
+    SSDGS__RANGE(dssim, 0, 1);
+    SSDGS__RANGE(densify_gradient, 0, most);
+    SSDGS__RANGE(densify_size, (ssdgs_real)1e-30, most);
+    SSDGS__RANGE(densify_shadow, 0, most);
+    SSDGS__RANGE(prune_opacity, (ssdgs_real)1e-30, (ssdgs_real)0.999);
+    SSDGS__RANGE(prune_weight, 0, most);
+#undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
-        if (!(rates[i].start >= 0) || !(rates[i].end >= 0) || !ssdgs__finite(rates[i].start) || !ssdgs__finite(rates[i].end))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: a learning rate is negative or not finite");
-    for (i = 0; i < 3; i++)
-        if (!ssdgs__finite(o->bounds_min[i]) || !ssdgs__finite(o->bounds_max[i]) || !(o->bounds_min[i] < o->bounds_max[i]) ||
-            !ssdgs__finite(o->background[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds or background");
+        if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: %s = %g, %g: rates must be finite and not negative",
+                               names[i], (double)rates[i].start, (double)rates[i].end);
+    for (i = 0; i < 3; i++) {
+        if (!(o->bounds_min[i] >= -most && o->bounds_max[i] <= most && o->bounds_min[i] < o->bounds_max[i]))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds_min[%d] = %g is not below bounds_max[%d] = %g", i,
+                               (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
+        if (!ssdgs__finite(o->background[i])) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                "train options: background[%d] is not finite", i);
+    }
     return SSDGS_OK;
 }
 
@@ -6939,6 +6946,7 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
     *dx = VSUB(px, VSET(record[0]));
     *dy = VSUB(py, VSET(record[1]));
     p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy, VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
+    p = VMIN(VSET(record[5]), p); /* of a needle with its centre far away p is a small difference of large terms */
     *drawn = VGE(p, log2_threshold);
     *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));

@@ -2,7 +2,7 @@
 # sh tests/figures.sh BUILD FUZZ_SECONDS FUZZ_TARGET...: runs the tests at their longest and writes BUILD/figures/FIGURES.md and
 # BUILD/figures.json from what they print ("figure KEY VALUE", "row NN passed|failed NAME"). Hours; a part whose log is there
 # already is not repeated: delete it to have it again. With - for FUZZ_SECONDS nothing is run, and what has no log is named. What
-# the machine lacks (clang's libFuzzer, gcovr) is left out and named.
+# the machine lacks (clang's libFuzzer, gcov) is left out and named.
 set -u
 build=$1 seconds=$2
 shift 2
@@ -36,6 +36,7 @@ part() {
         /^hash / { hash[++m] = $0 }
         /^[0-9]+ passed, [0-9]+ failed$/ { last = $0 }
         /: ([0-9]+ passed, [0-9]+ failed|absent.*|no result.*)$/ { line[++k] = $0 }
+        /^never taken: / { split($3, at, ":"); if (at[1] != name) line[++k] = name = at[1]; line[k] = line[k] " " at[2] }
         /^commit / { commit = $2 }
         /^exit / { code = $2 }
         END {
@@ -51,13 +52,6 @@ part() {
 }
 
 absent() { printf '\n## %s\n\nNot measured: %s is missing.\n' "$1" "$2"; }
-
-coverage() { # of all tests together, on the kernels of AVX2
-    make -j2 test BUILD="$build/coverage" CC=gcc CFLAGS='-O0 --coverage -DSSDGS_NO_AVX512' LDLIBS='-lm -lpthread --coverage' BUILDS= &&
-        gcovr -r . --object-directory "$build/coverage" --filter ssdgs.h --filter examples/olat.h --branches --json-summary-pretty \
-            --merge-mode-functions=separate >"$out/coverage.json" &&
-        sed -n 's/^ *"branch_percent": \([0-9.]*\).*/figure branch_coverage_percent \1/p' "$out/coverage.json" | tail -n 1
-}
 
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
 {
@@ -81,8 +75,8 @@ TEXT
             part "fuzz_$target" "Fuzzing: $target" sh tests/fuzz/run.sh "$build/fuzzers" "$seconds" "$target"
         done
     else absent Fuzzing "clang's libFuzzer"; fi
-    if command -v gcovr >/dev/null; then part coverage 'Coverage of ssdgs.h and examples/olat.h' coverage
-    else absent Coverage gcovr; fi
+    if command -v gcov >/dev/null; then part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
+    else absent Coverage gcov; fi
     part matrix 'Compilers and machines' sh tests/matrix.sh "$build"
 } >"$out/FIGURES.md"
 

@@ -992,7 +992,7 @@ static void true_conic(int n, double variance, double conic[3]) {
 }
 
 /* Records of giants and needles against long double; the exponent over the screen must not be positive. In float it is, for
-   needles of more than 2000 : 1, by the rounding of the conic's entries times (px from the centre)^2. */
+   needles of more than 2000 : 1, by the rounding of the conic's entries times (px from the centre)^2; the walks cut that off. */
 static void test_conic(int step) {
     static ssdgs_real record[TURNS][8], depth[TURNS];
     double worst = 0, excess = -1, needle_excess = 0;

@@ -1,0 +1,216 @@
+/* What makes no sense is refused and named: every setting and option just outside of its range, and NaN; every argument that is
+   missing. The ends of the ranges are taken. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+typedef struct field { const char *name; size_t at; int real; double low, high; } field;
+#define WHOLE(type, name, low, high) {#name, offsetof(type, name), 0, low, high}
+#define REAL(type, name, low, high) {#name, offsetof(type, name), 1, low, high}
+
+static const field settings_fields[] = {
+#define I(name, low, high) WHOLE(ssdgs_settings, name, low, high)
+#define R(name, low, high) REAL(ssdgs_settings, name, low, high)
+    I(terms, 0, 15), I(baked, 0, 1), I(transfer, 0, 1), I(dipole, 0, 3), I(asg, 0, 1), I(per_channel_optics, 0, 1),
+    I(depth_cue, 0, 1), I(transport, 0, 1), I(residual_shadow, 0, 1), I(shadow_on_scattering, 0, 1), I(scattering_layers, 2, 16),
+    I(scattering_width, 1, 1024), I(view_octaves, 0, 8), I(light_octaves, 0, 8), I(shadow_layers, 0, 16),
+    I(shadow_width, 1, 1024), I(light_blur, 0, 1), I(light_map_size, 0, 8192), R(light_bias, 0, 1e30),
+    R(pixel_variance, 0.01, 10), R(eta, 1, 2.5), R(length_unit, 1e-15, 1e15), R(light_scale, 0, 1e30), R(centre[0], -1e30, 1e30),
+    R(centre[1], -1e30, 1e30), R(centre[2], -1e30, 1e30)
+#undef I
+#undef R
+};
+static const field render_fields[] = {
+#define R(name, low, high) REAL(ssdgs_render_options, name, low, high)
+    R(stop, 0, 1), R(alpha_threshold, 0, 1), R(max_error, 0, 1), R(light_detail, 0.01, 8)
+#undef R
+};
+static const field train_fields[] = {
+#define I(name, low, high) WHOLE(ssdgs_train_options, name, low, high)
+#define R(name, low, high) REAL(ssdgs_train_options, name, low, high)
+#define RATE(name) R(name.start, 0, 1e30), R(name.end, 0, 1e30)
+    I(iterations, 1, 100000000), I(schedule, 0, 3), I(max_gaussians, 1, 1 << 28), I(densify_every, 1, 2000000000),
+    I(opacity_reset_every, 0, 2000000000), R(dssim, 0, 1), R(densify_gradient, 0, 1e30), R(densify_size, 1e-30, 1e30),
+    R(densify_shadow, 0, 1e30), R(prune_opacity, 1e-30, 0.999), R(prune_weight, 0, 1e30), RATE(position), RATE(opacity),
+    RATE(scale), RATE(rotation), RATE(color), RATE(asg), RATE(frame), RATE(material), RATE(shadow), RATE(scattering),
+    RATE(camera_rate), RATE(light_rate)
+#undef I
+#undef R
+};
+
+static ssdgs_context *context;
+static ssdgs_model *model;
+static ssdgs_photo photo;
+static ssdgs_settings settings;
+static ssdgs_render_options render_options;
+static ssdgs_train_options train_options;
+static ssdgs_real color[4 * 4 * 3];
+
+static ssdgs_image picture(void) {
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    return image;
+}
+
+static ssdgs_result make_model(void) {
+    ssdgs_model *made = NULL;
+    const ssdgs_result result = ssdgs_model_create(context, &settings, 0, &made);
+    CHECK(!result == (made != NULL));
+    ssdgs_model_destroy(made);
+    return result;
+}
+
+static ssdgs_result render(void) {
+    const ssdgs_image image = picture();
+    return ssdgs_render_ex(model, &photo.camera, &photo.light, 1, &render_options, &image, NULL);
+}
+
+static ssdgs_result make_trainer(void) {
+    ssdgs_trainer *made = NULL;
+    const ssdgs_result result = ssdgs_trainer_create(model, &photo, 1, &train_options, &made);
+    CHECK(!result == (made != NULL));
+    ssdgs_trainer_destroy(made);
+    return result;
+}
+
+/* Each field of the options in turn at its ends and beyond; `use` is what looks at them. */
+static void check_ranges(const field *f, size_t count, void *options, ssdgs_result (*use)(void)) {
+    for (; count--; f++) {
+        unsigned char *at = (unsigned char *)options + f->at, kept[sizeof(ssdgs_real)];
+        const double below = !f->real ? f->low - 1 : f->low > 0 ? f->low / 2 : f->low < 0 ? f->low * 1.01 : -1e-3;
+        const double values[5] = {f->low, f->high, below, f->real ? f->high * 1.01 : f->high + 1, f->real ? (double)NAN : f->low - 1};
+        int i;
+        memcpy(kept, at, sizeof kept);
+        for (i = 0; i < 5; i++) {
+            const ssdgs_real real = (ssdgs_real)values[i];
+            const int whole = f->real ? 0 : (int)values[i];
+            if (f->real) memcpy(at, &real, sizeof real);
+            else memcpy(at, &whole, sizeof whole);
+            if (!CHECK(i < 2 ? !use() : use() == SSDGS_ERR_ARGUMENT &&
+                       strstr(ssdgs_error_message(context), strchr(f->name, '.') ? ": rates " : f->name)))
+                printf("    %s = %g: %s\n", f->name, values[i], ssdgs_error_message(context));
+        }
+        memcpy(at, kept, sizeof kept);
+    }
+}
+
+static void test_bounds(void) {
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 4; k++) {
+            const ssdgs_train_options kept = train_options;
+            if (k == 0) train_options.bounds_min[i] = train_options.bounds_max[i];
+            if (k == 1) train_options.bounds_min[i] = (ssdgs_real)NAN;
+            if (k == 2) train_options.bounds_max[i] = (ssdgs_real)HUGE_VAL;
+            if (k == 3) train_options.background[i] = (ssdgs_real)NAN;
+            CHECK(make_trainer() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), k < 3 ? "bounds_min" : "background"));
+            train_options = kept;
+        }
+}
+
+#define MISSING(call) CHECK((call) == SSDGS_ERR_ARGUMENT)
+
+static void test_missing(void) {
+    static unsigned char byte = 0;
+    const ssdgs_image image = picture();
+    const ssdgs_real *background = train_options.background;
+    ssdgs_camera camera = photo.camera;
+    ssdgs_light light = photo.light;
+    ssdgs_model *made = model;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_metrics metrics;
+    ssdgs_image narrow = image;
+    ssdgs_photo bad = photo;
+    MISSING(ssdgs_context_create(NULL, NULL));
+    ssdgs_context_destroy(NULL);
+    ssdgs_model_destroy(NULL);
+    ssdgs_trainer_destroy(NULL);
+    CHECK(*ssdgs_error_message(NULL) && *ssdgs_result_string(SSDGS_RESULT_COUNT) && *ssdgs_isa_string(SSDGS_ISA_COUNT));
+    MISSING(ssdgs_model_create(NULL, NULL, 0, &made));
+    MISSING(ssdgs_model_create(context, NULL, 0, NULL));
+    MISSING(ssdgs_model_load_memory(NULL, &byte, 1, &made, NULL));
+    MISSING(ssdgs_model_load_memory(context, NULL, 1, &made, NULL));
+    MISSING(ssdgs_model_load_memory(context, &byte, 1, NULL, NULL));
+    MISSING(ssdgs_model_load(NULL, "build/none", &made, NULL));
+    MISSING(ssdgs_model_load(context, NULL, &made, NULL));
+    MISSING(ssdgs_model_load(context, "build/none", NULL, NULL));
+    CHECK(!made);
+    MISSING(ssdgs_model_save(NULL, "build/none"));
+    MISSING(ssdgs_model_save(model, NULL));
+    MISSING(ssdgs_render(NULL, &camera, &light, 1, &image));
+    MISSING(ssdgs_render(model, NULL, &light, 1, &image));
+    MISSING(ssdgs_render(model, &camera, &light, 1, NULL));
+    MISSING(ssdgs_render(model, &camera, NULL, 1, &image));
+    narrow.stride = camera.width - 1;
+    MISSING(ssdgs_render(model, &camera, &light, 1, &narrow));
+    MISSING(ssdgs_compare(NULL, color, color, 4, 4, &metrics));
+    MISSING(ssdgs_compare(context, NULL, color, 4, 4, &metrics));
+    MISSING(ssdgs_compare(context, color, NULL, 4, 4, &metrics));
+    MISSING(ssdgs_compare(context, color, color, 0, 4, &metrics));
+    MISSING(ssdgs_compare(context, color, color, 4, 0, &metrics));
+    MISSING(ssdgs_compare(context, color, color, 40000, 4, &metrics));
+    MISSING(ssdgs_compare(context, color, color, 4, 40000, &metrics));
+    MISSING(ssdgs_compare(context, color, color, 4, 4, NULL));
+    MISSING(ssdgs_trainer_create(NULL, &photo, 1, NULL, &trainer));
+    MISSING(ssdgs_trainer_create(model, &photo, 1, NULL, NULL));
+    MISSING(ssdgs_trainer_create(model, NULL, 1, NULL, &trainer));
+    MISSING(ssdgs_trainer_create(model, &photo, 0, NULL, &trainer));
+    bad.pixels = NULL;
+    MISSING(ssdgs_trainer_create(model, &bad, 1, NULL, &trainer));
+    bad = photo;
+    bad.camera.width = 0;
+    MISSING(ssdgs_trainer_create(model, &bad, 1, NULL, &trainer));
+    MISSING(ssdgs_evaluate(model, &bad, background, NULL, &metrics));
+    CHECK(!trainer);
+    MISSING(ssdgs_evaluate(NULL, &photo, background, NULL, &metrics));
+    MISSING(ssdgs_evaluate(model, NULL, background, NULL, &metrics));
+    MISSING(ssdgs_evaluate(model, &photo, NULL, NULL, &metrics));
+    MISSING(ssdgs_evaluate(model, &photo, background, NULL, NULL));
+    MISSING(ssdgs_refine_photo(NULL, &bad, background, 1));
+    MISSING(ssdgs_refine_photo(model, NULL, background, 1));
+    MISSING(ssdgs_refine_photo(model, &bad, NULL, 1));
+    MISSING(ssdgs_refine_photo(model, &bad, background, -1));
+    CHECK(!ssdgs_trainer_create(model, &photo, 1, NULL, &trainer));
+    MISSING(ssdgs_trainer_step(NULL, NULL));
+    MISSING(ssdgs_trainer_run(NULL, NULL, NULL));
+    MISSING(ssdgs_trainer_refined(NULL, 0, &camera, &light));
+    MISSING(ssdgs_trainer_refined(trainer, -1, &camera, &light));
+    MISSING(ssdgs_trainer_refined(trainer, 1, &camera, &light));
+    MISSING(ssdgs_trainer_refined(trainer, 0, NULL, &light));
+    MISSING(ssdgs_trainer_refined(trainer, 0, &camera, NULL));
+    MISSING(ssdgs_trainer_save(NULL, "build/none"));
+    MISSING(ssdgs_trainer_save(trainer, NULL));
+    MISSING(ssdgs_trainer_load(NULL, "build/none"));
+    MISSING(ssdgs_trainer_load(trainer, NULL));
+    ssdgs_trainer_destroy(trainer);
+    CHECK(!ssdgs_train_memory(NULL, &train_options, 4, 4) && !ssdgs_train_memory(&settings, NULL, 4, 4));
+    CHECK(!ssdgs_train_memory(&settings, &train_options, 0, 4) && !ssdgs_train_memory(&settings, &train_options, 4, 0));
+    settings.baked = 1;
+    CHECK(!ssdgs_model_create(context, &settings, 0, &made));
+    MISSING(ssdgs_trainer_create(made, &photo, 1, NULL, &trainer)); /* baked colours do not learn */
+    settings.baked = 0;
+    ssdgs_model_destroy(made);
+}
+
+int main(void) {
+    static unsigned char pixels[4 * 4 * 4];
+    const ssdgs_real eye[3] = {0, -3, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    memset(pixels, 128, sizeof pixels);
+    photo.camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 4, 4);
+    photo.light.position[2] = 3;
+    photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = 1;
+    photo.pixels = pixels;
+    settings = ssdgs_settings_default();
+    render_options = ssdgs_render_options_default();
+    train_options = ssdgs_train_options_default();
+    if (!CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 3, &model))) return 1;
+    check_ranges(settings_fields, sizeof settings_fields / sizeof *settings_fields, &settings, make_model);
+    check_ranges(render_fields, sizeof render_fields / sizeof *render_fields, &render_options, render);
+    check_ranges(train_fields, sizeof train_fields / sizeof *train_fields, &train_options, make_trainer);
+    test_bounds();
+    test_missing();
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+    TEST_END();
+}
