@@ -3,8 +3,9 @@
 # ssdgs.h and examples/olat.h was taken. A branch is counted once for each function that it stands in: a kernel's, once per
 # instruction set. Those never taken are listed. C++ is left out, where every call has a branch for exceptions.
 build=$1/coverage
+mkdir -p "$build"
 make -j2 test BUILD="$build" CC=gcc CFLAGS='-O0 --coverage -fprofile-update=atomic -DSSDGS_NO_AVX512' LDLIBS='-lm -lpthread --coverage' \
-    BUILDS= || exit 1
+    BUILDS= >"$build.log" 2>&1 || { tail -n 40 "$build.log"; exit 1; }
 for counts in "$build"/*.gcda; do
     case $counts in */compile_cpp.gcda) continue ;; esac
     # one line of source on each: "branches": [{... "count": N, ...}, ...], "count": N, "line_number": N, ..., "function_name": "..."

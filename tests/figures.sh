@@ -19,12 +19,12 @@ part() {
     fi
     if [ ! -f "$log" ]; then
         echo "$name: $*" >&2
-        echo "commit $(git rev-parse --short HEAD 2>/dev/null || echo unknown)" >"$log.part"
+        printf 'commit %s\ncommand %s\n' "$(git rev-parse --short HEAD 2>/dev/null || echo unknown)" "$*" >"$log.part"
         "$@" >>"$log.part" 2>&1
         echo "exit $?" >>"$log.part"
         mv "$log.part" "$log"
     fi
-    printf '\n## %s\n\n`%s`\n' "$title" "$*"
+    printf '\n## %s\n\n`%s`\n' "$title" "$(sed -n 's/^command //p' "$log" | sed 1q)"
     # rows of the catalogue, then figures
     awk '
         /^row [0-9]+ (passed|failed) / {
