@@ -681,7 +681,7 @@ typedef struct ssdgs_splat_view {
     ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
     ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn */
     /* SSDGS_STAGE_SORT */
-    uint32_t *order;            /* (visible) Gaussians, nearest first, ties by index */
+    uint32_t *order;            /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
     int visible;
     /* SSDGS_STAGE_BIN */
     size_t instance_room;       /* instance numbers in use, with gaps */
