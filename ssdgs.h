@@ -5340,6 +5340,7 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
                             const ssdgs_real *gradient,
                             ssdgs_real *mean, ssdgs_real *square, size_t n) {
     ssdgs__adam_range *r = job->range + job->ranges++;
+    const double rate = ssdgs__group_rate(trainer, group, t);
     r->parameter = parameter;
     r->gradient = gradient;
     r->mean = mean;
@@ -5347,7 +5348,7 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->n = n;
     r->group = group;
     r->bad = 0;
-    r->rate = (ssdgs_real)ssdgs__group_rate(trainer, group, t);
+    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient whose square is finite it is too */
     r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
     r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
     r->first_chunk = job->chunks;
