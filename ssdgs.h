@@ -5348,7 +5348,7 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->n = n;
     r->group = group;
     r->bad = 0;
-    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient whose square is finite it is too */
+    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* so rate x gradient is finite where the square of the gradient is */
     r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
     r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
     r->first_chunk = job->chunks;
