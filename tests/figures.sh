@@ -1,8 +1,8 @@
 #!/bin/sh
 # sh tests/figures.sh BUILD FUZZ_SECONDS FUZZ_TARGET...: runs the tests at their longest and writes BUILD/figures/FIGURES.md and
 # BUILD/figures.json from what they print ("figure KEY VALUE", "row NN passed|failed NAME"). Hours; a part whose log is there
-# already is not repeated: delete it to have it again. With - for FUZZ_SECONDS nothing is run, and what has no log is named. What
-# the machine lacks (clang's libFuzzer, gcov) is left out and named.
+# already is not repeated: delete it to have it again. With - for FUZZ_SECONDS nothing is run: what has no log stays as
+# tests/FIGURES.md has it, with the commit it was measured at. What the machine lacks (clang's libFuzzer, gcov) is left out and named.
 set -u
 build=$1 seconds=$2
 shift 2
@@ -14,7 +14,13 @@ part() {
     name=$1 title=$2 log=$out/$1.log
     shift 2
     if [ ! -f "$log" ] && [ "$seconds" = - ]; then
-        printf '\n## %s\n\nNot measured yet.\n' "$title"
+        awk -v head="## $title" '/^## / { in_it = $0 == head } in_it { section[++n] = $0 }
+            END {
+                while (n && section[n] == "") n--
+                if (!n) section[n = 1] = head "\n\nNot measured yet."
+                print ""
+                for (i = 1; i <= n; i++) print section[i]
+            }' tests/FIGURES.md
         return
     fi
     if [ ! -f "$log" ]; then
@@ -70,19 +76,20 @@ TEXT
     part soak 'Stress: training, determinism' "$build/t_soak" full
     part faults 'Faults and hostile files' "$build/t_faults" full
     part mutants 'Mutants of the backward passes' sh tests/mutants.sh "$build/mutants"
-    if [ -x "$build/fuzzers/all" ]; then
+    if [ "$seconds" = - ] || [ -x "$build/fuzzers/all" ]; then
         for target in $targets; do
             part "fuzz_$target" "Fuzzing: $target" sh tests/fuzz/run.sh "$build/fuzzers" "$seconds" "$target"
         done
     else absent Fuzzing "clang's libFuzzer"; fi
-    if command -v gcov >/dev/null; then part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
+    if [ "$seconds" = - ] || command -v gcov >/dev/null; then
+        part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
     else absent Coverage gcov; fi
     part matrix 'Compilers and machines' sh tests/matrix.sh "$build"
 } >"$out/FIGURES.md"
 
-# The same figures; of a key that several programs print, the sum.
-sed -n 's/^figure //p' "$out"/*.log | awk '
-    { if (!($1 in sum)) key[++n] = $1; sum[$1] = $1 in sum ? sum[$1] + $2 : $2 }
+# The same figures; of a key that stands in several tables, the sum.
+awk -F ' *[|] *' '
+    NF == 4 && $2 ~ /^[a-z][a-z0-9_]*$/ && $3 ~ /^[-+0-9.e]+$/ { if (!($2 in sum)) key[++n] = $2; sum[$2] += $3 }
     END { printf "{\n"; for (i = 1; i <= n; i++) printf "  \"%s\": %s%s\n", key[i], sum[key[i]], i < n ? "," : ""; printf "}\n" }
-' >"$build/figures.json"
+' "$out/FIGURES.md" >"$build/figures.json"
 echo "$out/FIGURES.md, $build/figures.json"
