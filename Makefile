@@ -34,12 +34,12 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts (BENCH=--quick: a minute)
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
 
-experiments: $(BUILD)/train $(BUILD)/relight ## the paper's experiments on SCENES in DATA (hours) into tests/EXPERIMENTS.md
+experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours) into tests/EXPERIMENTS.md
 	sh tests/experiments.sh $(BUILD) "$(DATA)" $(ITERATIONS) $(SCENES)
 	mkdir -p tests/images
 	cp $(BUILD)/experiments/EXPERIMENTS.md tests
 	cp $(BUILD)/experiments/images/* tests/images
-experiments-quick: $(BUILD)/train $(BUILD)/relight ## the same on the scene in examples/data, 300 iterations: minutes
+experiments-quick: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the same on the scene in examples/data, 300 iterations: minutes
 	sh tests/experiments.sh $(BUILD) examples/data 300 waxcow:black
 
 # Models to measure with, trained where there are none; the published networks take longer: fewer iterations.
@@ -111,6 +111,8 @@ $(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) | $(BUILD)
 $(BUILD)/t_%_64: tests/t_%.c $(HEADERS) | $(BUILD)
 	$(COMPILE) -DSSDGS_REAL64 $< -o $@ $(LDLIBS)
 $(BUILD)/t_%: tests/t_%.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $< -o $@ $(LDLIBS)
+$(BUILD)/show: tests/show.c $(HEADERS) | $(BUILD)
 	$(COMPILE) $< -o $@ $(LDLIBS)
 $(BUILD)/%.o: tests/%.c $(HEADERS) | $(BUILD)
 	$(COMPILE) -c $< -o $@

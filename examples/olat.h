@@ -1,4 +1,4 @@
-/* olat.h - reads folders of photographs taken under one light at a time, reads and writes PNG. MIT, see ssdgs.h.
+/* olat.h - reads and writes datasets of photographs under one light at a time, and PNG. MIT, see ssdgs.h.
 
    #include "ssdgs.h"
    #include "olat.h"
@@ -1315,6 +1315,91 @@ OLAT__API int olat_load(const char *folder, const char *split_json, int flags, o
     free(text);
     free(j.path);
     return j.failed;
+}
+
+/* A text file that grows in memory; text is NULL once out of it. */
+typedef struct olat__writer { char *text; size_t size, room; } olat__writer;
+
+static void olat__write(olat__writer *w, const char *text) {
+    const size_t size = strlen(text);
+    if (w->text && w->room - w->size < size) {
+        char *grown = (char *)realloc(w->text, w->room = 2 * (w->room + size));
+        if (!grown) free(w->text);
+        w->text = grown;
+    }
+    if (!w->text) return;
+    memcpy(w->text + w->size, text, size);
+    w->size += size;
+}
+
+/* The numbers, with a point in every locale, between two texts. */
+static void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count, const char *after) {
+    char text[64];
+    int i, k;
+    olat__write(w, before);
+    for (i = 0; i < count; i++) {
+        snprintf(text, sizeof text, "%s%.9g", i ? ", " : "", v[i]);
+        for (k = i ? 2 : 0; text[k]; k++) {
+            if (!strchr("+-.0123456789einfa", text[k])) text[k] = '.';
+        }
+        olat__write(w, text);
+    }
+    olat__write(w, after);
+}
+
+static void olat__write_frame(olat__writer *w, const olat_frame *frame, const char *folder) {
+    static const double last_row[4] = {0, 0, 0, 1};
+    const ssdgs_camera *camera = &frame->camera;
+    const size_t used = strlen(folder);
+    double v[4];
+    int k, m;
+    if (frame->file && !strncmp(frame->file, folder, used)) {
+        const char *c = frame->file + used + (used && frame->file[used] == '/');
+        char text[3] = "";
+        olat__write(w, "\"file_path\": \"");
+        for (; *c; c++) {
+            snprintf(text, sizeof text, "%s%c", *c == '"' || *c == '\\' ? "\\" : "", *c);
+            olat__write(w, text);
+        }
+        olat__write(w, "\", ");
+    }
+    v[0] = camera->width, v[1] = camera->height;
+    olat__write_numbers(w, "\"w\": ", v, 1, ", ");
+    olat__write_numbers(w, "\"h\": ", v + 1, 1, ",\n  ");
+    v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx, v[3] = (double)camera->fy;
+    olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, "],\n  \"transform_matrix\": [");
+    for (k = 0; k < 3; k++) { /* camera to world, y up and z backward */
+        for (m = 0, v[3] = 0; m < 3; m++) {
+            v[m] = (double)camera->view[4 * m + k];
+            v[3] -= v[m] * (double)camera->view[4 * m + 3];
+            if (m) v[m] = -v[m];
+        }
+        olat__write_numbers(w, "[", v, 4, "], ");
+    }
+    olat__write_numbers(w, "[", last_row, 4, "]],\n  ");
+    for (k = 0; k < 3; k++) v[k] = (double)frame->light.position[k];
+    olat__write_numbers(w, frame->light.kind == SSDGS_LIGHT_POINT ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, "], ");
+    for (k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
+    olat__write_numbers(w, "\"pl_intensity\": [", v, 3, "]}");
+}
+
+/* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined poses, say. */
+OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset *set, char error[512]) {
+    olat__writer w;
+    int i, failed;
+    w.size = 0;
+    w.room = 4096;
+    w.text = (char *)malloc(w.room);
+    olat__write(&w, "{\"frames\": [");
+    for (i = 0; i < set->count; i++) {
+        olat__write(&w, i ? ",\n {" : "\n {");
+        olat__write_frame(&w, &set->frames[i], folder);
+    }
+    olat__write(&w, "\n]}\n");
+    failed = w.text ? olat__write_file(path, (const unsigned char *)w.text, w.size, error)
+        : olat__fail(error, "%s: out of memory", olat__tail(path));
+    free(w.text);
+    return failed;
 }
 
 /* The frames as ssdgs_photo structs that share the dataset's pixels: (count), to be freed; NULL if out of memory. */

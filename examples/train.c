@@ -283,6 +283,21 @@ static void print_peak_memory(void)
 #endif
 }
 
+/* The training photographs' cameras and lights as refined, beside the model. */
+static int save_refined(job *j, char error[512])
+{
+    char *path = (char *)malloc(strlen(j->given[OUTPUT]) + 16);
+    int i, failed;
+    if (!path) return sprintf(error, "out of memory"), 1;
+    sprintf(path, "%s.refined.json", j->given[OUTPUT]);
+    for (i = 0; i < j->train_set.count; i++)
+        ssdgs_trainer_refined(j->trainer, i, &j->train_set.frames[i].camera, &j->train_set.frames[i].light);
+    failed = olat_save(path, j->dataset, &j->train_set, error);
+    if (!failed) printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n", path);
+    free(path);
+    return failed;
+}
+
 static int train(job *j)
 {
     const char *output = j->given[OUTPUT], *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
@@ -340,6 +355,7 @@ static int train(job *j)
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
     print_peak_memory();
     printf("\n");
+    if (j->given[REFINE] && save_refined(j, error)) return fail(error);
 
     ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
     ssdgs_model_destroy(j->model);

@@ -34,7 +34,7 @@ head_line() {
     printf ' --- |\n'
 }
 
-# row LABEL PAPER NAME OPTION...: test PSNR (training PSNR) of every scene
+# row LABEL PAPER NAME OPTION...: test PSNR (training PSNR) and time of every scene
 row() {
     label=$1 paper=$2 name=$3
     shift 3
@@ -42,7 +42,7 @@ row() {
     for s in $scenes; do
         case "$*" in *disturbed.json*) [ -f "$data/${s%%:*}/transforms_train_disturbed.json" ] || { line="$line - |"; continue; } ;; esac
         run "$s" "$name" "$@"
-        line="$line $(psnr test) ($(psnr training)) |"
+        line="$line $(psnr test) ($(psnr training)), $(sed -n 's/.*trained in \([0-9:]*\),.*/\1/p' "$log") |"
     done
     echo "$line ${*:+\`$*\`} |"
 }
@@ -69,10 +69,25 @@ sheet() {
         [ "$out/$scene.$2.png" -nt "$out/$scene.$2.ply" ] || "$build/relight" "$out/$scene.$2.ply" "$data/$scene" \
             --background "${s##*:}" --out "$out/frames" --sheet "$out/$scene.$2.png" >&2
     done
-    scene=${scenes%%:*}
+    image "$1" "$2"
+}
+
+# image LABEL NAME: puts BUILD/experiments/SCENE.NAME.png of the first scene into the text.
+image() {
     mkdir -p "$out/images"
-    cp "$out/$scene.$2.png" "$out/images"
-    printf '\n%s:\n\n![%s](images/%s)\n' "$1" "$1" "$scene.$2.png"
+    cp "$out/${scenes%%:*}.$2.png" "$out/images"
+    printf '\n%s:\n\n![%s](images/%s)\n' "$1" "$1" "${scenes%%:*}.$2.png"
+}
+
+# show NAME KIND MODEL_NAME...: a picture of every scene by tests/show.c
+show() {
+    name=$1 kind=$2
+    shift 2
+    for s in $scenes; do
+        models=
+        for m in "$@"; do models="$models $out/${s%%:*}.$m.ply"; done
+        "$build/show" "$kind" "$out/${s%%:*}.$name.png" "$data/${s%%:*}" "${s##*:}" $models >&2
+    done
 }
 
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
@@ -82,7 +97,7 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
 
 Made by \`make experiments\`: $iterations iterations for every run, the schedule scaled to them, on ${cpu:-an unknown CPU} with
 $(getconf _NPROCESSORS_ONLN 2>/dev/null || echo '?') threads. Figures are PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the
-training photographs. The paper's figures are means over its 8 scenes with 60,000 to 100,000 iterations on other scenes: compare
+training photographs, after them the time of the training. The paper's figures are means over its 8 scenes with 60,000 to 100,000 iterations on other scenes: compare
 differences, not values. Runs with other seeds differ by 0.1 to 0.3 dB.
 TEXT
     printf '\n## Default configuration\n'
@@ -114,11 +129,38 @@ TEXT
     row 'diffuse and specular' '33.00 (34.37)' default
     row 'all terms' '32.13 (33.14)' shadow_on_scattering --set shadow_on_scattering=1
     sheet 'Shadow on all terms (above, under I, on diffuse and specular)' shadow_on_scattering
+    show backlit backlit default shadow_on_scattering
+    image 'A photograph lit from behind, shadow on diffuse and specular, on all terms (as Figure 13)' backlit
 
     head_line 'Disturbed cameras and lights' 'training' 'paper (SSS-GS scenes, its own noise)'
     row 'true poses and lights' '' default
     row 'disturbed' '37.44' disturbed --train-json transforms_train_disturbed.json
     row 'disturbed, refined' '38.35' refined --train-json transforms_train_disturbed.json --refine
+    printf '\n| scene | test, each pose and light fitted to its photograph | cameras (length), (angle), lights (length): disturbed | refined |\n'
+    printf '| --- | --- | --- | --- |\n'
+    for s in $scenes; do
+        scene=${s%%:*}
+        [ -f "$data/$scene/transforms_train_disturbed.json" ] || continue
+        log=$out/$scene.$iterations.refined.log
+        echo "| $scene | $(psnr 'test (each.*)') |" \
+            "$("$build/show" poses "$data/$scene/transforms_train.json" "$data/$scene/transforms_train_disturbed.json") |" \
+            "$("$build/show" poses "$data/$scene/transforms_train.json" "$out/$scene.refined.ply.refined.json") |"
+    done
+
+    printf '\n## Shadows, lights, views\n'
+    show pipeline pipeline default
+    image 'What the light leaves behind the object, coarse visibility, refined shadow, rendering (as Figure 3)' pipeline
+    show sweeps sweeps default
+    image 'One view under six lights, six views under one light, none of them in training (as Figure 10)' sweeps
+    for s in $scenes; do
+        scene=${s%%:*} frames=
+        "$build/relight" "$out/$scene.default.ply" "$data/$scene" --trajectory --background "${s##*:}" --out "$out/$scene.trajectory" >&2
+        for i in 0000 0030 0060 0090 0120 0165 0195 0225 0255 0285 0315 0345 0375 0405 0435 0465; do
+            frames="$frames $out/$scene.trajectory/$i.png"
+        done
+        "$build/show" strip "$out/$scene.trajectory.png" 8 $frames
+    done
+    image 'The path of Appendix D: the light goes round, the camera to the back, the light round again, the camera returns' trajectory
 
     head_line 'Dipole forms and profiles' 'form' paper
     row 'Jensen et al. 2001' '' default

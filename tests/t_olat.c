@@ -746,6 +746,38 @@ static void test_datasets(void) {
     CHECK(olat_load(FOLDER, "b", 0, &set, error) && strstr(error, "regular") && live == 0);
 }
 
+/* What is saved loads again: the same up to the rounding of the origin. */
+static void test_saving(void) {
+    olat_dataset again;
+    int i, k;
+    CHECK(loads("{\"fl_x\":3.25,\"fl_y\":3.5,\"cx\":2.75,\"cy\":2.125,\"frames\":[" FRAME ",\n{" FILE_A
+                "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.1,1e-7,3e8],"
+                "\"transform_matrix\":[[0,-0.6,0.8,0.3],[0,0.8,0.6,-7.1],[-1,0,0,2.2],[0,0,0,1]]}]}", 0));
+    if (!CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))) printf("%s\n", error);
+    if (!CHECK(!olat_load(FOLDER, "saved.json", 0, &again, error))) printf("%s\n", error);
+    CHECK(again.count == 2 && set.count == 2);
+    for (i = 0; i < again.count; i++) {
+        const olat_frame *a = &set.frames[i], *b = &again.frames[i];
+        CHECK(!strcmp(b->file, FOLDER "/./a.png") && b->camera.width == 6 && b->camera.height == 4);
+        CHECK(a->camera.fx == b->camera.fx && a->camera.fy == b->camera.fy && a->camera.cx == b->camera.cx &&
+              a->camera.cy == b->camera.cy && a->light.kind == b->light.kind);
+        for (k = 0; k < 12; k++) CHECK(fabs((double)(a->camera.view[k] - b->camera.view[k])) < 2e-6);
+        for (k = 0; k < 3; k++)
+            CHECK(fabs((double)(a->light.position[k] - b->light.position[k])) < 1e-7 &&
+                  fabs((double)(a->light.intensity[k] / b->light.intensity[k]) - 1) < 1e-7);
+    }
+    olat_free(&again);
+    meter_free(set.frames[0].file); /* no image, a quotation mark, and a folder that is not the image's */
+    set.frames[0].file = NULL;
+    memcpy(set.frames[1].file, FOLDER "/\"", sizeof FOLDER + 2);
+    CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error) && !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
+    CHECK(!again.frames[0].file && again.frames[1].file && strstr(again.frames[1].file, "/\"."));
+    olat_free(&again);
+    CHECK(olat_save(FOLDER "/dir.png", FOLDER, &set, error) && strstr(error, "dir.png"));
+    olat_free(&set);
+    CHECK(live == 0);
+}
+
 static void test_memory(void) {
     static const unsigned char grey[4] = {1, 2, 3, 4};
     long n;
@@ -764,8 +796,18 @@ static void test_memory(void) {
         done = !olat_write_png(FOLDER "/grey.png", 2, 2, 1, grey, error);
         CHECK(live == 0 && (done || strstr(error, "out of memory")));
     }
+    CHECK(done);
+    fail_at = 0;
+    CHECK(loads(TOP FRAME "," FRAME "]}", 0));
+    for (n = 1, done = 0; !done && n < 20; n++) {
+        const long before = live;
+        calls = 0, fail_at = n;
+        done = !olat_save(FOLDER "/saved.json", FOLDER, &set, error);
+        CHECK(live == before && (done || strstr(error, "out of memory")));
+    }
     fail_at = 0;
     CHECK(done);
+    olat_free(&set);
 }
 
 static void test_cow(void) {
@@ -805,6 +847,7 @@ int main(void) {
     test_json();
     test_numbers();
     test_datasets();
+    test_saving();
     test_memory();
     test_cow();
     TEST_END();
