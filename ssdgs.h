@@ -635,7 +635,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height);
 
 #ifndef SSDGS_NO_STDIO
-/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings. */
+/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings.
+   ERR_NONFINITE as on saving a model. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 #endif
@@ -4964,6 +4965,13 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
     }
 }
 
+/* No file may hold networks or ASG that loading would refuse. */
+static ssdgs_result ssdgs__savable(const ssdgs_model *model, const char *path) {
+    if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
+    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
+                       "%s: not written, a parameter of the networks or the ASG is not finite", path);
+}
+
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
     size_t rows[SSDGS__PLY_KINDS], row;
     char line[128];
@@ -4971,8 +4979,7 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
     ssdgs__ply_cursor cursor;
     int kind;
     if (!model || !path) return SSDGS_ERR_ARGUMENT;
-    if (!model->context->k->finite(model->globals, model->global_count)) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
-            "%s: not written, a parameter of the networks or the ASG is not finite, and no file may hold that", path);
+    if (ssdgs__savable(model, path)) return SSDGS_ERR_NONFINITE;
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
     for (kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
@@ -6164,6 +6171,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
     ssdgs__checkpoint_io io;
     ssdgs__writer writer;
     if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
+    if (ssdgs__savable(trainer->model, path)) return SSDGS_ERR_NONFINITE;
     ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_describe(trainer, &head);
     io.writer = &writer;

@@ -206,6 +206,9 @@ static void test_resume(void) {
             bytes[at] ^= 0x10;
             CHECK(ssdgs_trainer_load(trainer, "build/t_train_bad.ckpt") == SSDGS_ERR_FORMAT);
         }
+        model->globals[model->global_count - 1] = (ssdgs_real)NAN; /* what would be refused is not written */
+        CHECK(ssdgs_trainer_save(trainer, "build/t_train.ckpt") == SSDGS_ERR_NONFINITE);
+        CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
         for (i = 0; i < 4; i++) { /* wrong inside, with the right checksum */
             ssdgs__checkpoint_head head;
             unsigned char *copy = (unsigned char *)malloc(size);
