@@ -283,15 +283,19 @@ static void print_peak_memory(void)
 #endif
 }
 
-/* The training photographs' cameras and lights as refined, beside the model. */
+/* The training photographs' cameras and lights as refined, for what follows and in a file beside the model. */
 static int save_refined(job *j, char error[512])
 {
     char *path = (char *)malloc(strlen(j->given[OUTPUT]) + 16);
     int i, failed;
     if (!path) return sprintf(error, "out of memory"), 1;
     sprintf(path, "%s.refined.json", j->given[OUTPUT]);
-    for (i = 0; i < j->train_set.count; i++)
-        ssdgs_trainer_refined(j->trainer, i, &j->train_set.frames[i].camera, &j->train_set.frames[i].light);
+    for (i = 0; i < j->train_set.count; i++) {
+        olat_frame *frame = &j->train_set.frames[i];
+        ssdgs_trainer_refined(j->trainer, i, &frame->camera, &frame->light);
+        j->photos[i].camera = frame->camera;
+        j->photos[i].light = frame->light;
+    }
     failed = olat_save(path, j->dataset, &j->train_set, error);
     if (!failed) printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n", path);
     free(path);
