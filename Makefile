@@ -49,7 +49,7 @@ $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
 	  $(if $(findstring published,$@),--preset published --iterations 1000,--iterations $(ITERATIONS))
 
 # Each program closes with "N passed, N failed"; one that does not counts as one failed.
-test: $(TESTS) $(EXAMPLES) ## every test; SSDGS_GOLDEN=folder reads the golden files there
+test: $(TESTS) $(EXAMPLES) $(BUILD)/show ## every test; SSDGS_GOLDEN=folder reads the golden files there
 	@passed=0; failed=0; for t in $(TESTS) $(BUILDS); do \
 	  echo "== $$t"; log=$(BUILD)/$${t##*/}.log; \
 	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; */fuzz) $(RUN) $$t tests/fuzz/seeds/*/*;; *) $(RUN) $$t;; esac >$$log 2>&1; code=$$?; \
