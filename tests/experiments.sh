@@ -97,8 +97,8 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
 
 Made by \`make experiments\`: $iterations iterations for every run, the schedule scaled to them, on ${cpu:-an unknown CPU} with
 $(getconf _NPROCESSORS_ONLN 2>/dev/null || echo '?') threads. Figures are PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the
-training photographs, after them the time of the training. The paper's figures are means over its 8 scenes with 60,000 to 100,000 iterations on other scenes: compare
-differences, not values. Runs with other seeds differ by 0.1 to 0.3 dB.
+training photographs, after them the time of the training. The paper's figures are means over its 8 scenes with 60,000 to 100,000
+iterations: compare differences, not values. Runs with other seeds differ by 0.1 to 0.3 dB.
 TEXT
     printf '\n## Default configuration\n'
     details default
