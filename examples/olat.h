@@ -1388,7 +1388,7 @@ OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset
     olat__writer w;
     int i, failed;
     w.size = 0;
-    w.room = 4096;
+    w.room = 256;
     w.text = (char *)malloc(w.room);
     olat__write(&w, "{\"frames\": [");
     for (i = 0; i < set->count; i++) {

@@ -750,8 +750,8 @@ static void test_datasets(void) {
 static void test_saving(void) {
     olat_dataset again;
     int i, k;
-    CHECK(loads("{\"fl_x\":3.25,\"fl_y\":3.5,\"cx\":2.75,\"cy\":2.125,\"frames\":[" FRAME ",\n{" FILE_A
-                "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.1,1e-7,3e8],"
+    CHECK(loads("{\"fl_x\":3.2512345,\"fl_y\":3.5432109,\"cx\":2.7654321,\"cy\":2.1234567,\"frames\":[" FRAME ",\n{" FILE_A
+                "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.12345678,1.2345678e-7,3.4567891e8],"
                 "\"transform_matrix\":[[0,-0.6,0.8,0.3],[0,0.8,0.6,-7.1],[-1,0,0,2.2],[0,0,0,1]]}]}", 0));
     if (!CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))) printf("%s\n", error);
     if (!CHECK(!olat_load(FOLDER, "saved.json", 0, &again, error))) printf("%s\n", error);
