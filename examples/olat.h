@@ -1353,8 +1353,8 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const ch
     const size_t used = strlen(folder);
     double v[4];
     int k, m;
-    if (frame->file && !strncmp(frame->file, folder, used)) {
-        const char *c = frame->file + used + (used && frame->file[used] == '/');
+    if (frame->file && !strncmp(frame->file, folder, used) && (!used || frame->file[used] == '/')) {
+        const char *c = frame->file + used + (used > 0);
         char text[3] = "";
         olat__write(w, "\"file_path\": \"");
         for (; *c; c++) {

@@ -23,7 +23,7 @@ typedef struct show {
 
 static int failed(show *s, const char *message)
 {
-    if (message) snprintf(s->error, sizeof s->error, "%s", message);
+    snprintf(s->error, sizeof s->error, "%s", message);
     return 1;
 }
 

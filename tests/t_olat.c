@@ -773,6 +773,10 @@ static void test_saving(void) {
     CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error) && !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
     CHECK(!again.frames[0].file && again.frames[1].file && strstr(again.frames[1].file, "/\"."));
     olat_free(&again);
+    CHECK(!olat_save(FOLDER "/saved.json", "build/t_olat_file", &set, error) && /* a folder whose name only begins alike */
+          !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
+    CHECK(!again.frames[1].file);
+    olat_free(&again);
     CHECK(olat_save(FOLDER "/dir.png", FOLDER, &set, error) && strstr(error, "dir.png"));
     olat_free(&set);
     CHECK(live == 0);
