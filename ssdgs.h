@@ -72,7 +72,7 @@ WHAT IT COMPUTES
   (eq. 3), with
   f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
   f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of the half
-         vector (eqs. 10 to 12)
+         vector (eqs. 10 to 12); deferred, each pixel's own (ssdgs_asg)
   S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow network (eq. 8)
   f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a material code
          (eq. 4)
@@ -82,11 +82,13 @@ WHAT IT COMPUTES
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
   layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, but no sines of wo and few
   of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
-  by less than light_bias casts no shadow. transport = 1 lets the scattering network see besides what true dipole
-  transport brings to x from where the light enters.
-  ssdgs_settings_published(): the paper to the letter. Colours are the stored values; one sigma_s, sigma_a for all
-  channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S, no bias; both passes add
-  0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
+  by less than light_bias casts no shadow. The specular term is deferred: Gaussians blend c_s S E, normals, sharpness and
+  F0, and each pixel is shaded once. A narrow highlight passes over one Gaussian in few photographs, which its own normal
+  fits by heart; the normals' mean at a pixel carries over to other views. transport = 1 lets the scattering network see
+  besides what true dipole transport brings to x from where the light enters.
+  ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
+  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S,
+  no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
@@ -169,7 +171,8 @@ GPU HOOK
   desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and writes
   ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no memory before them:
   a hook points the members at its own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y.
-  The rest is there. With any hook set no frame keeps results of the last. In training SHADE
+  The rest is there. With any hook set no frame keeps results of the last. Where layer_count is not 0, SHADE fills layers
+  and COMPOSITE adds the specular term (ssdgs_asg) from what they blend to. In training SHADE
   and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs
   the CPU's version. Components of an image are composited by the CPU from the tile lists, so they need BIN's results in
   host memory. A result other than SSDGS_OK ends the frame.
@@ -238,8 +241,8 @@ CONTENTS, search for the tag
   >>project_kernel  EWA projection
   >>bin_kernel      which parts of a tile an ellipse touches
   >>walk_kernels    transmittance walks of camera and lights
-  >>composite_kernel, >>transport_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>dipole_kernel, >>colour_kernel,
-  >>image_kernels
+  >>composite_kernel, >>transport_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>highlight_kernel,
+  >>dipole_kernel, >>colour_kernel, >>image_kernels
 
 VERSIONS
   0.1.0  the first
@@ -330,10 +333,10 @@ typedef enum ssdgs_stage {
     SSDGS_STAGE_SORT,               /* -> order, nearest first */
     SSDGS_STAGE_BIN,                /* -> instances and tile lists */
     SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
-    SSDGS_STAGE_SHADE,              /* -> color and the components asked for */
-    SSDGS_STAGE_COMPOSITE,          /* -> image, transmittance */
-    SSDGS_STAGE_COMPOSITE_BACKWARD, /* image_gradient -> splat_gradient, color_gradient */
-    SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient -> gradient, global_gradient, light and eye gradients */
+    SSDGS_STAGE_SHADE,              /* -> color, layers and the components asked for */
+    SSDGS_STAGE_COMPOSITE,          /* -> pixels, layer_pixels, transmittance */
+    SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient -> splat_gradient, color_gradient, layer_gradient; the shared gradients anew */
+    SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
     SSDGS_STAGE_PROJECT_BACKWARD,   /* splat_gradient -> gradient, view_gradient */
     SSDGS_STAGE_COUNT
 } ssdgs_stage;
@@ -370,7 +373,12 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
 typedef enum ssdgs_dipole {
     SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY
 } ssdgs_dipole;
-typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR } ssdgs_asg; /* eq. 12, or the released angular form */
+/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form. Deferred: one term per pixel and light,
+   from what the pixel's Gaussians blend to, so that their normals agree and highlights carry over to other views:
+   M (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h)) with M = c_s S E and, over the pixel's alpha,
+   Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part along the blended normal. So t_j chooses between the
+   normals' mean, right for smooth surfaces, and all of them, right for rough ones */
+typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
 typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
@@ -384,7 +392,8 @@ enum { /* terms of eq. 3; a mask */
 #define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
 
 /* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale), sigmoid(opacity),
-   softplus(colours and ASG weights), quaternions w x y z normalised. */
+   softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first ASG weights are log lambda, log mu and
+   the logit of F0 less that of 0.04; the others rest. */
 enum {
     SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
     SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
@@ -397,7 +406,7 @@ typedef struct ssdgs_settings {
     int baked;                /* 1: softplus(diffuse) is the colour itself, lights are ignored (a plain splat file) */
     int transfer;             /* ssdgs_transfer: how stored images relate to the colours splatted */
     int dipole;               /* ssdgs_dipole */
-    int asg;                  /* ssdgs_asg */
+    int asg;                  /* ssdgs_asg; deferred */
     int per_channel_optics;   /* 1: sigma_s, sigma_a for each colour channel */
     int depth_cue;            /* 1: the scattering network sees the depth cue; positions are in length units */
     int transport;            /* 1: it also sees the light that true dipole transport brings from where it really enters */
@@ -431,8 +440,8 @@ typedef struct ssdgs_model_view {
     size_t stride;           /* floats from one plane to the next */
     ssdgs_real *gaussians;   /* (SSDGS_CHANNELS, stride) */
     ssdgs_real *asg_basis;   /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
-    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u */
-    ssdgs_real *asg_sigma;   /* (SSDGS_ASG_COUNT) raw sigma of the angular form */
+    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u; deferred: log s, logit t */
+    ssdgs_real *asg_sigma;   /* (SSDGS_ASG_COUNT) raw sigma of the angular form; deferred: a before softplus */
     ssdgs_real *scattering;  /* per layer: (out, in) weights, then (out) biases */
     size_t scattering_count;
     ssdgs_real *shadow;
@@ -651,8 +660,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own ---- */
 
-#define SSDGS_SPLAT_SUMS 12  /* per instance, both directions */
-#define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, unused */
+#define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, camera depth */
 
 typedef struct ssdgs_tile_entry {
     uint32_t gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
@@ -695,7 +703,7 @@ typedef struct ssdgs_splat_view {
     uint16_t *tile_seen;        /* (instances) which micro-tiles blend it */
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
-    ssdgs_real *tile_sums;      /* (instances, SSDGS_SPLAT_SUMS) */
+    ssdgs_real *tile_sums;      /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -724,14 +732,18 @@ typedef struct ssdgs_frame {
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
     ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
+    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, and color has none */
+    ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; M of each light */
     ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;         /* (3, h, w) without background */
+    ssdgs_real *layer_pixels;   /* (1 + layer_count, 3, h, w) the colour and the layers, blended; for components and training */
     ssdgs_real *transmittance;  /* (h, w) */
     /* backward */
     ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
     ssdgs_real *splat_gradient; /* (n, SSDGS_SPLAT_GRADIENTS) */
     ssdgs_real *color_gradient; /* (n, 4) */
+    ssdgs_real *layer_gradient; /* (layer_count, n, 4) */
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
     ssdgs_real *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
     ssdgs_real light_gradient[3]; /* position of light 0 */
@@ -882,7 +894,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BLOCK 64      /* Gaussians shaded together */
 #define SSDGS__AHEAD 12      /* ranks; what is theirs lies anywhere in memory */
 #define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
-#define SSDGS__SUMS SSDGS_SPLAT_SUMS
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
 #define SSDGS__GLANCES 2000  /* about 0.1 ms */
@@ -892,8 +903,15 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04       /* Schlick */
+#define SSDGS__F0_LOGIT -3.1780538303479458
+#define SSDGS__SHARPEST 12   /* |log lambda|, |log mu| of deferred lobes at most */
+#define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
+#define SSDGS__LAYERS 6      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, M of one light */
+#define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
+#define SSDGS__LOBE 10       /* rows: Q (6), normal (3), F0 */
+#define SSDGS__HIGHLIGHT_SUMS (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
 
 enum { /* rows of a block's geometry */
     SSDGS__WI = 0, SSDGS__WO = 3, SSDGS__NORMAL = 6, SSDGS__IRRADIANCE = 9, SSDGS__COSINE, SSDGS__GLOSS, SSDGS__ROWS,
@@ -928,7 +946,8 @@ typedef struct ssdgs__product {
 typedef struct ssdgs__lighting {
     ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
     int directional, angular, dipole, diffuse, specular, shadow, scattering;
-    int residual_shadow, per_channel_optics, shadow_on_scattering;
+    int residual_shadow, per_channel_optics, shadow_on_scattering, deferred;
+    ssdgs_real view[12], inverse_fx, inverse_fy, cx, cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
 } ssdgs__lighting;
 
 typedef struct ssdgs__kernels {
@@ -938,8 +957,12 @@ typedef struct ssdgs__kernels {
     void (*bin)(const ssdgs_splat_view *, const uint16_t *, ssdgs_real, int, int, uint32_t);
     void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
-    void (*composite)(const ssdgs__tile *, const ssdgs_real *, ssdgs_real *);
-    void (*composite_backward)(const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
+    void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
+    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, size_t, int);
+    void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *);
+    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*lobe)(const ssdgs_real *, ssdgs_real *);
+    void (*lobe_backward)(const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*dense)(const ssdgs__product *);
     int (*live_rows)(const ssdgs_real *, int, uint16_t *);
@@ -955,9 +978,8 @@ typedef struct ssdgs__kernels {
     void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
                    const ssdgs_real *, ssdgs_real *);
     void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
-                                ssdgs_real *);
+                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
+                            ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
     void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
     void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
     void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
@@ -1616,6 +1638,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.version = SSDGS_VERSION;
     s.terms = SSDGS_ALL_TERMS;
     s.transfer = SSDGS_TRANSFER_SRGB;
+    s.asg = SSDGS_ASG_DEFERRED;
     s.per_channel_optics = s.depth_cue = s.residual_shadow = 1;
     s.scattering_layers = 3;
     s.scattering_width = 64;
@@ -1634,6 +1657,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
 SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     ssdgs_settings s = ssdgs_settings_default();
     s.transfer = SSDGS_TRANSFER_NONE;
+    s.asg = SSDGS_ASG_GEOMETRIC;
     s.per_channel_optics = s.depth_cue = s.residual_shadow = 0;
     s.scattering_layers = 6;
     s.scattering_width = 256;
@@ -1658,7 +1682,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(baked, 0, 1);
     SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
     SSDGS__RANGE(dipole, 0, SSDGS_DIPOLE_BURLEY);
-    SSDGS__RANGE(asg, 0, SSDGS_ASG_ANGULAR);
+    SSDGS__RANGE(asg, 0, SSDGS_ASG_DEFERRED);
     SSDGS__RANGE(per_channel_optics, 0, 1);
     SSDGS__RANGE(depth_cue, 0, 1);
     SSDGS__RANGE(transport, 0, 1);
@@ -1710,8 +1734,9 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
         q[0] = (ssdgs_real)cos(pi * j / (2 * SSDGS_ASG_COUNT));
         q[1] = q[2] = 0;
         q[3] = (ssdgs_real)sin(pi * j / (2 * SSDGS_ASG_COUNT)); /* a turn about the normal */
-        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR ? 0 : (ssdgs_real)(0.5 + 0.6 * j);
-        sharpness[1] = sharpness[0];
+        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR ? 0
+            : (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
+        sharpness[1] = model->settings.asg == SSDGS_ASG_DEFERRED ? 0 : sharpness[0];
     }
     for (net = 0; net < 2; net++) {
         int sizes[SSDGS_MAX_LAYERS + 1];
@@ -1820,6 +1845,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels, transmittance;
     ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
+    ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, kept_lights, shadow_logit, shadow_known;
     int view_room;
@@ -2249,6 +2275,13 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
+    if (frame->settings.asg == SSDGS_ASG_DEFERRED && (frame->terms & SSDGS_SPECULAR_TERM) && frame->light_count) {
+        frame->layer_count = SSDGS__LAYERS - 2 + frame->light_count;
+        SSDGS__RESERVE(m->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
+        if (components || training)
+            SSDGS__RESERVE(m->layer_pixels, frame->layer_pixels, ssdgs_real, pixels * 3 * (size_t)(frame->layer_count + 1));
+        if (training) SSDGS__RESERVE(m->layer_gradient, frame->layer_gradient, ssdgs_real, n * 4 * (size_t)frame->layer_count);
+    }
     if (components) {
         SSDGS__RESERVE(m->component[0], frame->diffuse, ssdgs_real, n * 4);
         SSDGS__RESERVE(m->component[1], frame->specular, ssdgs_real, n * 4);
@@ -2670,8 +2703,8 @@ typedef struct ssdgs__block_layout {
     int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers, widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                          /* within the block */
-    size_t inputs, pairs, outs;                                          /* scratch of both directions */
-    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dvisibility, scratch; /* and of the backward */
+    size_t inputs, pairs, outs, lobe;                                    /* scratch of both directions */
+    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dspecular, dvisibility, scratch; /* and of the backward */
 } ssdgs__block_layout;
 
 /* Rows of all layers' outputs. */
@@ -2703,10 +2736,12 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count : 1); /* only the backward asks again */
     l.pairs = b * (size_t)(l.widest + 1);
     l.outs = l.pairs + b * (size_t)((l.widest + 1) / 2);
-    l.dgauss = l.outs + b * SSDGS__OUTS;
+    l.lobe = l.outs + b * SSDGS__OUTS;
+    l.dgauss = l.lobe + b * SSDGS__LOBE;
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
-    l.dvisibility = l.dcolor + b * 3;
+    l.dspecular = l.dcolor + b * 3;
+    l.dvisibility = l.dspecular + b * 3;
     l.dnet = l.dvisibility + b;
     l.dnet2 = l.dnet + b * (size_t)(l.widest + 1);
     l.transposed = l.dnet2 + b * (size_t)(l.widest + 1);
@@ -2714,7 +2749,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     return l;
 }
 
-/* Raw parameters of the angular form, within what neither over- nor underflows. */
+/* Raw parameters of the angular form and deferred weights, within what neither over- nor underflows. */
 static ssdgs_real ssdgs__angular_raw(ssdgs_real raw) { return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw; }
 
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
@@ -2740,6 +2775,12 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     k.residual_shadow = s->residual_shadow;
     k.per_channel_optics = s->per_channel_optics;
     k.shadow_on_scattering = s->shadow_on_scattering;
+    k.deferred = frame->layer_count > 0;
+    memcpy(k.view, frame->camera.view, sizeof k.view);
+    k.inverse_fx = 1 / frame->camera.fx;
+    k.inverse_fy = 1 / frame->camera.fy;
+    k.cx = frame->camera.cx;
+    k.cy = frame->camera.cy;
     for (j = 0; j < SSDGS_ASG_COUNT; j++) {
         const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
         ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
@@ -2749,11 +2790,24 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
             const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
             for (i = 0; i < 2; i++) b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
             b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j])) * ssdgs__softplus_scalar(step);
+        } else if (k.deferred) {
+            b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
+            b[9] = ssdgs__exp_scalar(sharpness[0]);
+            b[10] = ssdgs__softplus_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
         } else {
             for (i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
         }
     }
     return k;
+}
+
+static ssdgs_result ssdgs__lightings(const ssdgs_frame *frame, ssdgs__lighting **lightings) {
+    ssdgs_context *context = frame->context;
+    int light;
+    SSDGS__RESERVE(frame->memory->lightings, *lightings, ssdgs__lighting, frame->light_count + 1);
+    for (light = 0; light < frame->light_count; light++) (*lightings)[light] = ssdgs__lighting_of(frame, light);
+    return SSDGS_OK;
 }
 
 /* Sums over lanes of dL/d(basis rows) -> raw ASG parameters. */
@@ -3228,6 +3282,18 @@ static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int s
     }
 }
 
+static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
+    return frame->layers + (size_t)layer * 4 * (size_t)frame->gaussians.count;
+}
+
+/* Rows of a block into a layer. */
+static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t at[SSDGS__BLOCK], int live, const ssdgs_real *rows) {
+    ssdgs_real *to = ssdgs__layer(frame, layer);
+    int s, c;
+    for (s = 0; s < live; s++)
+        for (c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
+}
+
 static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot, ssdgs_real *memory,
                                ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
@@ -3236,6 +3302,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     const size_t n = (size_t)frame->gaussians.count;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
     uint32_t *pairs = (uint32_t *)(void *)(scratch + l->pairs);
+    const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
     int light, s, i, c;
     for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
@@ -3272,8 +3339,20 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
+        if (lighting->deferred) ssdgs__layer_store(frame, SSDGS__LAYERS - 2 + light, at, live, outs + 3 * SSDGS__BLOCK);
+        if (lighting->deferred) memset(outs + 3 * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *outs);
     }
-    for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++) {
+    if (frame->layer_count) {
+        k->lobe(gauss, scratch + l->lobe);
+        for (i = 0; i < 3; i++) ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
+        for (s = 0; s < live; s++) {
+            ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
+            to[0] = frame->views[0].depth[at[s]];
+            to[1] = scratch[l->lobe + 9 * SSDGS__BLOCK + (size_t)s];
+            to[2] = 1;
+        }
+    }
+    for (s = 0; s < live; s++) {
         const size_t g = at[s];
         ssdgs_real *o = outs + s, *color = frame->color + 4 * g;
         int black = !ssdgs__finite(o[9 * SSDGS__BLOCK]);
@@ -3282,7 +3361,12 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
                 o[c * SSDGS__BLOCK] = ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s]);
             color[c] = o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
+            for (i = 0; i < frame->layer_count; i++) { /* whose products with the lobes must be finite as well */
+                const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
+                black |= !(value <= (ssdgs_real)1e30 && value >= (ssdgs_real)-1e30);
+            }
         }
+        for (i = 0; i < frame->layer_count && black; i++) memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
         for (c = 0; c < SSDGS__OUTS && black; c++) color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
         color[3] = (ssdgs_real)black;
         if (!frame->components) continue;
@@ -3321,6 +3405,8 @@ static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
         if (frame->seen[g] != SSDGS_GLIMPSED) continue;
         for (p = 0; p < (frame->components ? 6 : 1); p++) memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
+        for (p = 0; p < frame->layer_count; p++)
+            memcpy(ssdgs__layer(frame, p) + 4 * g, ssdgs__layer(frame, p) + 4 * from, 4 * sizeof(ssdgs_real));
     }
 }
 
@@ -3341,14 +3427,15 @@ static void ssdgs__shade_task(void *data, int slot) {
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
     ssdgs_context *context = frame->context;
-    int light;
     memset(job, 0, sizeof *job);
     job->frame = frame;
     job->layout = ssdgs__layout(frame);
     job->blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     SSDGS__RESERVE(frame->memory->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
-    SSDGS__RESERVE(frame->memory->lightings, job->lightings, ssdgs__lighting, frame->light_count + 1);
-    for (light = 0; light < frame->light_count; light++) job->lightings[light] = ssdgs__lighting_of(frame, light);
+    {
+        const ssdgs_result result = ssdgs__lightings(frame, &job->lightings);
+        if (result) return result;
+    }
     if (frame->options.bf16 && context->bf16 && !frame->training) {
         SSDGS__RESERVE(frame->memory->packed, job->packed[0], uint32_t, frame->model->global_count);
         job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers, frame->gaussians.scattering,
@@ -3395,6 +3482,17 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
+static ssdgs_real *ssdgs__layer_gradient(const ssdgs_frame *frame, int layer) {
+    return frame->layer_gradient + (size_t)layer * 4 * (size_t)frame->gaussians.count;
+}
+
+/* (n, 4) of the Gaussians `at` -> rows (3, BLOCK), 0 where none is. */
+static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__BLOCK], int live, ssdgs_real *rows) {
+    int s, c;
+    for (s = 0; s < SSDGS__BLOCK; s++)
+        for (c = 0; c < 3; c++) rows[c * SSDGS__BLOCK + s] = s < live ? from[4 * at[s] + (size_t)c] : 0;
+}
+
 static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
@@ -3405,13 +3503,20 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
+    ssdgs_real *dspecular = scratch + l->dspecular, *dlobe = scratch + l->lobe;
+    const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
     int light, s, c;
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
-    for (s = 0; s < SSDGS__BLOCK; s++) {
-        const int live = block * SSDGS__BLOCK + s < frame->shaded_count;
-        for (c = 0; c < 3; c++) dcolor[c * SSDGS__BLOCK + s] = live
-            ? frame->color_gradient[4 * ssdgs__block_lane(frame, block, s) + (size_t)c] : 0;
+    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    ssdgs__gradient_rows(frame->color_gradient, at, live, dcolor);
+    if (frame->layer_count) {
+        ssdgs_real rows[3 * SSDGS__BLOCK];
+        for (c = 0; c < 3; c++)
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live, dlobe + 3 * c * SSDGS__BLOCK);
+        ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
+        memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK, SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
+        k->lobe_backward(gauss, dlobe, dgauss);
     }
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
@@ -3421,7 +3526,10 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16, *dinputs;
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
-        k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor, dgauss, drows,
+        if (lighting->deferred)
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__LAYERS - 2 + light), at, live, dspecular);
+        k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
+                           lighting->deferred ? dspecular : dcolor, dgauss, drows,
                            scratch + l->transposed - SSDGS__BLOCK, dnet, dvisibility);
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
@@ -3441,9 +3549,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
-    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
     for (c = 0; c < SSDGS_CHANNELS; c++)
-        for (s = 0; s < SSDGS__BLOCK && block * SSDGS__BLOCK + s < frame->shaded_count; s++)
+        for (s = 0; s < live; s++)
             frame->gradient[(size_t)c * frame->gaussians.stride + at[s]] = dgauss[c * SSDGS__BLOCK + s];
 }
 
@@ -3471,14 +3578,24 @@ static void ssdgs__sum_slots_task(void *data, int part) {
                      SSDGS__SLOTS, frame->global_gradient + first[SSDGS__SHADOW_NET]);
 }
 
-/* Overwrites gradient, global_gradient and light_gradient; adds the eye's part to view_gradient. */
+/* eye = -R^T t */
+static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
+    int j, c;
+    for (j = 0; j < 3; j++)
+        for (c = 0; c < 3; c++) {
+            frame->view_gradient[4 * j + c] -= frame->camera.view[4 * j + 3] * deye[c];
+            frame->view_gradient[4 * j + 3] -= frame->camera.view[4 * j + c] * deye[c];
+        }
+}
+
+/* Overwrites gradient; adds to global_gradient, light_gradient and view_gradient. */
 static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS, lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
     ssdgs_real sums[SSDGS__LANE_SUMS];
     ssdgs__shade_job job;
     size_t i;
-    int slot, light, j, c, lane;
+    int slot, light, lane;
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
@@ -3487,11 +3604,9 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
     SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
     memset(frame->gradient, 0, n * sizeof(ssdgs_real));
-    memset(frame->global_gradient, 0, frame->model->global_count * sizeof(ssdgs_real));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_backward_task, &job);
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__sum_slots_task, &job);
     memset(sums, 0, sizeof sums);
-    memset(frame->light_gradient, 0, sizeof frame->light_gradient);
     for (slot = 0; slot < SSDGS__SLOTS; slot++)
         for (light = 0; light < frame->light_count; light++)
             for (i = 0; i < SSDGS__LANE_SUMS; i++) {
@@ -3502,96 +3617,198 @@ static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
                 sums[i] += sum;
                 if (i < 3 && light == 0) frame->light_gradient[i] += sum;
             }
-    ssdgs__asg_backward(frame, sums + 6);
-    /* eye = -R^T t */
-    for (j = 0; j < 3; j++)
-        for (c = 0; c < 3; c++) {
-            frame->view_gradient[4 * j + c] -= frame->camera.view[4 * j + 3] * sums[3 + c];
-            frame->view_gradient[4 * j + 3] -= frame->camera.view[4 * j + c] * sums[3 + c];
-        }
+    if (!frame->layer_count) ssdgs__asg_backward(frame, sums + 6);
+    ssdgs__eye_backward(frame, sums + 3);
     return SSDGS_OK;
 }
 
 /* ==== >>composite  eq. 1 and its backward over tiles ==== */
 
-typedef struct ssdgs__composite_job { const ssdgs_frame *frame; const ssdgs_real *color; ssdgs_real *pixels,
-    *transmittance; } ssdgs__composite_job;
+/* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes or come from them. */
+static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count, ssdgs_real *const planes[]) {
+    int micro, row, c;
+    for (micro = 0; micro < 16; micro++)
+        for (row = 0; row < 4; row++) {
+            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row, inside = tile->width - x;
+            const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
+            if (inside <= 0 || y >= tile->height) continue;
+            for (c = 0; c < count; c++) {
+                const ssdgs_real *from = values + micro * 64 + c * 16 + 4 * row;
+                if (inside >= 4) memcpy(planes[c] + at, from, 4 * sizeof *from);
+                else memcpy(planes[c] + at, from, (size_t)inside * sizeof *from);
+            }
+        }
+}
+
+static void ssdgs__tile_load(const ssdgs__tile *tile, const ssdgs_real *plane, int c, ssdgs_real *values) {
+    int micro, row;
+    for (micro = 0; micro < 16; micro++)
+        for (row = 0; row < 4; row++) {
+            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row, inside = y < tile->height ? tile->width - x : 0;
+            const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
+            ssdgs_real *to = values + micro * 64 + 16 * c + 4 * row;
+            if (inside >= 4) memcpy(to, plane + at, 4 * sizeof *to);
+            else {
+                memset(to, 0, 4 * sizeof *to);
+                if (inside > 0) memcpy(to, plane + at, (size_t)inside * sizeof *to);
+            }
+        }
+}
+
+/* Blended, layer 0 is the colour. */
+static ssdgs_real *ssdgs__layer_plane(const ssdgs_frame *frame, int layer, int c) {
+    return frame->layer_pixels + (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)(3 * layer + c);
+}
+
+static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer, const ssdgs_real *values) {
+    ssdgs_real *planes[3];
+    int c;
+    if (!frame->layer_pixels) return;
+    for (c = 0; c < 3; c++) planes[c] = ssdgs__layer_plane(frame, layer, c);
+    ssdgs__tile_store(tile, values, 3, planes);
+}
+
+typedef struct ssdgs__composite_job {
+    const ssdgs_frame *frame;
+    const ssdgs_real *color;
+    ssdgs_real *planes[4];      /* colour, transmittance */
+    ssdgs__lighting *lightings; /* NULL: without the layers */
+} ssdgs__composite_job;
 
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
-    const ssdgs_splat_view *v = job->frame->views;
-    const ssdgs__tile tile = ssdgs__tile_of(job->frame, v, index, 1);
-    const size_t plane = (size_t)v->width * (size_t)v->height;
-    ssdgs_real pixels[16 * 64];
-    int micro, row, c;
-    job->frame->context->k->composite(&tile, job->color, pixels);
-    for (micro = 0; micro < 16; micro++)
-        for (row = 0; row < 4; row++) {
-            const int x = tile.x + 4 * (micro & 3), y = tile.y + 4 * (micro >> 2) + row, inside = v->width - x;
-            const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
-            if (inside <= 0 || y >= v->height) continue;
-            for (c = 0; c < 4; c++) {
-                const ssdgs_real *from = pixels + micro * 64 + c * 16 + 4 * row;
-                ssdgs_real *to = c < 3 ? job->pixels + plane * (size_t)c + at : job->transmittance + at;
-                if (inside >= 4) memcpy(to, from, 4 * sizeof *to);
-                else memcpy(to, from, (size_t)inside * sizeof *to);
+    const ssdgs_frame *frame = job->frame;
+    const ssdgs__kernels *k = frame->context->k;
+    const ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
+    const int layers = job->lightings ? SSDGS__LAYERS : 1;
+    const ssdgs_real *color[SSDGS__LAYERS];
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], *glow = pixels + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+    int layer, light;
+    for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
+    k->composite(&tile, layers, color, pixels);
+    if (job->lightings) {
+        for (layer = 0; layer < layers; layer++) ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
+        for (light = 0; light < frame->light_count; light++) {
+            if (light) {
+                color[0] = ssdgs__layer(frame, SSDGS__LAYERS - 2 + light);
+                k->composite(&tile, 1, color, glow);
+                ssdgs__layer_pixels_store(frame, &tile, SSDGS__LAYERS - 1 + light, glow);
             }
+            k->highlight(job->lightings + light, &tile, pixels);
         }
+    }
+    ssdgs__tile_store(&tile, pixels, 4, job->planes);
 }
 
-/* Any per-Gaussian triple: the colour, or a component. */
-static ssdgs_result ssdgs__composite_planes(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
+static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels,
+                                   ssdgs__lighting *lightings) {
+    const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
     ssdgs__composite_job job;
+    int c;
     job.frame = frame;
     job.color = color;
-    job.pixels = pixels;
-    job.transmittance = frame->transmittance;
+    for (c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
+    job.planes[3] = frame->transmittance;
+    job.lightings = lightings;
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task, &job);
-    return SSDGS_OK;
+}
+
+/* Any per-Gaussian triple, a component. */
+static void ssdgs__composite_planes(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
+    ssdgs__composite_tiles(frame, color, pixels, NULL);
+}
+
+static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
+    ssdgs__lighting *lightings = NULL;
+    const ssdgs_result result = frame->layer_count ? ssdgs__lightings(frame, &lightings) : SSDGS_OK;
+    if (!result) ssdgs__composite_tiles(frame, frame->color, frame->pixels, lightings);
+    return result;
+}
+
+typedef struct ssdgs__uncomposite_job {
+    ssdgs_frame *frame;
+    ssdgs__lighting *lightings;
+    ssdgs_real *highlight_sums; /* (tiles, lights, SSDGS__HIGHLIGHT_SUMS) */
+    size_t stride;              /* of tile_sums: 8 and 4 per layer */
+} ssdgs__uncomposite_job;
+
+/* The fourth of a walk's first layer: what the gradients' product with the pixel comes to, 1: with T's. */
+static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradient, int layers, int transmittance) {
+    int micro, lane, layer, c;
+    for (micro = 0; micro < 16; micro++)
+        for (lane = 0; lane < 16; lane++) {
+            const int at = micro * 64 + lane;
+            ssdgs_real total = transmittance ? pixels[at + 48] * gradient[at + 48] : 0;
+            for (layer = 0; layer < layers; layer++)
+                for (c = 0; c < 3; c++) {
+                    const int value = layer * SSDGS__TILE_LAYER + at + 16 * c;
+                    total += gradient[value] * pixels[value];
+                }
+            gradient[at + 48] = total;
+        }
 }
 
 static void ssdgs__composite_backward_task(void *data, int index) {
-    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs__uncomposite_job *job = (const ssdgs__uncomposite_job *)data;
+    const ssdgs_frame *frame = job->frame;
     const ssdgs_splat_view *v = frame->views;
+    const ssdgs__kernels *k = frame->context->k;
     const ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
-    ssdgs_real pixels[16 * 64];
-    int micro, lane, c;
+    const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1, last = (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+    const ssdgs_real *color[SSDGS__LAYERS];
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
+    ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
+    int layer, light, c;
     if (!tile.count) return;
-    for (micro = 0; micro < 16; micro++)
-        for (lane = 0; lane < 16; lane++) {
-            const int x = tile.x + 4 * (micro & 3) + (lane & 3), y = tile.y + 4 * (micro >> 2) + (lane >> 2);
-            const size_t at = (size_t)y * (size_t)v->width + (size_t)x;
-            ssdgs_real *p = pixels + micro * 64 + lane, total = 0;
-            for (c = 0; c < 4; c++) p[16 * c] = 0;
-            if (x >= v->width || y >= v->height) continue;
-            for (c = 0; c < 3; c++) {
-                p[16 * c] = frame->pixel_gradient[plane * (size_t)c + at];
-                total += p[16 * c] * frame->pixels[plane * (size_t)c + at];
-            }
-            p[48] = total + frame->transmittance[at] * frame->pixel_gradient[plane * 3 + at];
-        }
-    frame->context->k->composite_backward(&tile, frame->color, pixels, v->tile_sums + (size_t)v->tile_start[index] * SSDGS__SUMS);
+    memset(sums, 0, tile.count * job->stride * sizeof *sums);
+    for (c = 0; c < 4; c++) ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
+    for (layer = 0; layer < layers - deferred; layer++)
+        for (c = 0; c < 3; c++)
+            ssdgs__tile_load(&tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
+                             pixels + layer * SSDGS__TILE_LAYER);
+    ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
+    memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
+    for (light = deferred * frame->light_count - 1; light >= 0; light--) { /* the first one's M is walked with the other layers */
+        const int m = SSDGS__LAYERS - 1 + light;
+        for (c = 0; c < 3; c++) ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, m, c), c, pixels + last);
+        k->highlight_backward(job->lightings + light, &tile, pixels, gradient,
+                              job->highlight_sums + (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
+        if (!light) continue;
+        color[0] = ssdgs__layer(frame, m - 1);
+        ssdgs__gradient_product(pixels + last, gradient + last, 1, 0);
+        k->composite_backward(&tile, 1, color, gradient + last, sums, job->stride, m);
+    }
+    for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
+    ssdgs__gradient_product(pixels, gradient, layers, 1);
+    k->composite_backward(&tile, layers, color, gradient, sums, job->stride, 0);
 }
 
 static void ssdgs__splat_gradient_task(void *data, int index) {
-    const ssdgs_frame *frame = (const ssdgs_frame *)data;
+    const ssdgs__uncomposite_job *job = (const ssdgs__uncomposite_job *)data;
+    const ssdgs_frame *frame = job->frame;
     const ssdgs_splat_view *v = frame->views;
     const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
-    int begin, end, i;
+    int begin, end, i, layer;
     size_t g;
     ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
     for (g = (size_t)begin; g < (size_t)end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
         const ssdgs_real *r = v->record + 8 * g;
-        ssdgs_real a, b, c, sum[SSDGS__SUMS], *d = frame->splat_gradient + SSDGS__SPLAT * g;
+        ssdgs_real a, b, c, sum[8], *d = frame->splat_gradient + SSDGS__SPLAT * g;
         uint32_t instance;
         if (!of.count) continue;
         a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
         memset(sum, 0, sizeof sum);
         for (instance = of.first; instance < of.first + of.count; instance++) {
             const uint32_t place = v->instance[instance].place;
-            for (i = 0; v->tile_seen[place] && i < SSDGS__SUMS; i++) sum[i] += v->tile_sums[(size_t)place * SSDGS__SUMS + (size_t)i];
+            const ssdgs_real *from = v->tile_sums + (size_t)place * job->stride;
+            if (!v->tile_seen[place]) continue;
+            for (i = 0; i < 8; i++) sum[i] += from[i];
+            for (layer = 0; layer <= frame->layer_count; layer++) {
+                ssdgs_real *to = (layer ? ssdgs__layer_gradient(frame, layer - 1) : frame->color_gradient) + 4 * g;
+                for (i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
+            }
         }
         /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
         d[0] = a * sum[1] + b * sum[2];
@@ -3601,21 +3818,55 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         d[4] = (ssdgs_real)-0.5 * sum[5];
         d[5] = sum[0];
         d[6] = sum[6];
-        for (i = 0; i < 3; i++) frame->color_gradient[4 * g + (size_t)i] = sum[8 + i];
+        d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, 2)[4 * g] : 0;
     }
+}
+
+/* Sums of the tiles -> light, view and ASG gradients. */
+static void ssdgs__highlight_gradient(ssdgs_frame *frame, const ssdgs__uncomposite_job *job) {
+    const size_t tiles = (size_t)frame->views[0].tiles_x * (size_t)frame->views[0].tiles_y;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], tile;
+    int light, i, j;
+    ssdgs__global_groups(&frame->settings, first);
+    for (tile = 0; tile < tiles; tile++)
+        for (light = 0; light < frame->light_count; light++) {
+            const ssdgs_real *sum = job->highlight_sums + (tile * (size_t)frame->light_count + (size_t)light) * SSDGS__HIGHLIGHT_SUMS;
+            for (i = 0; i < 3 && !light; i++) frame->light_gradient[i] += sum[i];
+            ssdgs__eye_backward(frame, sum + 3);
+            for (i = 0; i < 9; i++) frame->view_gradient[4 * (i / 3) + i % 3] += sum[6 + i];
+            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+                for (i = 0; i < 2; i++) frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] += sum[15 + 2 * j + i];
+                frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] += sum[15 + 2 * SSDGS_ASG_COUNT + j];
+            }
+        }
 }
 
 static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     ssdgs_splat_view *v = frame->views;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
-    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
-    SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * SSDGS__SUMS + SSDGS__SUMS);
+    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK, tiles = (size_t)v->tiles_x * (size_t)v->tiles_y;
+    const size_t sums = tiles * (size_t)frame->light_count * SSDGS__HIGHLIGHT_SUMS;
+    ssdgs__uncomposite_job job;
+    memset(&job, 0, sizeof job);
+    job.frame = frame;
+    job.stride = 8 + 4 * (size_t)(1 + frame->layer_count);
+    if (frame->layer_count) {
+        const ssdgs_result result = ssdgs__lightings(frame, &job.lightings);
+        if (result) return result;
+        SSDGS__RESERVE(frame->memory->highlight_sums, job.highlight_sums, ssdgs_real, sums);
+        memset(job.highlight_sums, 0, sums * sizeof *job.highlight_sums);
+        memset(frame->layer_gradient, 0, n * 4 * (size_t)frame->layer_count * sizeof(ssdgs_real));
+    }
+    SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, (v->instances + 1) * job.stride);
     memset(frame->splat_gradient, 0, n * SSDGS__SPLAT * sizeof(ssdgs_real));
     memset(frame->color_gradient, 0, n * 4 * sizeof(ssdgs_real));
+    memset(frame->global_gradient, 0, frame->model->global_count * sizeof(ssdgs_real));
+    memset(frame->light_gradient, 0, sizeof frame->light_gradient);
     memset(frame->view_gradient, 0, sizeof frame->view_gradient);
-    ssdgs__parallel(context, v->tiles_x * v->tiles_y, ssdgs__composite_backward_task, frame);
-    ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__splat_gradient_task, frame);
+    ssdgs__parallel(context, (int)tiles, ssdgs__composite_backward_task, &job);
+    ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__splat_gradient_task, &job);
+    if (frame->layer_count) ssdgs__highlight_gradient(frame, &job);
     return SSDGS_OK;
 }
 
@@ -3651,7 +3902,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
         case SSDGS_STAGE_BIN: return ssdgs__bin(frame);
         case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
         case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
-        case SSDGS_STAGE_COMPOSITE: return ssdgs__composite_planes(frame, frame->color, frame->pixels);
+        case SSDGS_STAGE_COMPOSITE: return ssdgs__composite(frame);
         case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
         case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
         case SSDGS_STAGE_PROJECT_BACKWARD: return ssdgs__project_backward(frame);
@@ -3746,7 +3997,9 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
         const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
         if (!to[c]) continue;
-        ssdgs__composite_planes(&frame, from[c], planes);
+        if (c == 1 && frame.layer_count) {
+            for (i = 0; i < pixels * 3; i++) planes[i] = frame.pixels[i] - frame.layer_pixels[i];
+        } else ssdgs__composite_planes(&frame, from[c], planes);
         ssdgs__write_rows(&frame, planes, 3, stride, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
@@ -3813,7 +4066,6 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
     }
 }
 
-#define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which colours are not divided by it */
 
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored) {
@@ -5091,8 +5343,8 @@ static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) 
     return o->iterations < 60000 ? iteration * (60000.0 / o->iterations) : (double)iteration;
 }
 
-/* Terms in use at time t, and per group whether it learns. */
-static int ssdgs__phase(const ssdgs_train_options *o, double t, int learns[SSDGS__GROUPS]) {
+/* Terms in use at time t, and per group whether it learns. Deferred lobes have no basis that could be frozen. */
+static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int learns[SSDGS__GROUPS]) {
     double scattering = 9e3, specular = 16e3, freeze_scattering = 13e3, thaw_scattering = 20e3, thaw_asg = 20e3;
     int terms = SSDGS_DIFFUSE_TERM, i;
     const int joint = o->schedule == SSDGS_SCHEDULE_JOINT, merged = o->schedule == SSDGS_SCHEDULE_MERGED;
@@ -5109,7 +5361,7 @@ static int ssdgs__phase(const ssdgs_train_options *o, double t, int learns[SSDGS
     if (t >= specular) terms |= SSDGS_SPECULAR_TERM;
     learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] = learns[SSDGS__G_MATERIAL] = !(t >= 9e3 && t < 16e3);
     learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] = !(t >= freeze_scattering && t < thaw_scattering);
-    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++) learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg;
+    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++) learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg || asg == SSDGS_ASG_DEFERRED;
     return terms;
 }
 
@@ -5906,7 +6158,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (!trainer) return SSDGS_ERR_ARGUMENT;
     o = &trainer->options;
     t = ssdgs__schedule_time(o, trainer->iteration);
-    terms = ssdgs__phase(o, t, learns) & trainer->model->settings.terms;
+    terms = ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
     photo = ssdgs__next_photo(trainer);
     correction = trainer->corrections + photo;
     for (j = 0; j < 3; j++)
@@ -5979,7 +6231,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
     ssdgs__block_layout layout;
-    size_t per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
+    size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
     ssdgs_frame frame;
     double across;
     if (!settings || !options || width < 1 || height < 1) return 0;
@@ -5987,6 +6239,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     frame.settings = *settings;
     frame.terms = settings->terms;
     frame.training = frame.light_count = 1;
+    layers = settings->asg == SSDGS_ASG_DEFERRED && (settings->terms & SSDGS_SPECULAR_TERM) ? SSDGS__LAYERS : 1;
     layout = ssdgs__layout(&frame);
     ssdgs__global_groups(settings, first);
     n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
@@ -5995,11 +6248,11 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     across = 6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
     instances = (size_t)((double)points * across * across);
     instances = 2 * n + (instances > 3 * n ? instances : 3 * n);
-    per_instance = sizeof(ssdgs_real) * SSDGS__SUMS + sizeof(ssdgs_tile_entry) + 12;
+    per_instance = sizeof(ssdgs_real) * (8 + 4 * layers) + sizeof(ssdgs_tile_entry) + 12;
     /* parameters and two moments with a quarter of slack, gradients, splat records of two views, activations */
-    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + layout.size / SSDGS__BLOCK) + 160;
+    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) + 160;
     fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
-        6 * first[SSDGS__GLOBAL_GROUPS] + 36 * ((size_t)width + 48) * ((size_t)height + 10);
+        6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 3 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
@@ -6756,7 +7009,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
     }
 }
 
-/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity). Adds to the gradient planes; view_slot (12) is overwritten. */
+/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes; view_slot (12) is overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
                                    const R *splat, R *gradient, size_t gradient_stride, R *view_slot) {
     V view_sum[12][SSDGS__NV];
@@ -6767,16 +7020,16 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
     for (i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
         const size_t v = i / SSDGS__VW % SSDGS__NV;
-        R lane[6][SSDGS__VW], any = 0;
-        V g[6], total, inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3];
+        R lane[8][SSDGS__VW], any = 0;
+        V g[8], total, inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3];
         for (l = 0; l < SSDGS__VW; l++)
-            for (j = 0; j < 6; j++) {
-                lane[j][l] = splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
+            for (j = 0; j < 8; j++) {
+                lane[j][l] = j == 6 ? 0 : splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
                 any = lane[j][l] != 0 ? 1 : any;
             }
         if (any == 0) continue;
         total = VSET(0);
-        for (j = 0; j < 6; j++) {
+        for (j = 0; j < 8; j++) {
             g[j] = VLOAD(lane[j]);
             total = VADD(total, VABS(g[j]));
         }
@@ -6823,7 +7076,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             V logit = VSEL(VLT(VABS(raw), VSET(20)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
             VSTORE(d, VADD(VLOAD(d), logit));
         }
-        dt[2] = VSET(0);
+        dt[2] = g[7];
         for (l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
             V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z), slope = VMUL(p.t[l], p.inverse_z);
             V w0 = VSET(k->view[4 * l]), w1 = VSET(k->view[4 * l + 1]), w2 = VSET(k->view[4 * l + 2]);
@@ -7152,29 +7405,34 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     else F(walk_light_lanes)(tile, sums, 0, 0);
 }
 
-/* ==== >>composite_kernel  eq. 1: color (n, 4) of Gaussians -> three planes of the tile's pixels ====
-   pixels: [micro-tile][3 colours, transmittance][16 lanes]. */
-SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) {
+/* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ====
+   pixels: [layer][micro-tile][3 colours, transmittance in the first layer][16 lanes]. */
+SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color, R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
-    R local[SSDGS__BATCH][4], transmittance[16][16];
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], transmittance[16][16];
     uint32_t from = 0;
-    int micro, v, i, n;
+    int micro, v, i, n, layer;
+    memset(pixels, 0, (size_t)layers * SSDGS__TILE_LAYER * sizeof *pixels);
     for (micro = 0; micro < 16; micro++) {
-        for (v = 0; v < 64; v++) pixels[micro * 64 + v] = v < 48 ? (R)0 : (R)1;
+        for (v = 48; v < 64; v++) pixels[micro * 64 + v] = 1;
         for (v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
     }
     while (from < tile->count) {
         n = F(batch_gather)(&batch, tile, &from);
-        for (i = 0; i < n; i++) memcpy(local[i], color + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
+        for (layer = 0; layer < layers; layer++)
+            for (i = 0; i < n; i++)
+                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
-            V px[SSDGS__NV], py[SSDGS__NV], c[3][SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
+            V px[SSDGS__NV], py[SSDGS__NV], c[SSDGS__LAYERS][3][SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
+                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                    SSDGS__UNROLL for (i = 0; i < 3; i++)
+                        c[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
@@ -7187,11 +7445,15 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
                     w = VSEL(live, VMUL(alpha, t[v]), VSET(0));
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
-                    SSDGS__UNROLL for (i = 0; i < 3; i++) c[i][v] = VFMA(w, VSET(local[index][i]), c[i][v]);
+                    SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                        SSDGS__UNROLL for (i = 0; i < 3; i++)
+                            c[layer][i][v] = VFMA(w, VSET(local[layer][index][i]), c[layer][i][v]);
                 }
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (i = 0; i < 3; i++) VSTORE(pixel + 16 * i + v * SSDGS__VW, c[i][v]);
+                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                    SSDGS__UNROLL for (i = 0; i < 3; i++)
+                        VSTORE(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[layer][i][v]);
                 VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
@@ -7199,15 +7461,22 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, const R *color, R *pixels) 
     }
 }
 
-/* pixels: [micro-tile][3 colour gradients, the gradients' product with the pixel][16 lanes]. Per entry, sums (n, 12) of
-   g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w, 0, w dC. Walks front to back again: what lies
-   behind an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
-SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, const R *pixels, R *sums) {
+SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const *color, R *pixels) {
+    if (layers == 1) F(composite_layers)(1, tile, color, pixels);
+    else F(composite_layers)(SSDGS__LAYERS, tile, color, pixels);
+}
+
+/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the pixel][16 lanes]. Per entry
+   adds to sums (n, stride) of g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w of slot 0, 0; from
+   8 + 4 slot on w dC of each layer. Walks front to back again: what lies behind an entry is the final pixel less what has been
+   passed, so alpha and T are the forward's, bit for bit. */
+SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color, const R *pixels, R *sums,
+                                            size_t stride, int slot) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
     F(batch) batch;
-    R local[SSDGS__BATCH][4], passed[16][16], transmittance[16][16];
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], passed[16][16], transmittance[16][16];
     uint32_t from = 0;
-    int micro, v, i, n;
+    int micro, v, i, n, layer;
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             passed[micro][v] = 0;
@@ -7215,26 +7484,27 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
         }
     while (from < tile->count) {
         n = F(batch_gather)(&batch, tile, &from);
-        for (i = 0; i < n; i++) {
-            memcpy(local[i], color + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
-            memset(sums + (size_t)batch.place[i] * SSDGS__SUMS, 0, SSDGS__SUMS * sizeof(R));
-        }
+        for (layer = 0; layer < layers; layer++)
+            for (i = 0; i < n; i++)
+                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             const R *pixel = pixels + micro * 64;
-            V px[SSDGS__NV], py[SSDGS__NV], dc[4][SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
+            V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (i = 0; i < 4; i++) dc[i][v] = VLOAD(pixel + 16 * i + v * SSDGS__VW);
+                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                    SSDGS__UNROLL for (i = 0; i < 3; i++)
+                        dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                product[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
             }
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
-                const V red = VSET(local[index][0]), green = VSET(local[index][1]), blue = VSET(local[index][2]);
-                R *out = sums + (size_t)batch.place[index] * SSDGS__SUMS;
-                V sum[12][SSDGS__NV];
+                R *out = sums + (size_t)batch.place[index] * stride;
+                V sum[8 + 4 * SSDGS__LAYERS][SSDGS__NV];
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w, shade, behind, g, gx, gy, before_it = t[v];
                     VM drawn;
@@ -7242,9 +7512,12 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
                     w = VMUL(alpha, before_it);
-                    shade = VDOT3(red, green, blue, dc[0][v], dc[1][v], dc[2][v]);
+                    shade = VDOT3(VSET(local[0][index][0]), VSET(local[0][index][1]), VSET(local[0][index][2]), dc[0][0][v], dc[0][1][v],
+                                  dc[0][2][v]);
+                    SSDGS__UNROLL for (layer = 1; layer < layers; layer++)
+                        SSDGS__UNROLL for (i = 0; i < 3; i++) shade = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], shade);
                     before[v] = VFMA(w, shade, before[v]);
-                    behind = VDIV(VSUB(dc[3][v], before[v]), VSUB(one, alpha));
+                    behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
                     g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
                     g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
                     gx = VMUL(g, dx);
@@ -7255,15 +7528,17 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
                     sum[3][v] = VMUL(gx, dx);
                     sum[4][v] = VMUL(gx, dy);
                     sum[5][v] = VMUL(gy, dy);
-                    sum[6][v] = w;
-                    sum[8][v] = VMUL(w, dc[0][v]);
-                    sum[9][v] = VMUL(w, dc[1][v]);
-                    sum[10][v] = VMUL(w, dc[2][v]);
-                    sum[7][v] = sum[11][v] = zero;
+                    sum[6][v] = slot ? zero : w;
+                    sum[7][v] = zero;
+                    SSDGS__UNROLL for (layer = 0; layer < layers; layer++) {
+                        SSDGS__UNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
+                        sum[11 + 4 * layer][v] = zero;
+                    }
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
-                F(sum4)(out + 8, sum[8], sum[9], sum[10], sum[11]);
+                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer], sum[11 + 4 * layer]);
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
@@ -7271,6 +7546,12 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, const R *color, co
             }
         }
     }
+}
+
+SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *sums, size_t stride,
+                                     int slot) {
+    if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, sums, stride, slot);
+    else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, sums, stride, slot);
 }
 
 /* ==== >>transport_kernel ====
@@ -7509,6 +7790,19 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 
 /* ==== >>asg_kernel  eqs. 9 to 12: directions, Lambert's cosine, Fresnel x ASG of a block under one light ==== */
 
+/* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
+SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
+    V h2 = VDOT3(h[0], h[1], h[2], h[0], h[1], h[2]);
+    int i;
+    *half = VGE(h2, VSET(1e-12)); /* wi = -wo has no half vector: no highlight there */
+    *inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
+    for (i = 0; i < 3; i++) h[i] = VMUL(h[i], *inverse_h);
+    *missing = VSUB(VSET(1), VDOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
+    *missing = VMAX(VSET(0), VMIN(VSET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
+    h2 = VMUL(*missing, *missing);
+    *fifth = VMUL(VMUL(h2, h2), *missing);
+}
+
 /* One lane set of the geometry; both directions of the pass run through it. */
 typedef struct F(geometry) {
     V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3],
@@ -7517,7 +7811,7 @@ typedef struct F(geometry) {
 } F(geometry);
 
 SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const R *gauss) {
-    V x[3], raw[4], d2, e2, h2;
+    V x[3], raw[4], d2, e2, fifth;
     int i;
     for (i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
     for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
@@ -7537,15 +7831,9 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const
         g->h[i] = VADD(g->wi[i], g->wo[i]);
     }
     g->cosine = VDOT3(g->r[2], g->r[5], g->r[8], g->wi[0], g->wi[1], g->wi[2]);
-    h2 = VDOT3(g->h[0], g->h[1], g->h[2], g->h[0], g->h[1], g->h[2]);
-    g->half = VGE(h2, VSET(1e-12)); /* wi = -wo has no half vector: no highlight there */
-    g->inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
-    for (i = 0; i < 3; i++) g->h[i] = VMUL(g->h[i], g->inverse_h);
+    F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &fifth);
     for (i = 0; i < 3; i++) g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
-    g->missing = VSUB(VSET(1), VDOT3(g->wo[0], g->wo[1], g->wo[2], g->h[0], g->h[1], g->h[2]));
-    g->missing = VMAX(VSET(0), VMIN(VSET(1), g->missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
-    h2 = VMUL(g->missing, g->missing);
-    g->fresnel = VFMA(VSET(1 - SSDGS__F0), VMUL(VMUL(h2, h2), g->missing), VSET(SSDGS__F0));
+    g->fresnel = VFMA(VSET(1 - SSDGS__F0), fifth, VSET(SSDGS__F0));
 }
 
 /* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma (angular).
@@ -7594,7 +7882,7 @@ SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
     return value;
 }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s. */
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s, which deferred is 1. */
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
@@ -7608,14 +7896,14 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
         }
         VSTORE(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, g.irradiance);
         VSTORE(rows + SSDGS__COSINE * SSDGS__BLOCK + s, VMAX(VSET(0), g.cosine));
-        if (k->specular)
+        if (k->specular && !k->deferred)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
                 V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL)
                     : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
                 d = VFMA(weight, lobe, d);
             }
-        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s, VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
+        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s, k->deferred ? VSET(1) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
     }
 }
 
@@ -7633,9 +7921,9 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             dn[i] = VLOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
             dlocal[i] = VSET(0);
         }
-        df = VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
+        df = k->deferred ? VSET(0) : VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
         dlobe = VMUL(df, g.fresnel);
-        if (k->specular)
+        if (k->specular && !k->deferred)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw), de[3], db[12], lobe,
                     push;
@@ -7685,6 +7973,240 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             VSTORE(out, VADD(VLOAD(out), to_light));
             VSTORE(out + 48, VADD(VLOAD(out + 48), to_eye));
         }
+    }
+}
+
+/* ==== >>highlight_kernel  eqs. 9, 10 and 12 of a tile's pixels under one light, from what their Gaussians blend to ====
+   Q = layers 1, 2 / A, depth and F0 = layer 3 / A with A, the sum of the weights, its third; the normal is layer 4's direction,
+   M = layer 5. */
+
+typedef struct F(glint) {
+    V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing, fifth, fresnel;
+    V n[3], inverse_n, along, p[2][3], row[2][3], q[2]; /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
+    V to_camera[2]; /* the camera's ray (x, y, 1) */
+    VM half;
+} F(glint);
+
+SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pixel[2], const R *layers) {
+    const R *q = layers + SSDGS__TILE_LAYER, *more = layers + 3 * SSDGS__TILE_LAYER, *normal = layers + 4 * SSDGS__TILE_LAYER;
+    V at[3], d2;
+    int i, j;
+    g->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(more + 32), VSET(SSDGS__THIN)));
+    g->depth = VMUL(VLOAD(more), g->inverse_cover);
+    g->f0 = VMUL(VLOAD(more + 16), g->inverse_cover);
+    g->to_camera[0] = VMUL(VSUB(pixel[0], VSET(k->cx)), VSET(k->inverse_fx));
+    g->to_camera[1] = VMUL(VSUB(pixel[1], VSET(k->cy)), VSET(k->inverse_fy));
+    for (i = 0; i < 3; i++)
+        g->ray[i] = VFMA(VSET(k->view[i]), g->to_camera[0], VFMA(VSET(k->view[4 + i]), g->to_camera[1], VSET(k->view[8 + i])));
+    d2 = VDOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
+    g->inverse_ray = VDIV(VSET(1), VSQRT(d2));
+    for (i = 0; i < 3; i++) {
+        at[i] = VFMA(g->ray[i], g->depth, VSET(k->eye[i]));
+        g->wo[i] = VNEG(VMUL(g->ray[i], g->inverse_ray));
+        g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), at[i]);
+    }
+    d2 = VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
+    g->inverse_light = k->directional ? VSET(1) : VDIV(VSET(1), VSQRT(d2));
+    for (i = 0; i < 3; i++) {
+        g->wi[i] = VMUL(g->wi[i], g->inverse_light);
+        g->h[i] = VADD(g->wi[i], g->wo[i]);
+    }
+    F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &g->fifth);
+    g->fresnel = VFMA(VSUB(VSET(1), g->f0), g->fifth, g->f0);
+    for (i = 0; i < 3; i++) g->n[i] = VLOAD(normal + 16 * i);
+    d2 = VDOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
+    g->half = VAND(g->half, VGE(d2, VSET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
+    g->inverse_n = VDIV(VSET(1), VSQRT(VMAX(d2, VSET(SSDGS__THIN * SSDGS__THIN))));
+    for (i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
+    g->along = VDOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
+    for (i = 0; i < 3; i++) {
+        g->p[0][i] = VFNMA(g->n[i], g->along, g->h[i]);
+        g->p[1][i] = g->h[i];
+    }
+    for (j = 0; j < 2; j++) {
+        for (i = 0; i < 3; i++)
+            g->row[j][i] = VMUL(g->inverse_cover, VFMA(VLOAD(q + 16 * i), g->p[j][i],
+                                                       VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
+                                                            VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
+        g->q[j] = VDOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
+    }
+}
+
+/* exp(-s ((1 - t) q0 + t q1)) of lobe j */
+SSDGS__FI V F(glow_lobe)(const R *basis, const V q[2]) {
+    return VEXP(VMUL(VSET(-basis[9]), VMAX(VSET(0), VFMA(VSET(1 - basis[8]), q[0], VMUL(VSET(basis[8]), q[1])))));
+}
+
+SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
+    V sum = VSET(0);
+    int j;
+    for (j = 0; j < SSDGS_ASG_COUNT; j++) sum = VFMA(VSET(k->basis[12 * j + 10]), F(glow_lobe)(k->basis + 12 * j, q), sum);
+    return sum;
+}
+
+/* Adds the light's specular term to layer 0. */
+SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers) {
+    int micro, v, c;
+    for (micro = 0; micro < 16; micro++) {
+        V px[SSDGS__NV], py[SSDGS__NV];
+        R *at = layers + micro * 64, *m = at + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+        F(pixel_centres)(tile, micro, px, py);
+        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW) {
+            const V pixel[2] = {px[v], py[v]};
+            F(glint) g;
+            V value;
+            if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
+            F(glint_lanes)(&g, k, pixel, at);
+            value = VSEL(g.half, VMUL(g.fresnel, F(glow)(k, g.q)), VSET(0));
+            for (c = 0; c < 3; c++) VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
+        }
+    }
+}
+
+/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes layer 5; adds to sums (SSDGS__HIGHLIGHT_SUMS). */
+SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers, R *gradient, R *sums) {
+    V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
+    int micro, v, i, j;
+    for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
+        for (v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
+    for (micro = 0; micro < 16; micro++) {
+        V px[SSDGS__NV], py[SSDGS__NV];
+        const R *at = layers + micro * 64, *m = at + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+        R *d = gradient + micro * 64, *dm = d + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+        F(pixel_centres)(tile, micro, px, py);
+        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW) {
+            const V pixel[2] = {px[v], py[v]};
+            F(glint) g;
+            V glow, value, push = VSET(0), dq[2], df0, dwoh, dh[3], dn[3], dwo[3], dsum, radial, along, ddepth, dat[3], dray, dcover,
+                to;
+            R *dlayer = d + SSDGS__TILE_LAYER;
+            F(glint_lanes)(&g, k, pixel, at);
+            glow = F(glow)(k, g.q);
+            value = VSEL(g.half, VMUL(g.fresnel, glow), VSET(0));
+            for (i = 0; i < 3; i++) {
+                VSTORE(dm + 16 * i, VMUL(VLOAD(d + 16 * i), value));
+                push = VFMA(VLOAD(d + 16 * i), VLOAD(m + 16 * i), push);
+            }
+            push = VSEL(g.half, push, VSET(0));
+            dq[0] = dq[1] = VSET(0);
+            for (j = 0; j < SSDGS_ASG_COUNT; j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
+                const R *b = k->basis + 12 * j;
+                const V lobe = VMUL(VMUL(push, g.fresnel), F(glow_lobe)(b, g.q)), pull = VMUL(VSET(-b[9] * b[10]), lobe);
+                V *out = sum[15 + 2 * j] + v;
+                const V fold = VFMA(VSET(1 - b[8]), g.q[0], VMUL(VSET(b[8]), g.q[1]));
+                dq[0] = VFMA(VSET(1 - b[8]), pull, dq[0]);
+                dq[1] = VFMA(VSET(b[8]), pull, dq[1]);
+                *out = VFMA(fold, pull, *out);
+                out += SSDGS__NV;
+                *out = VFMA(VMUL(VSET(b[8] * (1 - b[8])), VSUB(g.q[1], g.q[0])), pull, *out);
+                sum[15 + 2 * SSDGS_ASG_COUNT + j][v] = VFMA(VSET(b[11]), lobe, sum[15 + 2 * SSDGS_ASG_COUNT + j][v]);
+            }
+            /* F = F0 + (1 - F0) (1 - wo.h)^5 */
+            push = VMUL(push, glow);
+            df0 = VMUL(push, VSUB(VSET(1), g.fifth));
+            to = VMUL(g.missing, g.missing);
+            dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
+            for (j = 0; j < 2; j++) {
+                to = VMUL(dq[j], g.inverse_cover);
+                for (i = 0; i < 3; i++) {
+                    const V twice = VMUL(VMUL(VSET(2), to), g.p[j][i]);
+                    R *cross = dlayer + SSDGS__TILE_LAYER + 16 * i;
+                    VSTORE(dlayer + 16 * i, VFMA(VMUL(to, g.p[j][i]), g.p[j][i], VLOAD(dlayer + 16 * i)));
+                    VSTORE(cross, VFMA(twice, g.p[j][(i + 1) % 3], VLOAD(cross)));
+                }
+            }
+            for (i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
+            along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
+            for (i = 0; i < 3; i++) { /* p = h - n (n.h) */
+                dn[i] = VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along)));
+                dh[i] = VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
+                dwo[i] = VMUL(dwoh, g.h[i]);
+            }
+            radial = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
+            for (i = 0; i < 3; i++) {
+                R *out = dlayer + 3 * SSDGS__TILE_LAYER + 16 * i;
+                VSTORE(out, VFMA(VFNMA(g.n[i], radial, dn[i]), g.inverse_n, VLOAD(out)));
+            }
+            radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+            for (i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
+                dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
+                dwo[i] = VADD(dwo[i], dsum);
+                dh[i] = dsum;
+            }
+            radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
+            along = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+            ddepth = VSET(0);
+            for (i = 0; i < 3; i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
+                dat[i] = k->directional ? VSET(0) : VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
+                ddepth = VFMA(dat[i], g.ray[i], ddepth);
+                sum[i][v] = VSUB(sum[i][v], dat[i]);
+                sum[3 + i][v] = VADD(sum[3 + i][v], dat[i]);
+                dray = VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along), dwo[i]), g.inverse_ray));
+                sum[6 + i][v] = VFMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */
+                sum[9 + i][v] = VFMA(dray, g.to_camera[1], sum[9 + i][v]);
+                sum[12 + i][v] = VADD(dray, sum[12 + i][v]);
+            }
+            dlayer += 2 * SSDGS__TILE_LAYER;
+            VSTORE(dlayer, VFMA(ddepth, g.inverse_cover, VLOAD(dlayer)));
+            VSTORE(dlayer + 16, VFMA(df0, g.inverse_cover, VLOAD(dlayer + 16)));
+            /* Q, depth and F0 are over A, A > |N| */
+            dcover = VFMA(dq[0], g.q[0], VFMA(dq[1], g.q[1], VFMA(ddepth, g.depth, VMUL(df0, g.f0))));
+            VSTORE(dlayer + 32, VFNMA(dcover, g.inverse_cover, VLOAD(dlayer + 32)));
+        }
+    }
+    for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
+}
+
+/* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on. */
+SSDGS__FI V F(sharpness)(V raw) { return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw))); }
+SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_LOGIT))); }
+
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0. */
+SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
+    int s, i, j;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        V raw[4], q[4], r[9], sharp[2];
+        for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        F(rotation)(raw, q, r);
+        for (j = 0; j < 2; j++) sharp[j] = F(sharpness)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
+        for (i = 0; i < 6; i++) {
+            const int a = 3 * (i % 3), b = i < 3 ? a : (a + 3) % 9;
+            VSTORE(rows + i * SSDGS__BLOCK + s, VFMA(VMUL(sharp[0], r[a]), r[b], VMUL(VMUL(sharp[1], r[a + 1]), r[b + 1])));
+        }
+        for (i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
+        VSTORE(rows + 9 * SSDGS__BLOCK + s, F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
+    }
+}
+
+/* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK). */
+SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
+    int s, i, j;
+    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        V raw[4], q[4], r[9], dr[9], dq[4], inverse_q, f0;
+        R *out = dgauss + SSDGS_FRAME * SSDGS__BLOCK + s;
+        for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        inverse_q = F(rotation)(raw, q, r);
+        for (i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
+        for (j = 0; j < 2; j++) { /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
+            const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), sharp = F(sharpness)(log_sharp);
+            R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
+            V product = VSET(0);
+            for (i = 0; i < 3; i++) {
+                const int next = (i + 1) % 3, before = (i + 2) % 3;
+                const V row = VFMA(VMUL(VSET(2), VLOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
+                                   VFMA(VLOAD(drows + (3 + i) * SSDGS__BLOCK + s), r[3 * next + j],
+                                        VMUL(VLOAD(drows + (3 + before) * SSDGS__BLOCK + s), r[3 * before + j])));
+                dr[3 * i + j] = VMUL(sharp, row);
+                product = VFMA(VMUL(VSET(0.5), row), r[3 * i + j], product);
+            }
+            product = VSEL(VLT(VABS(log_sharp), VSET(SSDGS__SHARPEST)), VMUL(product, sharp), VSET(0));
+            VSTORE(dsharp, VADD(VLOAD(dsharp), product));
+        }
+        F(rotation_backward)(dq, q, inverse_q, dr);
+        for (i = 0; i < 4; i++, out += SSDGS__BLOCK) VSTORE(out, VADD(VLOAD(out), dq[i]));
+        f0 = F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
+        out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
+        VSTORE(out, VFMA(VFNMA(f0, f0, f0), VLOAD(drows + 9 * SSDGS__BLOCK + s), VLOAD(out)));
     }
 }
 
@@ -7825,9 +8347,10 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
     }
 }
 
-/* dcolor (3, BLOCK). Adds to dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
+/* dcolor (3, BLOCK), dspecular for the specular term alone: dcolor, unless that is deferred. Adds to dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
 SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
-                                  const R *optics, const R *dcolor, R *dgauss, R *drows, R *dshadow, R *doptics, R *dvisibility) {
+                                  const R *optics, const R *dcolor, const R *dspecular, R *dgauss, R *drows, R *dshadow, R *doptics,
+                                  R *dvisibility) {
     int s, c, i;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
@@ -7850,10 +8373,13 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             }
             if (k->specular) { /* c_s f_s S */
                 const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
+                const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
+                    glint = VMUL(VMUL(push, irradiance), factor), shine = VMUL(ks, gloss);
                 R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
-                VSTORE(out, VFMA(VMUL(lit, gloss), F(sigmoid)(raw), VLOAD(out)));
-                surface = VFMA(ks, gloss, surface);
-                dgloss = VFMA(lit, ks, dgloss);
+                VSTORE(out, VFMA(VMUL(glint, gloss), F(sigmoid)(raw), VLOAD(out)));
+                dgloss = VFMA(glint, ks, dgloss);
+                dirradiance = VFMA(VMUL(push, factor), shine, dirradiance);
+                dfactor = VFMA(VMUL(push, irradiance), shine, dfactor);
             }
             dirradiance = VFMA(VMUL(g, factor), surface, dirradiance);
             if (k->scattering) { /* c_sss f_sss */
@@ -8068,6 +8594,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 
 static const ssdgs__kernels F(kernels) = {
     F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
+    F(highlight), F(highlight_backward), F(lobe), F(lobe_backward),
     F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward),
     F(reflect), F(reflect_backward), F(dipole_profile),
     F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)

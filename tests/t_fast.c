@@ -162,6 +162,7 @@ static void test_max_error(void) {
                 frame.color[4 * i] = frame.seen[i] == SSDGS_GLIMPSED;
                 glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
             }
+            frame.layer_count = 0; /* the weights alone */
             CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
             for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
             CHECK(most > 0 && most <= bounds[b] * (1 + 1e-5));

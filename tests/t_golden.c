@@ -491,7 +491,7 @@ static void test_network(const char *name, int shadow, int residual, int default
         dother = reals((size_t)(l.widest + 1) * BLOCK);
         dweights = reals(count);
         slot = reals(ssdgs__slot_gradient_size(sizes, layers));
-        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, dgauss, drows, shadow ? dnet : dother,
+        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, one, dgauss, drows, shadow ? dnet : dother,
                                     shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
         dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, sizes[0], slot);
@@ -607,6 +607,7 @@ static void test_full(const char *name, int defaults) {
     size_t n, i, pixels, first[SSDGS__GLOBAL_GROUPS + 1], stride;
     int c;
     if (!gold_open(&file, name)) return;
+    settings.asg = SSDGS_ASG_GEOMETRIC;
     settings.pixel_variance = (ssdgs_real)0.3;
     settings.view_octaves = settings.light_octaves = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];

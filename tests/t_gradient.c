@@ -35,6 +35,7 @@ static void fill(ssdgs_model *model) {
             p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = -2.2 + 0.5 * draw(at++);
         }
     }
+    v.gaussians[SSDGS_ASG_WEIGHT * v.stride + 2] = SSDGS__SHARPEST + 1; /* deferred lobes get no sharper */
     for (i = 0; i < model->global_count; i++) model->globals[i] += 0.3 * (2 * draw(at++) - 1);
 }
 
@@ -455,6 +456,8 @@ int main(void) {
     s = base, s.name = "transport", s.settings.transport = 1;
     run(&s);
     s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
+    run(&s);
+    s = base, s.name = "geometric ASG", s.settings.asg = SSDGS_ASG_GEOMETRIC;
     run(&s);
     s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;
     s.options.stop = 0.4;

@@ -11,7 +11,7 @@ typedef struct field { const char *name; size_t at; int real; double low, high; 
 static const field settings_fields[] = {
 #define I(name, low, high) WHOLE(ssdgs_settings, name, low, high)
 #define R(name, low, high) REAL(ssdgs_settings, name, low, high)
-    I(terms, 0, 15), I(baked, 0, 1), I(transfer, 0, 1), I(dipole, 0, 3), I(asg, 0, 1), I(per_channel_optics, 0, 1),
+    I(terms, 0, 15), I(baked, 0, 1), I(transfer, 0, 1), I(dipole, 0, 3), I(asg, 0, 2), I(per_channel_optics, 0, 1),
     I(depth_cue, 0, 1), I(transport, 0, 1), I(residual_shadow, 0, 1), I(shadow_on_scattering, 0, 1), I(scattering_layers, 2, 16),
     I(scattering_width, 1, 1024), I(view_octaves, 0, 8), I(light_octaves, 0, 8), I(shadow_layers, 0, 16),
     I(shadow_width, 1, 1024), I(light_blur, 0, 1), I(light_map_size, 0, 8192), R(light_bias, 0, 1e30),

@@ -747,21 +747,23 @@ static void test_schedule(void) {
     ssdgs_train_options o = ssdgs_train_options_default();
     int learns[SSDGS__GROUPS];
     o.iterations = 6000;
-    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 499), learns) == SSDGS_DIFFUSE_TERM);
-    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 500), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 499), learns) == SSDGS_DIFFUSE_TERM);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 500), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
     CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && learns[SSDGS__G_MATERIAL]);
-    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 900), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM));
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 900), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM));
     CHECK(!learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__G_MATERIAL] && learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET]);
-    CHECK(ssdgs__phase(&o, ssdgs__schedule_time(&o, 1600), learns) == SSDGS_ALL_TERMS);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 1600), learns) == SSDGS_ALL_TERMS);
     CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
-    ssdgs__phase(&o, ssdgs__schedule_time(&o, 2000), learns);
+    ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 2000), learns);
     CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
+    ssdgs__phase(&o, SSDGS_ASG_DEFERRED, ssdgs__schedule_time(&o, 1600), learns); /* no bases to wait for */
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SHARPNESS] && learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SIGMA]);
     o.schedule = SSDGS_SCHEDULE_JOINT;
-    CHECK(ssdgs__phase(&o, 0, learns) == SSDGS_ALL_TERMS);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 0, learns) == SSDGS_ALL_TERMS);
     o.schedule = SSDGS_SCHEDULE_SWAPPED;
-    CHECK(ssdgs__phase(&o, 9000, learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SPECULAR_TERM));
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 9000, learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SPECULAR_TERM));
     o.schedule = SSDGS_SCHEDULE_MERGED;
-    CHECK(ssdgs__phase(&o, 4999, learns) == SSDGS_DIFFUSE_TERM && ssdgs__phase(&o, 5000, learns) == SSDGS_ALL_TERMS);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 4999, learns) == SSDGS_DIFFUSE_TERM && ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 5000, learns) == SSDGS_ALL_TERMS);
 }
 
 /* The bf16 product against the float one: an odd depth, a row count that is no multiple of four. */

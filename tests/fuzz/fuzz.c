@@ -93,7 +93,7 @@ static ssdgs_settings draw_settings(input *in) {
     s.shadow_on_scattering ^= flags >> 5 & 1;
     s.light_blur ^= flags >> 6 & 1;
     s.dipole = draw_below(in, 4);
-    s.asg = draw_below(in, 2);
+    s.asg = draw_below(in, 3);
     s.scattering_layers = 2 + draw_below(in, 3);
     s.scattering_width = 1 + draw_below(in, 20);
     s.shadow_layers = draw_below(in, 4);
