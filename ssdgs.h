@@ -3588,7 +3588,8 @@ static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
         }
 }
 
-/* Overwrites gradient; adds to global_gradient, light_gradient and view_gradient. */
+/* Overwrites gradient and the networks' part of global_gradient, without layers the ASG's too; adds to light_gradient and
+   view_gradient. */
 static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS, lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;

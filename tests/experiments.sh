@@ -171,6 +171,7 @@ TEXT
     head_line 'The default configuration, one change at a time' 'change' paper
     row none '' default
     row 'stored values instead of linear light' '' stored --transfer none
+    row 'a specular term per Gaussian' '' geometric --set asg=0
     row 'no depth cue' '' no_cue --set depth_cue=0
     row 'one optics for all channels' '' one_optics --set per_channel_optics=0
     row 'plain shadow network' '' plain_shadow --set residual_shadow=0

@@ -34,6 +34,7 @@ static ssdgs_result show_visibility(void *user, ssdgs_frame *frame)
     (void)user;
     for (i = 0; !result && i < frame->gaussians.count; i++)
         for (c = 0; c < 3; c++) frame->color[4 * i + c] = frame->visibility[i];
+    frame->layer_count = 0; /* no highlights on it */
     return result;
 }
 

@@ -253,6 +253,8 @@ static void test_shared_sums(void) {
         for (i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
         for (i = 0; i < 4 * MANY; i++) frame.color_gradient[i] = draw(i) - 0.5;
+        for (i = 0; i < 4 * MANY * (size_t)frame.layer_count; i++) frame.layer_gradient[i] = draw(4 * MANY + i) - 0.5;
+        memset(frame.global_gradient, 0, model->global_count * sizeof *frame.global_gradient);
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
         for (i = 0; i < model->global_count; i++) sum[i] += (part == 2 ? -1 : 1) * frame.global_gradient[i];
     }
@@ -299,15 +301,17 @@ static void test_moved_camera(void) {
 static void test_edges(void) {
     static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
     ssdgs_model_view v;
     ssdgs_frame frame;
     ssdgs_light light;
     int i, c, j;
+    settings.asg = SSDGS_ASG_GEOMETRIC;
     memset(&light, 0, sizeof light);
     light.position[1] = 2;
     for (c = 0; c < 3; c++) light.intensity[c] = 1;
-    if (!CHECK(!ssdgs_model_create(context, NULL, 2, &model))) exit(1);
+    if (!CHECK(!ssdgs_model_create(context, &settings, 2, &model))) exit(1);
     v = ssdgs_model_get(model);
     v.gaussians[SSDGS_OPACITY * v.stride] = -8; /* too faint for the light's map: nothing is known to be in its way */
     memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);

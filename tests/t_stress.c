@@ -714,6 +714,18 @@ static void row_26(void) { /* colours beyond all measure: a finite image, bytes 
                 ssdgs_model_destroy(model);
             }
         }
+    for (s = 0; s < 4; s++) { /* what all deferred lobes share, and reflectances within what is not yet black */
+        ssdgs_model *model = cloud(full(), 200);
+        const ssdgs_model_view v = ssdgs_model_get(model);
+        for (i = 0; i < SSDGS_ASG_COUNT; i++) {
+            v.asg_sigma[i] = (ssdgs_real)(s & 1 ? 1e30 : -1e30);
+            v.asg_sharpness[2 * i] = v.asg_sharpness[2 * i + 1] = (ssdgs_real)(s & 2 ? 1e30 : -1e30);
+        }
+        set(model, 9, SSDGS_SPECULAR, 3, 1e28);
+        look(model, &a);
+        CHECK(a.stats.blackened == 0);
+        ssdgs_model_destroy(model);
+    }
     ends[0] = (ssdgs_real)INFINITE;
     ends[1] = (ssdgs_real)NOT_A_NUMBER;
     for (i = 0; i < 2; i++) {
