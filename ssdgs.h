@@ -7411,9 +7411,10 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
 SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color, R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
-    R local[SSDGS__LAYERS][SSDGS__BATCH][4], transmittance[16][16];
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], transmittance[16][16];
     uint32_t from = 0;
-    int micro, v, i, n, layer;
+    const int at_once = SSDGS__NV == 1 ? layers : 1; /* as many sums as there are registers */
+    int which[SSDGS__BATCH], used, micro, v, i, n, layer, l;
     memset(pixels, 0, (size_t)layers * SSDGS__TILE_LAYER * sizeof *pixels);
     for (micro = 0; micro < 16; micro++) {
         for (v = 48; v < 64; v++) pixels[micro * 64 + v] = 1;
@@ -7427,36 +7428,45 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
-            V px[SSDGS__NV], py[SSDGS__NV], c[SSDGS__LAYERS][3][SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
+            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
-                    SSDGS__UNROLL for (i = 0; i < 3; i++)
-                        c[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
-            for (; left; left &= left - 1) {
-                const int index = ssdgs__lowest_bit(left);
+            for (used = 0; left; left &= left - 1, used++) {
+                const int index = which[used] = ssdgs__lowest_bit(left);
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha, w;
+                    V dx, dy, raw, alpha;
                     VM drawn, live = VGE(t[v], stop);
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    w = VSEL(live, VMUL(alpha, t[v]), VSET(0));
+                    VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
-                    SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
-                        SSDGS__UNROLL for (i = 0; i < 3; i++)
-                            c[layer][i][v] = VFMA(w, VSET(local[layer][index][i]), c[layer][i][v]);
                 }
             }
             SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
-                    SSDGS__UNROLL for (i = 0; i < 3; i++)
-                        VSTORE(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[layer][i][v]);
                 VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
+            }
+            for (layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
+                V c[SSDGS__LAYERS][3][SSDGS__NV];
+                SSDGS__UNROLL for (l = 0; l < at_once; l++)
+                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++)
+                        SSDGS__UNROLL for (i = 0; i < 3; i++)
+                            c[l][i][v] = VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                for (n = 0; n < used; n++)
+                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                        const V w = VLOAD(weight[n] + v * SSDGS__VW);
+                        SSDGS__UNROLL for (l = 0; l < at_once; l++)
+                            SSDGS__UNROLL for (i = 0; i < 3; i++)
+                                c[l][i][v] = VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
+                    }
+                SSDGS__UNROLL for (l = 0; l < at_once; l++)
+                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++)
+                        SSDGS__UNROLL for (i = 0; i < 3; i++)
+                            VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
             }
         }
     }
