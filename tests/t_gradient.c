@@ -35,7 +35,6 @@ static void fill(ssdgs_model *model) {
             p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = -2.2 + 0.5 * draw(at++);
         }
     }
-    v.gaussians[SSDGS_ASG_WEIGHT * v.stride + 2] = SSDGS__SHARPEST + 1; /* deferred lobes get no sharper */
     for (i = 0; i < model->global_count; i++) model->globals[i] += 0.3 * (2 * draw(at++) - 1);
 }
 
@@ -334,6 +333,24 @@ static void test_edges(void) {
     ssdgs_model_destroy(model);
 }
 
+/* Deferred lobes get neither sharper nor broader than the bound, so what lies beyond it has no gradient. */
+static void test_sharpest(void) {
+    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK], dgauss[SSDGS_CHANNELS * SSDGS__BLOCK];
+    static const double raw[4] = {-SSDGS__SHARPEST - 1, -1, 1, SSDGS__SHARPEST + 1};
+    int s, i;
+    for (s = 0; s < SSDGS__BLOCK; s++) {
+        gauss[SSDGS_FRAME * SSDGS__BLOCK + s] = 1;
+        for (i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[s % 4];
+        for (i = 0; i < SSDGS__LOBE; i++) drows[i * SSDGS__BLOCK + s] = 1;
+    }
+    context->k->lobe_backward(gauss, drows, dgauss);
+    for (s = 0; s < SSDGS__BLOCK; s++)
+        for (i = 0; i < 2; i++) {
+            const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s], want = s % 4 == 0 || s % 4 == 3 ? 0 : exp(raw[s % 4]);
+            CHECK(fabs(d - want) < 1e-14);
+        }
+}
+
 /* A photograph with transparency on a background: the gradient goes through the blending of stored values. */
 static void test_photo(int transfer) {
     static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
@@ -435,6 +452,7 @@ int main(void) {
     test_shared_sums();
     test_moved_camera();
     test_edges();
+    test_sharpest();
     test_photo(SSDGS_TRANSFER_SRGB);
     test_photo(SSDGS_TRANSFER_NONE);
     test_compose();
