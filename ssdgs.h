@@ -3339,8 +3339,10 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
-        if (lighting->deferred) ssdgs__layer_store(frame, SSDGS__LAYERS - 2 + light, at, live, outs + 3 * SSDGS__BLOCK);
-        if (lighting->deferred) memset(outs + 3 * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *outs);
+        if (lighting->deferred) {
+            ssdgs__layer_store(frame, SSDGS__LAYERS - 2 + light, at, live, outs + 3 * SSDGS__BLOCK);
+            memset(outs + 3 * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *outs);
+        }
     }
     if (frame->layer_count) {
         k->lobe(gauss, scratch + l->lobe);
@@ -3681,22 +3683,21 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
-    const int layers = job->lightings ? SSDGS__LAYERS : 1;
+    const int layers = job->lightings && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], *glow = pixels + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
     int layer, light;
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
-    if (job->lightings) {
-        for (layer = 0; layer < layers; layer++) ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
-        for (light = 0; light < frame->light_count; light++) {
-            if (light) {
-                color[0] = ssdgs__layer(frame, SSDGS__LAYERS - 2 + light);
-                k->composite(&tile, 1, color, glow);
-                ssdgs__layer_pixels_store(frame, &tile, SSDGS__LAYERS - 1 + light, glow);
-            }
-            k->highlight(job->lightings + light, &tile, pixels);
+    for (layer = 0; job->lightings && layer < layers; layer++)
+        ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
+    for (light = 0; layers > 1 && light < frame->light_count; light++) {
+        if (light) {
+            color[0] = ssdgs__layer(frame, SSDGS__LAYERS - 2 + light);
+            k->composite(&tile, 1, color, glow);
+            ssdgs__layer_pixels_store(frame, &tile, SSDGS__LAYERS - 1 + light, glow);
         }
+        k->highlight(job->lightings + light, &tile, pixels);
     }
     ssdgs__tile_store(&tile, pixels, 4, job->planes);
 }
