@@ -89,7 +89,9 @@ WHAT IT COMPUTES
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
   one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S,
   no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
-  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Terms join in
+  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where the specular
+  term is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
+  surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Terms join in
   the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
   them, longer ones do not.
   Density control clones or splits where the image pulls at a Gaussian, as published; it also halves what lies half in
@@ -375,9 +377,10 @@ typedef enum ssdgs_dipole {
 } ssdgs_dipole;
 /* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form. Deferred: one term per pixel and light,
    from what the pixel's Gaussians blend to, so that their normals agree and highlights carry over to other views:
-   M (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h)) with M = c_s S E and, over the pixel's alpha,
-   Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part along the blended normal. So t_j chooses between the
-   normals' mean, right for smooth surfaces, and all of them, right for rough ones */
+   M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h)) with M = c_s S E, the
+   blended normal n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part along n.
+   So t_j chooses between the normals' mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is
+   what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001), n.wi >= 0, wo.h >= 0.25 */
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
@@ -601,6 +604,8 @@ typedef struct ssdgs_train_options {
     int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
     ssdgs_real background[3];  /* stored values */
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
+    ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so that
+                                  normals are right where only highlights tell; 0.05; 0 = none */
     ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
@@ -732,7 +737,7 @@ typedef struct ssdgs_frame {
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
     ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
-    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, and color has none */
+    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, color has none; training, before it joins too */
     ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; M of each light */
     ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
     /* SSDGS_STAGE_COMPOSITE */
@@ -741,6 +746,7 @@ typedef struct ssdgs_frame {
     ssdgs_real *transmittance;  /* (h, w) */
     /* backward */
     ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
+    ssdgs_real *normal_gradient; /* (4, h, w) dL/d(the normals' layer), dL/d(its alpha, the ones' layer); NULL = 0 */
     ssdgs_real *splat_gradient; /* (n, SSDGS_SPLAT_GRADIENTS) */
     ssdgs_real *color_gradient; /* (n, 4) */
     ssdgs_real *layer_gradient; /* (layer_count, n, 4) */
@@ -906,8 +912,10 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__F0_LOGIT -3.1780538303479458
 #define SSDGS__SHARPEST 12   /* |log lambda|, |log mu| of deferred lobes at most */
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
+#define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
+#define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
 #define SSDGS__LAYERS 6      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, M of one light */
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
 #define SSDGS__LOBE 10       /* rows: Q (6), normal (3), F0 */
@@ -980,6 +988,7 @@ typedef struct ssdgs__kernels {
     void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
                             const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
                             ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*depth_normals)(const ssdgs_camera *, const ssdgs_real *, size_t, int, ssdgs_real, ssdgs_real *);
     void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
     void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
     void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
@@ -1847,7 +1856,7 @@ typedef struct ssdgs__frame_memory {
     ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target, kept_lights, shadow_logit, shadow_known;
+    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known;
     int view_room;
     ssdgs__kept kept;
     ssdgs__bounds scene;
@@ -2275,7 +2284,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
-    if (frame->settings.asg == SSDGS_ASG_DEFERRED && (frame->terms & SSDGS_SPECULAR_TERM) && frame->light_count) {
+    if (frame->settings.asg == SSDGS_ASG_DEFERRED && (training || frame->terms & SSDGS_SPECULAR_TERM) && frame->light_count) {
         frame->layer_count = SSDGS__LAYERS - 2 + frame->light_count;
         SSDGS__RESERVE(m->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
         if (components || training)
@@ -3689,7 +3698,8 @@ static void ssdgs__composite_task(void *data, int index) {
     int layer, light;
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
-    for (layer = 0; job->lightings && layer < layers; layer++)
+    if (job->lightings && layers == 1 && frame->layer_pixels) memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
+    for (layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
         ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
     for (light = 0; layers > 1 && light < frame->light_count; light++) {
         if (light) {
@@ -3758,6 +3768,7 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     const ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
     const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1, last = (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+    const int glints = deferred && frame->terms & SSDGS_SPECULAR_TERM ? frame->light_count : 0;
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
@@ -3771,7 +3782,11 @@ static void ssdgs__composite_backward_task(void *data, int index) {
                              pixels + layer * SSDGS__TILE_LAYER);
     ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
-    for (light = deferred * frame->light_count - 1; light >= 0; light--) { /* the first one's M is walked with the other layers */
+    if (deferred && !glints) memset(pixels + last, 0, SSDGS__TILE_LAYER * sizeof *pixels); /* there is no M yet */
+    for (c = 0; deferred && frame->normal_gradient && c < 4; c++)
+        ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c % 3 + 2 * (c / 3),
+                         gradient + (c < 3 ? 4 : 3) * SSDGS__TILE_LAYER);
+    for (light = glints - 1; light >= 0; light--) { /* the first one's M is walked with the other layers */
         const int m = SSDGS__LAYERS - 1 + light;
         for (c = 0; c < 3; c++) ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, m, c), c, pixels + last);
         k->highlight_backward(job->lightings + light, &tile, pixels, gradient,
@@ -5308,6 +5323,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.seed = 1;
     o.random_background = 1;
     o.dssim = (ssdgs_real)0.2;
+    o.normal_weight = (ssdgs_real)0.05;
     o.initial_points = 10000;
     for (i = 0; i < 3; i++) {
         o.bounds_min[i] = (ssdgs_real)-0.5;
@@ -5517,11 +5533,59 @@ static void ssdgs__exposure_backward_task(void *data, int index) {
         }
 }
 
+typedef struct ssdgs__normals_job {
+    const ssdgs_frame *frame;
+    ssdgs_real weight, *scratch; /* (bands, SSDGS__BAND + 6, stride) */
+    size_t stride;
+} ssdgs__normals_job;
+
+static void ssdgs__normals_task(void *data, int index) {
+    const ssdgs__normals_job *job = (const ssdgs__normals_job *)data;
+    const ssdgs_frame *frame = job->frame;
+    const int w = frame->camera.width, h = frame->camera.height, begin = index * SSDGS__BAND;
+    const int end = begin + SSDGS__BAND < h ? begin + SSDGS__BAND : h;
+    const ssdgs_real *depth = ssdgs__layer_plane(frame, 3, 0), *alpha = ssdgs__layer_plane(frame, 3, 2);
+    ssdgs_real *rows = job->scratch + (size_t)index * (SSDGS__BAND + 6) * job->stride, *out = rows + (SSDGS__BAND + 2) * job->stride;
+    int y, x, c;
+    memset(rows, 0, (SSDGS__BAND + 2) * job->stride * sizeof *rows);
+    for (y = begin > 0 ? begin - 1 : 0; y <= end && y < h; y++)
+        for (x = 0; x < w; x++) {
+            const size_t at = (size_t)y * (size_t)w + (size_t)x;
+            if (alpha[at] >= SSDGS__SOLID) rows[(size_t)(y - begin + 1) * job->stride + 16 + (size_t)x] = depth[at] / alpha[at];
+        }
+    for (y = begin; y < end; y++) {
+        frame->context->k->depth_normals(&frame->camera, rows + (size_t)(y - begin + 1) * job->stride + 16, job->stride, y,
+                                         job->weight, out);
+        for (c = 0; c < 4; c++)
+            memcpy(frame->normal_gradient + ((size_t)c * (size_t)h + (size_t)y) * (size_t)w, out + (size_t)c * job->stride,
+                   (size_t)w * sizeof *out);
+    }
+}
+
+/* The gradient of weight x the mean of alpha - N . n, N the blended normals, n those of the blended depth, which is held fixed. */
+static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
+    ssdgs_context *context = frame->context;
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const int bands = (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND;
+    ssdgs__normals_job job;
+    frame->normal_gradient = NULL;
+    if (!frame->layer_count || weight <= 0) return SSDGS_OK;
+    job.frame = frame;
+    job.weight = weight / (ssdgs_real)pixels;
+    job.stride = (size_t)(frame->camera.width + 15) / 16 * 16 + 32;
+    SSDGS__RESERVE(frame->memory->normals, frame->normal_gradient, ssdgs_real,
+                   4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * job.stride);
+    job.scratch = frame->normal_gradient + 4 * pixels;
+    ssdgs__parallel(context, bands, ssdgs__normals_task, &job);
+    return SSDGS_OK;
+}
+
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
                                           const ssdgs_camera *camera,
                                           const ssdgs_light *light, const ssdgs_real background[3], int terms,
-                                          const int frozen[2], ssdgs_real dssim, ssdgs__loss_values *values) {
+                                          const int frozen[2], ssdgs_real dssim, ssdgs_real normal_weight,
+                                          ssdgs__loss_values *values) {
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options = ssdgs_render_options_exact();
@@ -5544,6 +5608,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
                          frame->pixel_gradient, values);
     if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
+    result = ssdgs__normals_loss(frame, normal_weight);
+    if (result) return result;
     memcpy(frame->frozen, frozen, sizeof frame->frozen);
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
@@ -5946,6 +6012,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
     SSDGS__RANGE(dssim, 0, 1);
+    SSDGS__RANGE(normal_weight, 0, most);
     SSDGS__RANGE(densify_gradient, 0, most);
     SSDGS__RANGE(densify_size, (ssdgs_real)1e-30, most);
     SSDGS__RANGE(densify_shadow, 0, most);
@@ -6170,7 +6237,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
     for (j = 0; j < 2; j++) frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
     result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, frozen,
-                                   o->dssim, &values);
+                                   o->dssim, o->normal_weight, &values);
     if (result) return result;
     ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
     for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
@@ -6310,7 +6377,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
         result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, frozen,
-                                       (ssdgs_real)0.2, &values);
+                                       (ssdgs_real)0.2, 0, &values);
         if (result) return result;
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
@@ -7995,6 +8062,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
 typedef struct F(glint) {
     V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing, fifth, fresnel;
     V n[3], inverse_n, along, p[2][3], row[2][3], q[2]; /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
+    V cosine, inverse_woh, microfacet; /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
     V to_camera[2]; /* the camera's ray (x, y, 1) */
     VM half;
 } F(glint);
@@ -8031,6 +8099,9 @@ SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pix
     g->inverse_n = VDIV(VSET(1), VSQRT(VMAX(d2, VSET(SSDGS__THIN * SSDGS__THIN))));
     for (i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
     g->along = VDOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
+    g->cosine = VMAX(VSET(0), VDOT3(g->n[0], g->n[1], g->n[2], g->wi[0], g->wi[1], g->wi[2]));
+    g->inverse_woh = VDIV(VSET(1), VMAX(VSET(SSDGS__GRAZING), VSUB(VSET(1), g->missing)));
+    g->microfacet = VMUL(g->cosine, VMUL(g->inverse_woh, g->inverse_woh));
     for (i = 0; i < 3; i++) {
         g->p[0][i] = VFNMA(g->n[i], g->along, g->h[i]);
         g->p[1][i] = g->h[i];
@@ -8069,7 +8140,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
             V value;
             if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
             F(glint_lanes)(&g, k, pixel, at);
-            value = VSEL(g.half, VMUL(g.fresnel, F(glow)(k, g.q)), VSET(0));
+            value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0));
             for (c = 0; c < 3; c++) VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
         }
     }
@@ -8089,17 +8160,19 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
         for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(glint) g;
-            V glow, value, push = VSET(0), dq[2], df0, dwoh, dh[3], dn[3], dwo[3], dsum, radial, along, ddepth, dat[3], dray, dcover,
-                to;
+            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum, radial, along, ddepth,
+                dat[3], dray, dcover, to;
             R *dlayer = d + SSDGS__TILE_LAYER;
             F(glint_lanes)(&g, k, pixel, at);
             glow = F(glow)(k, g.q);
-            value = VSEL(g.half, VMUL(g.fresnel, glow), VSET(0));
+            value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
             for (i = 0; i < 3; i++) {
                 VSTORE(dm + 16 * i, VMUL(VLOAD(d + 16 * i), value));
                 push = VFMA(VLOAD(d + 16 * i), VLOAD(m + 16 * i), push);
             }
             push = VSEL(g.half, push, VSET(0));
+            dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
+            push = VMUL(push, g.microfacet);
             dq[0] = dq[1] = VSET(0);
             for (j = 0; j < SSDGS_ASG_COUNT; j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
                 const R *b = k->basis + 12 * j;
@@ -8118,6 +8191,9 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             df0 = VMUL(push, VSUB(VSET(1), g.fifth));
             to = VMUL(g.missing, g.missing);
             dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
+            to = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
+            dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), to, VSET(0)));
+            dcosine = VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
             for (j = 0; j < 2; j++) {
                 to = VMUL(dq[j], g.inverse_cover);
                 for (i = 0; i < 3; i++) {
@@ -8130,7 +8206,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             for (i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
             along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
             for (i = 0; i < 3; i++) { /* p = h - n (n.h) */
-                dn[i] = VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along)));
+                dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along))));
                 dh[i] = VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
                 dwo[i] = VMUL(dwoh, g.h[i]);
             }
@@ -8143,7 +8219,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             for (i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
                 dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
                 dwo[i] = VADD(dwo[i], dsum);
-                dh[i] = dsum;
+                dh[i] = VFMA(dcosine, g.n[i], dsum);
             }
             radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
             along = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
@@ -8556,6 +8632,41 @@ SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int widt
     }
 }
 
+/* A row of dL/d(normal, alpha) of L = weight (alpha - normal . n), n the normal of the surface that depth shows, from the nearer
+   neighbours along the row and across it: with u, v the ray (u, v, 1)'s coordinates, (ln depth)_u and (ln depth)_v,
+   n = ((ln d)_u, (ln d)_v, -1 - u (ln d)_u - v (ln d)_v) / |..|, 0 where a depth is (unknown). depth points at the row in a plane
+   with a border of 1 row and 16 columns of 0; out: 4 rows of the stride. */
+SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size_t stride, int y, R weight, R *out) {
+    const V zero = VSET(0), most = VSET(1e12);
+    const R focal[2] = {camera->fx, camera->fy};
+    int x, i;
+    for (x = 0; x < camera->width; x += SSDGS__VW) {
+        const ptrdiff_t step[2] = {1, (ptrdiff_t)stride};
+        const V here = VLOAD(depth + x);
+        V slope[2], least = here, n[3], length, ray;
+        VM known;
+        for (i = 0; i < 2; i++) {
+            const V before = VLOAD(depth + x - step[i]), after = VLOAD(depth + x + step[i]);
+            const V rise[2] = {VSUB(here, before), VSUB(after, here)};
+            const VM nearer = VLT(VABS(rise[0]), VABS(rise[1]));
+            least = VMIN(least, VMIN(before, after));
+            slope[i] = VDIV(VMUL(VSET(focal[i]), VSEL(nearer, rise[0], rise[1])), VMAX(VSEL(nearer, before, after), VSET(1e-30)));
+            slope[i] = VMAX(VNEG(most), VMIN(most, slope[i]));
+        }
+        known = VLT(zero, least);
+        ray = VDIV(VADD(VADD(VLOAD(ssdgs__count), VSET(x)), VSET((R)0.5 - camera->cx)), VSET(camera->fx));
+        n[0] = slope[0];
+        n[1] = slope[1];
+        n[2] = VNEG(VFMA(slope[0], ray, VFMA(slope[1], VSET(((R)y + (R)0.5 - camera->cy) / camera->fy), VSET(1))));
+        length = VDIV(VSET(-weight), VSQRT(VDOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
+        for (i = 0; i < 3; i++)
+            VSTORE(out + (size_t)i * stride + x,
+                   VSEL(known, VMUL(length, VDOT3(VSET(camera->view[i]), VSET(camera->view[4 + i]), VSET(camera->view[8 + i]),
+                                                  n[0], n[1], n[2])), zero));
+        VSTORE(out + 3 * stride + x, VSEL(known, VSET(weight), zero));
+    }
+}
+
 /* Whether all of n values are finite. */
 SSDGS__FN int F(finite)(const R *values, size_t n) {
     size_t i = 0;
@@ -8609,7 +8720,7 @@ static const ssdgs__kernels F(kernels) = {
     F(highlight), F(highlight_backward), F(lobe), F(lobe_backward),
     F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward),
     F(reflect), F(reflect_backward), F(dipole_profile),
-    F(colour), F(colour_backward), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
+    F(colour), F(colour_backward), F(depth_normals), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
 };
 
 #undef SSDGS__NAME

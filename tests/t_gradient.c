@@ -48,9 +48,10 @@ static void build_wall(ssdgs_model *model) {
     model->gaussians[SSDGS_OPACITY * model->capacity] = 12;
 }
 
-/* A smooth objective of the image: its product with fixed weights. */
+/* A smooth objective of the image, deferred also of the blended normals and their alpha: the product with fixed weights. */
 static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, const ssdgs_frame *fixed, ssdgs_frame *frame, int backward) {
     const size_t pixels = SIDE * SIDE, n = COUNT * (size_t)s->light_count;
+    static ssdgs_real normal_gradient[4 * SIDE * SIDE];
     double sum = 0;
     size_t i, c;
     if (ssdgs__frame_begin(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
@@ -69,6 +70,14 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
             frame->pixel_gradient[pixels * c + i] = weight;
             frame->pixel_gradient[pixels * 3 + i] = (c ? frame->pixel_gradient[pixels * 3 + i] : 0) + weight * s->options.background[c];
         }
+    frame->normal_gradient = frame->layer_count ? normal_gradient : NULL;
+    for (c = 0; frame->layer_count && c < 4; c++) {
+        const ssdgs_real *plane = c < 3 ? ssdgs__layer_plane(frame, 4, (int)c) : ssdgs__layer_plane(frame, 3, 2);
+        for (i = 0; i < pixels; i++) {
+            normal_gradient[pixels * c + i] = 0.3 * sin(0.29 * (double)i + 0.9 * (double)c + 2);
+            sum += normal_gradient[pixels * c + i] * plane[i];
+        }
+    }
     if (backward && ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
     return sum;
 }
@@ -351,6 +360,31 @@ static void test_sharpest(void) {
         }
 }
 
+/* Blended layers of tiles without a Gaussian are 0 whatever the frame before left there: normals beside them read their depth. */
+static void test_empty_tiles(void) {
+    enum { WIDE = 64 };
+    static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, WIDE, WIDE);
+    const ssdgs_settings settings = ssdgs_settings_default();
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_light light;
+    ssdgs_model *model = NULL;
+    ssdgs_frame frame;
+    size_t i, count;
+    int blended = 0, left = 0;
+    memset(&light, 0, sizeof light);
+    light.position[0] = light.intensity[0] = light.intensity[1] = light.intensity[2] = 2;
+    if (!CHECK(!ssdgs_model_create(context, &settings, 1, &model))) exit(1);
+    for (i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
+    if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 1)) exit(1);
+    count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
+    for (i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
+    if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
+    for (i = 0; i < count; i++) left += frame.layer_pixels[i] == 0.7, blended += frame.layer_pixels[i] > 0;
+    CHECK(!left && blended > 0 && blended < (int)count / 4);
+    ssdgs_model_destroy(model);
+}
+
 /* A photograph with transparency on a background: the gradient goes through the blending of stored values. */
 static void test_photo(int transfer) {
     static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
@@ -375,14 +409,14 @@ static void test_photo(int transfer) {
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
     fill(model);
     stride = model->capacity;
-    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, &values)) exit(1);
+    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values)) exit(1);
     for (i = 0; i < SSDGS_CHANNELS * COUNT; i++) gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
     for (i = 0; i < COUNT * SSDGS_SPECULAR; i += 5) { /* geometry, opacity, diffuse colour */
         ssdgs_real *value = model->gaussians + i / COUNT * stride + i % COUNT, start = *value;
         double loss[2], slope;
         for (side = 0; side < 2; side++) {
             *value = start + (side ? 1e-6 : -1e-6);
-            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, &values)) exit(1);
+            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values)) exit(1);
             loss[side] = values.loss;
         }
         *value = start;
@@ -457,6 +491,7 @@ int main(void) {
     test_photo(SSDGS_TRANSFER_NONE);
     test_compose();
     test_octaves();
+    test_empty_tiles();
     memset(&base, 0, sizeof base);
     base.name = "default";
     base.settings = ssdgs_settings_default();
