@@ -337,7 +337,8 @@ typedef enum ssdgs_stage {
     SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
     SSDGS_STAGE_SHADE,              /* -> color, layers and the components asked for */
     SSDGS_STAGE_COMPOSITE,          /* -> pixels, layer_pixels, transmittance */
-    SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient -> splat_gradient, color_gradient, layer_gradient; the shared gradients anew */
+    SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient, normal_gradient -> splat_gradient, color_gradient, layer_gradient; the
+                                       shared gradients anew */
     SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
     SSDGS_STAGE_PROJECT_BACKWARD,   /* splat_gradient -> gradient, view_gradient */
     SSDGS_STAGE_COUNT
@@ -604,8 +605,8 @@ typedef struct ssdgs_train_options {
     int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
     ssdgs_real background[3];  /* stored values */
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
-    ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so that
-                                  normals are right where only highlights tell; 0.05; 0 = none */
+    ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so
+                                  that normals are right where only highlights tell; 0.05; 0 = none */
     ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
@@ -737,12 +738,14 @@ typedef struct ssdgs_frame {
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
     ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
-    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, color has none; training, before it joins too */
+    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, color has none; in training also
+                                   before it joins */
     ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; M of each light */
     ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;         /* (3, h, w) without background */
-    ssdgs_real *layer_pixels;   /* (1 + layer_count, 3, h, w) the colour and the layers, blended; for components and training */
+    ssdgs_real *layer_pixels;   /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where nothing is; for
+                                   components and training */
     ssdgs_real *transmittance;  /* (h, w) */
     /* backward */
     ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
@@ -3698,7 +3701,8 @@ static void ssdgs__composite_task(void *data, int index) {
     int layer, light;
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
-    if (job->lightings && layers == 1 && frame->layer_pixels) memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
+    if (job->lightings && layers == 1 && frame->layer_pixels)
+        memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
     for (layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
         ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
     for (light = 0; layers > 1 && light < frame->light_count; light++) {
@@ -5545,7 +5549,8 @@ static void ssdgs__normals_task(void *data, int index) {
     const int w = frame->camera.width, h = frame->camera.height, begin = index * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < h ? begin + SSDGS__BAND : h;
     const ssdgs_real *depth = ssdgs__layer_plane(frame, 3, 0), *alpha = ssdgs__layer_plane(frame, 3, 2);
-    ssdgs_real *rows = job->scratch + (size_t)index * (SSDGS__BAND + 6) * job->stride, *out = rows + (SSDGS__BAND + 2) * job->stride;
+    ssdgs_real *rows = job->scratch + (size_t)index * (SSDGS__BAND + 6) * job->stride;
+    ssdgs_real *out = rows + (SSDGS__BAND + 2) * job->stride;
     int y, x, c;
     memset(rows, 0, (SSDGS__BAND + 2) * job->stride * sizeof *rows);
     for (y = begin > 0 ? begin - 1 : 0; y <= end && y < h; y++)
@@ -5562,7 +5567,7 @@ static void ssdgs__normals_task(void *data, int index) {
     }
 }
 
-/* The gradient of weight x the mean of alpha - N . n, N the blended normals, n those of the blended depth, which is held fixed. */
+/* The gradient of weight x the mean of alpha - N . n, N the blended normals, n those of the blended depth, held fixed. */
 static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     ssdgs_context *context = frame->context;
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
@@ -6308,7 +6313,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     frame.settings = *settings;
     frame.terms = settings->terms;
     frame.training = frame.light_count = 1;
-    layers = settings->asg == SSDGS_ASG_DEFERRED && (settings->terms & SSDGS_SPECULAR_TERM) ? SSDGS__LAYERS : 1;
+    layers = settings->asg == SSDGS_ASG_DEFERRED ? SSDGS__LAYERS : 1;
     layout = ssdgs__layout(&frame);
     ssdgs__global_groups(settings, first);
     n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
@@ -6321,7 +6326,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     /* parameters and two moments with a quarter of slack, gradients, splat records of two views, activations */
     per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) + 160;
     fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
-        6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 3 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
+        6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
@@ -8160,8 +8165,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
         for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(glint) g;
-            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum, radial, along, ddepth,
-                dat[3], dray, dcover, to;
+            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum, radial, along,
+                ddepth, dat[3], dray, dcover, to;
             R *dlayer = d + SSDGS__TILE_LAYER;
             F(glint_lanes)(&g, k, pixel, at);
             glow = F(glow)(k, g.q);
@@ -8720,7 +8725,8 @@ static const ssdgs__kernels F(kernels) = {
     F(highlight), F(highlight_backward), F(lobe), F(lobe_backward),
     F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward),
     F(reflect), F(reflect_backward), F(dipole_profile),
-    F(colour), F(colour_backward), F(depth_normals), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row), F(finite), F(adam)
+    F(colour), F(colour_backward), F(depth_normals), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row),
+    F(finite), F(adam)
 };
 
 #undef SSDGS__NAME
