@@ -386,13 +386,15 @@ static void count_error(errors *e, double error) {
     e->sum += error, e->count++;
 }
 
-/* Of colours above 1 the relative error: highlights seen nearly against the light are bright. */
+/* What a colour's error is told by: of deferred highlights above 1, bright where seen nearly against the light, the colour. */
+static double scale_of(double color) { return s.settings.asg == SSDGS_ASG_DEFERRED ? fmax(1, fabs(color)) : 1; }
+
 static void compare(const planes *got, double (*want)[5], const unsigned char *sure, int pixels, errors *e) {
     int i, c;
     for (i = 0; i < pixels; i++)
         for (c = 0; sure[i] && c < 5; c++) {
             const double value = (double)(c < 3 ? got->color[3 * i + c] : c < 4 ? got->alpha[i] : got->depth[i]);
-            count_error(e, fabs(value - want[i][c]) / fmax(1, fabs(want[i][c])));
+            count_error(e, fabs(value - want[i][c]) / (c < 3 ? scale_of(want[i][c]) : 1));
         }
 }
 
@@ -890,7 +892,7 @@ static double largest_difference(int x0, int y0, int width, int height, int whol
                 const double difference = c < 3 ? (double)(image[1].color[3 * a + c] - image->color[3 * b + c])
                     : c < 4 ? (double)(image[1].alpha[a] - image->alpha[b])
                     : (double)image[1].depth[a] / depth_scale - (double)image->depth[b];
-                const double size = c < 3 ? fmax(1, fabs((double)image->color[3 * b + c])) : 1;
+                const double size = c < 3 ? scale_of((double)image->color[3 * b + c]) : 1;
                 most = fabs(difference) <= most * size ? most : fabs(difference) / size;
             }
     return most;
