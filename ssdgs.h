@@ -4114,6 +4114,9 @@ typedef struct ssdgs__loss_job {
     ssdgs_real by_l1, by_ssim;
 } ssdgs__loss_job;
 
+/* Rows of whole vectors with a border of 16 columns. */
+static size_t ssdgs__padded_stride(int width) { return (size_t)(width + 15) / 16 * 16 + 32; }
+
 static size_t ssdgs__padded_at(const ssdgs__loss_job *job, int channel, int y) { /* row y, column 0 */
     return ((size_t)channel * (size_t)(job->height + 10) + (size_t)(y + 5)) * job->stride + 16;
 }
@@ -4185,7 +4188,7 @@ static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, c
     job.width = width;
     job.height = height;
     job.bands = (height + SSDGS__BAND - 1) / SSDGS__BAND;
-    job.stride = (size_t)(width + 15) / 16 * 16 + 32;
+    job.stride = ssdgs__padded_stride(width);
     plane = 3 * (size_t)(height + 10) * job.stride;
     tasks = 3 * job.bands;
     SSDGS__RESERVE(*memory, at, ssdgs_real, 6 * (size_t)tasks + 5 * plane + (size_t)tasks * 5 * job.stride);
@@ -5577,7 +5580,7 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     if (!frame->layer_count || weight <= 0) return SSDGS_OK;
     job.frame = frame;
     job.weight = weight / (ssdgs_real)pixels;
-    job.stride = (size_t)(frame->camera.width + 15) / 16 * 16 + 32;
+    job.stride = ssdgs__padded_stride(frame->camera.width);
     SSDGS__RESERVE(frame->memory->normals, frame->normal_gradient, ssdgs_real,
                    4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * job.stride);
     job.scratch = frame->normal_gradient + 4 * pixels;
