@@ -91,11 +91,12 @@ WHAT IT COMPUTES
   no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where the specular
   term is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
-  surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Terms join in
-  the paper's order, diffuse, shadow, scattering, specular, at iterations of a 60,000-iteration run; shorter runs scale
-  them, longer ones do not.
+  surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Diffuse alone
+  comes first, the other terms join together after 5,000 iterations of 60,000; shorter runs scale this, longer ones do not.
+  In the paper's order, one term after the other, scattering learns the highlights by heart before specular is there.
   Density control clones or splits where the image pulls at a Gaussian, as published; it also halves what lies half in
   shadow (densify_shadow) and drops what hardly shows (prune_weight).
+  ssdgs_train_options_published(): the paper's order and density control, 60,000 iterations.
 
 CONVENTIONS
   camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a translation. The
@@ -593,9 +594,9 @@ typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rat
 /* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations`. */
 typedef struct ssdgs_train_options {
     int version;               /* stamped by ssdgs_train_options_default */
-    int iterations;            /* 60000 */
+    int iterations;            /* 20000 */
     uint64_t seed;             /* 1 */
-    int schedule;              /* ssdgs_schedule */
+    int schedule;              /* ssdgs_schedule; merged */
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
     int initial_points;        /* random Gaussians when the model is empty; 10000 */
@@ -620,6 +621,7 @@ typedef struct ssdgs_train_options {
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
+SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 
 typedef struct ssdgs_train_stats {
     int iteration;        /* done so far */
@@ -3716,6 +3718,7 @@ static void ssdgs__composite_task(void *data, int index) {
     ssdgs__tile_store(&tile, pixels, 4, job->planes);
 }
 
+/* Blends color, any triple per Gaussian; with lightings, the layers too and their highlights. */
 static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels,
                                    ssdgs__lighting *lightings) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
@@ -3727,11 +3730,6 @@ static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *c
     job.planes[3] = frame->transmittance;
     job.lightings = lightings;
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task, &job);
-}
-
-/* Any per-Gaussian triple, a component. */
-static void ssdgs__composite_planes(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
-    ssdgs__composite_tiles(frame, color, pixels, NULL);
 }
 
 static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
@@ -4020,11 +4018,11 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         if (!to[c]) continue;
         if (c == 1 && frame.layer_count) {
             for (i = 0; i < pixels * 3; i++) planes[i] = frame.pixels[i] - frame.layer_pixels[i];
-        } else ssdgs__composite_planes(&frame, from[c], planes);
+        } else ssdgs__composite_tiles(&frame, from[c], planes, NULL);
         ssdgs__write_rows(&frame, planes, 3, stride, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
-        ssdgs__composite_planes(&frame, frame.shadow, planes);
+        ssdgs__composite_tiles(&frame, frame.shadow, planes, NULL);
         if (image->shadow) ssdgs__write_rows(&frame, planes, 1, stride, NULL, image->shadow);
         if (image->depth) ssdgs__write_rows(&frame, planes + pixels, 1, stride, NULL, image->depth);
     }
@@ -5326,8 +5324,9 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     int i;
     memset(&o, 0, sizeof o);
     o.version = SSDGS_VERSION;
-    o.iterations = 60000;
+    o.iterations = 20000;
     o.seed = 1;
+    o.schedule = SSDGS_SCHEDULE_MERGED;
     o.random_background = 1;
     o.dssim = (ssdgs_real)0.2;
     o.normal_weight = (ssdgs_real)0.05;
@@ -5360,6 +5359,17 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     SSDGS__RATE(camera_rate, 1e-3, 1e-5);
     SSDGS__RATE(light_rate, 1e-3, 5e-5);
 #undef SSDGS__RATE
+    return o;
+}
+
+SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
+    ssdgs_train_options o = ssdgs_train_options_default();
+    o.iterations = 60000;
+    o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
+    o.normal_weight = 0;
+    o.densify_gradient = (ssdgs_real)2e-4;
+    o.densify_shadow = 0;
+    o.prune_weight = 0;
     return o;
 }
 

@@ -462,11 +462,8 @@ static void time_jobs(bench *b, job *jobs, int count, double seconds) {
     }
 }
 
-/* Phases of the progressive schedule, in iterations of 60,000. */
-static const struct { const char *name; int from, to; } phases[] = {
-    {"diffuse", 0, 5000}, {"+ shadow", 5000, 9000}, {"+ scattering", 9000, 13000}, {"scattering network frozen", 13000, 16000},
-    {"+ specular", 16000, 20000}, {"all", 20000, 60000}
-};
+/* Phases of the default schedule, in iterations of 60,000. */
+static const struct { const char *name; int from, to; } phases[] = {{"diffuse", 0, 5000}, {"all", 5000, 60000}};
 enum { PHASES = sizeof phases / sizeof *phases };
 
 /* The job as a training job at the model's number of Gaussians, on scaled photographs of its views. */
@@ -474,6 +471,7 @@ static job training_job(const bench *b, job j, ssdgs_trainer *trainer, int phase
     ssdgs_train_options options = ssdgs_train_options_default();
     ssdgs_photo photos[MAX_PHOTOS];
     int v;
+    options.iterations = 60000;
     options.densify_every = 1 << 30;
     options.opacity_reset_every = 0;
     options.max_gaussians = SSDGS__MAX_GAUSSIANS;

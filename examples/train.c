@@ -216,7 +216,7 @@ static int parse(job *j, int argc, char **argv)
 
     if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
     j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
-    j->options = ssdgs_train_options_default();
+    j->options = preset ? ssdgs_train_options_published() : ssdgs_train_options_default();
     if (!choose(given, BACKGROUND, "black|white", &white)) return usage("no such background:", given[BACKGROUND]);
     if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer)) return usage("no such transfer:", given[TRANSFER]);
     if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))

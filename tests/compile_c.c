@@ -12,7 +12,7 @@ static const any_function functions[] = {
     ADDRESS(ssdgs_model_settings), ADDRESS(ssdgs_model_save), ADDRESS(ssdgs_model_load),
     ADDRESS(ssdgs_model_load_memory), ADDRESS(ssdgs_camera_look_at), ADDRESS(ssdgs_render_options_default),
     ADDRESS(ssdgs_render), ADDRESS(ssdgs_render_ex), ADDRESS(ssdgs_srgb_encode), ADDRESS(ssdgs_srgb_decode),
-    ADDRESS(ssdgs_to_bytes), ADDRESS(ssdgs_train_options_default), ADDRESS(ssdgs_trainer_create),
+    ADDRESS(ssdgs_to_bytes), ADDRESS(ssdgs_train_options_default), ADDRESS(ssdgs_train_options_published), ADDRESS(ssdgs_trainer_create),
     ADDRESS(ssdgs_trainer_destroy), ADDRESS(ssdgs_trainer_step), ADDRESS(ssdgs_trainer_run),
     ADDRESS(ssdgs_trainer_refined), ADDRESS(ssdgs_train_memory), ADDRESS(ssdgs_trainer_save),
     ADDRESS(ssdgs_trainer_load), ADDRESS(ssdgs_compare), ADDRESS(ssdgs_evaluate), ADDRESS(ssdgs_refine_photo),

@@ -115,20 +115,20 @@ TEXT
 
     head_line 'Training schedules (Tables 2 and 4)' 'order' paper
     row 'H: all from the start' '31.72 (32.17)' joint --schedule joint
-    row 'I: diffuse, shadow, scattering, specular' '33.29 (34.69)' default
+    row 'I: diffuse, shadow, scattering, specular' '33.29 (34.69)' progressive --schedule progressive
     row 'J: last two swapped' '32.08 (32.71)' swapped --schedule swapped
-    row 'K: all after diffuse' '32.74 (33.52)' merged --schedule merged
+    row 'K: all after diffuse' '32.74 (33.52)' default
     printf '\nPhotograph, rendering, diffuse, specular, scattering, shadow, normals (as Figures 5 and 12; the other scenes'\''\n'
     printf 'are in build/experiments).\n'
     sheet 'H, all from the start' joint
-    sheet 'I, diffuse, shadow, scattering, specular' default
+    sheet 'I, diffuse, shadow, scattering, specular' progressive
     sheet 'J, last two swapped' swapped
-    sheet 'K, all after diffuse' merged
+    sheet 'K, all after diffuse' default
 
     head_line 'Shadow also on scattering (eq. 14, Table 5)' 'shadow on' 'paper (9 scenes)'
     row 'diffuse and specular' '33.00 (34.37)' default
     row 'all terms' '32.13 (33.14)' shadow_on_scattering --set shadow_on_scattering=1
-    sheet 'Shadow on all terms (above, under I, on diffuse and specular)' shadow_on_scattering
+    sheet 'Shadow on all terms (above, under K, on diffuse and specular)' shadow_on_scattering
     show backlit backlit default shadow_on_scattering
     image 'A photograph lit from behind, shadow on diffuse and specular, on all terms (as Figure 13)' backlit
 
@@ -172,6 +172,7 @@ TEXT
     row none '' default
     row 'stored values instead of linear light' '' stored --transfer none
     row 'a specular term per Gaussian' '' geometric --set asg=0
+    row "normals not drawn to the depth's" '' no_normals --set normal_weight=0
     row 'no depth cue' '' no_cue --set depth_cue=0
     row 'one optics for all channels' '' one_optics --set per_channel_optics=0
     row 'plain shadow network' '' plain_shadow --set residual_shadow=0
