@@ -1415,4 +1415,25 @@ OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
     return photos;
 }
 
+/* The frame's photograph on a background, (h,w,3) stored values; the background alone where the frame has no image. */
+OLAT__API void olat_compose(const olat_frame *frame, const ssdgs_real background[3], ssdgs_real *out) {
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const ssdgs_real unit = frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
+    size_t i, k;
+    for (i = 0; i < pixels; i++) {
+        ssdgs_real v[4] = {0, 0, 0, 0};
+        for (k = 0; frame->pixels && k < 4; k++)
+            v[k] = unit * (frame->format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)frame->pixels)[4 * i + k]
+                                                                : ((const unsigned char *)frame->pixels)[4 * i + k]);
+        for (k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * background[k];
+    }
+}
+
+/* Where a camera stands. */
+OLAT__API void olat_eye(const ssdgs_camera *camera, ssdgs_real eye[3]) {
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
+}
+
 #endif /* OLAT_H */

@@ -204,13 +204,6 @@ static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real 
     }
 }
 
-static void camera_eye(const ssdgs_camera *camera, ssdgs_real eye[3])
-{
-    int i, k;
-    for (i = 0; i < 3; i++)
-        for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
-}
-
 /* World axes with up last: z, unless the cameras' mean upward direction lies clearly along another one. */
 static void find_axes(const olat_dataset *data, double axes[3][3])
 {
@@ -252,7 +245,7 @@ static int make_trajectory(job *j)
     }
     for (i = 0; i < data->count; i++) {
         const ssdgs_light *l = &data->frames[i].light;
-        camera_eye(&data->frames[i].camera, eye);
+        olat_eye(&data->frames[i].camera, eye);
         orbit_add(&camera_orbit, axes, eye, 1.0 / data->count, i == 0);
         orbit_add(&light_orbit, axes, l->position, 1.0 / data->count, 0);
         for (k = 0; k < 3; k++) intensity[k] += (double)l->intensity[k] / data->count;
@@ -339,20 +332,6 @@ static ssdgs_result render(job *j, int index, int components)
     return result;
 }
 
-/* The photograph over the background. */
-static void show_photo(const job *j, const olat_frame *frame, ssdgs_real *out, size_t pixels)
-{
-    size_t i, k;
-    for (i = 0; i < pixels * 3; i++) out[i] = 0;
-    for (i = 0; frame->has_image && i < pixels; i++) {
-        ssdgs_real v[4];
-        for (k = 0; k < 4; k++)
-            v[k] = frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)((const uint16_t *)frame->pixels)[4 * i + k] / 65535
-                                                        : (ssdgs_real)((const unsigned char *)frame->pixels)[4 * i + k] / 255;
-        for (k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * j->background[k];
-    }
-}
-
 /* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as they are. */
 static void show(job *j, const olat_frame *frame, int output)
 {
@@ -364,7 +343,7 @@ static void show(job *j, const olat_frame *frame, int output)
         out = output == DIFFUSE ? p->diffuse : output == SPECULAR ? p->specular : p->scattering;
         transfer = ssdgs_model_settings(j->model)->transfer;
     } else if (output == PHOTO) {
-        show_photo(j, frame, out, pixels);
+        olat_compose(frame, j->background, out);
     } else if (output == IMAGE) {
         out = j->image;
     } else if (output == NORMAL) { /* -1 .. 1 to 0 .. 1, nothing to black */

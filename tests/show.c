@@ -156,29 +156,24 @@ static int sweeps(show *s)
 static double facing(const olat_frame *frame, const ssdgs_real centre[3])
 {
     double to_eye[3], to_light[3];
-    int i, k;
+    ssdgs_real eye[3];
+    int i;
+    olat_eye(&frame->camera, eye);
     for (i = 0; i < 3; i++) {
-        for (k = 0, to_eye[i] = -(double)centre[i]; k < 3; k++)
-            to_eye[i] -= (double)frame->camera.view[4 * k + i] * (double)frame->camera.view[4 * k + 3];
-        to_light[i] = (double)frame->light.position[i] - (double)centre[i];
+        to_eye[i] = (double)(eye[i] - centre[i]);
+        to_light[i] = (double)(frame->light.position[i] - centre[i]);
     }
     return olat__dot(to_eye, to_light) / sqrt(olat__dot(to_eye, to_eye) * olat__dot(to_light, to_light));
 }
 
-/* The photograph on the background, into bytes; returns the sum of its values. */
-static double show_photo(show *s, const olat_frame *frame)
+/* The sum of a photograph's values. */
+static double brightness(show *s, const olat_frame *frame)
 {
-    const int wide = frame->format == SSDGS_PIXELS_RGBA16;
-    double v[4], sum = 0;
-    size_t i, c;
-    for (i = 0; i < (size_t)frame->camera.width * (size_t)frame->camera.height; i++) {
-        for (c = 0; c < 4; c++)
-            v[c] = wide ? ((const uint16_t *)frame->pixels)[4 * i + c] / 65535.0 : ((const uint8_t *)frame->pixels)[4 * i + c] / 255.0;
-        for (c = 0; c < 3; c++) {
-            s->bytes[3 * i + c] = (unsigned char)(255 * (v[3] * v[c] + (1 - v[3]) * (double)s->background[c]) + 0.5);
-            sum += v[3] * v[c];
-        }
-    }
+    const ssdgs_real black[3] = {0, 0, 0};
+    double sum = 0;
+    size_t i;
+    olat_compose(frame, black, s->image);
+    for (i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++) sum += (double)s->image[i];
     return sum;
 }
 
@@ -189,7 +184,7 @@ static int backlit(show *s, const char *const *models, int count)
     double most = 0;
     int i;
     for (i = 0; i < s->set.count; i++) {
-        const double light = show_photo(s, s->set.frames + i);
+        const double light = brightness(s, s->set.frames + i);
         if (facing(s->set.frames + i, ssdgs_model_settings(s->model)->centre) > -0.25 || light <= most) continue;
         most = light;
         chosen = s->set.frames + i;
@@ -197,7 +192,8 @@ static int backlit(show *s, const char *const *models, int count)
     s->width /= 2;
     s->height /= 2;
     if (make_sheet(s, 1 + count, 1)) return 1;
-    show_photo(s, chosen);
+    olat_compose(chosen, s->background, s->image);
+    ssdgs_to_bytes(s->image, 3 * (size_t)width * (size_t)height, SSDGS_TRANSFER_NONE, s->bytes);
     paste(s, 0, 0, s->bytes, width, width / 4, height / 4);
     for (i = 0; i < count; i++) {
         if (open_model(s, models[i]) || render(s, &chosen->camera, &chosen->light)) return 1;

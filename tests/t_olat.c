@@ -814,6 +814,37 @@ static void test_memory(void) {
     olat_free(&set);
 }
 
+/* A photograph on a background, the background alone; a turned camera's place. */
+static void test_views(void) {
+    static const unsigned char bytes[8] = {255, 51, 0, 255, 255, 255, 0, 51};
+    static const uint16_t words[8] = {65535, 13107, 0, 65535, 65535, 65535, 0, 13107};
+    static const ssdgs_real background[3] = {(ssdgs_real)0.5, (ssdgs_real)0.25, 1};
+    static const double shown[6] = {1, 0.2, 0, 0.2 + 0.8 * 0.5, 0.2 + 0.8 * 0.25, 0.8}, bare[6] = {0.5, 0.25, 1, 0.5, 0.25, 1};
+    static const ssdgs_real view[12] = {0, -1, 0, -2, 0, 0, -1, (ssdgs_real)1.25, 1, 0, 0, (ssdgs_real)-0.5};
+    static const double place[3] = {0.5, -2, 1.25};
+    olat_frame frame;
+    ssdgs_real out[6], eye[3];
+    unsigned char pixels[8];
+    uint16_t wide[8];
+    memset(&frame, 0, sizeof frame);
+    memcpy(pixels, bytes, sizeof pixels);
+    memcpy(wide, words, sizeof wide);
+    frame.camera.width = 2;
+    frame.camera.height = 1;
+    memcpy(frame.camera.view, view, sizeof view);
+    olat_eye(&frame.camera, eye);
+    CHECK(near_all(eye, place, 3));
+    olat_compose(&frame, background, out);
+    CHECK(near_all(out, bare, 6));
+    frame.pixels = pixels;
+    olat_compose(&frame, background, out);
+    CHECK(near_all(out, shown, 6));
+    frame.pixels = wide;
+    frame.format = SSDGS_PIXELS_RGBA16;
+    olat_compose(&frame, background, out);
+    CHECK(near_all(out, shown, 6));
+}
+
 static void test_cow(void) {
     static const char *const splits[2] = {"transforms_train.json", "transforms_test.json"};
     FILE *stream = fopen("examples/data/waxcow/transforms_test.json", "rb");
@@ -853,6 +884,7 @@ int main(void) {
     test_datasets();
     test_saving();
     test_memory();
+    test_views();
     test_cow();
     TEST_END();
 }
