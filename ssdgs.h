@@ -593,7 +593,7 @@ typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rat
 
 /* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations`. */
 typedef struct ssdgs_train_options {
-    int version;               /* stamped by ssdgs_train_options_default */
+    int version;               /* stamped by ssdgs_train_options_default / _published */
     int iterations;            /* 20000 */
     uint64_t seed;             /* 1 */
     int schedule;              /* ssdgs_schedule; merged */
