@@ -72,7 +72,7 @@ WHAT IT COMPUTES
   (eq. 3), with
   f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
   f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of the half
-         vector (eqs. 10 to 12); deferred, each pixel's own (ssdgs_asg)
+         vector (eqs. 10 to 12)
   S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow network (eq. 8)
   f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a material code
          (eq. 4)
@@ -82,15 +82,16 @@ WHAT IT COMPUTES
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
   layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, but no sines of wo and few
   of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
-  by less than light_bias casts no shadow. The specular term is deferred: Gaussians blend c_s S E, normals, sharpness and
-  F0, and each pixel is shaded once. A narrow highlight passes over one Gaussian in few photographs, which its own normal
-  fits by heart; the normals' mean at a pixel carries over to other views. transport = 1 lets the scattering network see
-  besides what true dipole transport brings to x from where the light enters.
+  by less than light_bias casts no shadow. Direct light is deferred (ssdgs_asg): Gaussians blend what they would reflect
+  without shadow, their normals, sharpness and F0, and f_s and S are each pixel's own. A narrow highlight passes over one
+  Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a pixel carries over to other
+  views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows it. transport = 1 lets
+  the scattering network see besides what true dipole transport brings to x from where the light enters.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
   one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S,
   no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
-  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where the specular
-  term is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
+  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where light
+  is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
   surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Diffuse alone
   comes first, the other terms join together after 5,000 iterations of 60,000; shorter runs scale this, longer ones do not.
   In the paper's order, one term after the other, scattering learns the highlights by heart before specular is there.
@@ -174,11 +175,12 @@ GPU HOOK
   desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and writes
   ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no memory before them:
   a hook points the members at its own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y.
-  The rest is there. With any hook set no frame keeps results of the last. Where layer_count is not 0, SHADE fills layers
-  and COMPOSITE adds the specular term (ssdgs_asg) from what they blend to. In training SHADE
-  and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs
-  the CPU's version. Components of an image are composited by the CPU from the tile lists, so they need BIN's results in
-  host memory. A result other than SSDGS_OK ends the frame.
+  The rest is there. With any hook set no frame keeps results of the last. Where layer_count is not 0, WALK fills the
+  lights' falls, SHADE layers, and COMPOSITE adds the diffuse and specular terms (ssdgs_asg) from what they blend to. In
+  training SHADE and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between.
+  ssdgs_stage_cpu(frame, stage) runs the CPU's version. An image's components are the CPU's work, of layer_pixels and
+  pixel_shadow or, where layer_count is 0, of BIN's tile lists, which they need in host memory. A result other than
+  SSDGS_OK ends the frame.
 
 DETERMINISM
   The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
@@ -335,9 +337,9 @@ typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0,        /* Gaussians -> records and depths of every view */
     SSDGS_STAGE_SORT,               /* -> order, nearest first */
     SSDGS_STAGE_BIN,                /* -> instances and tile lists */
-    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux (lights) */
-    SSDGS_STAGE_SHADE,              /* -> color, layers and the components asked for */
-    SSDGS_STAGE_COMPOSITE,          /* -> pixels, layer_pixels, transmittance */
+    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux, falls (lights) */
+    SSDGS_STAGE_SHADE,              /* -> color, layers or the components asked for */
+    SSDGS_STAGE_COMPOSITE,          /* -> pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow */
     SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient, normal_gradient -> splat_gradient, color_gradient, layer_gradient; the
                                        shared gradients anew */
     SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
@@ -377,12 +379,15 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
 typedef enum ssdgs_dipole {
     SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY
 } ssdgs_dipole;
-/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form. Deferred: one term per pixel and light,
-   from what the pixel's Gaussians blend to, so that their normals agree and highlights carry over to other views:
-   M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h)) with M = c_s S E, the
-   blended normal n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part along n.
-   So t_j chooses between the normals' mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is
-   what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001), n.wi >= 0, wo.h >= 0.25 */
+/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form; so is S. Deferred: one term per pixel and
+   light, from what the pixel's Gaussians blend to, so that their normals agree, highlights carry over to other views and shadows
+   have edges: S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))) with
+   D = (c_d / pi) f_d E, M = c_s E, the blended normal n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes
+   and F0; p is h less its part along n. So t_j chooses between the normals' mean, right for smooth surfaces, and all of them,
+   right for rough ones. n.wi / (wo.h)^2 is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001),
+   n.wi >= 0, wo.h >= 0.25. S is eq. 8's of the blended answers of the shadow network and of (1 - soft) v + soft v_g: v is the
+   transmittance to the place at the pixel's depth, by the distances at which it falls in the light's map, v_g the Gaussians',
+   over alpha as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes out beside where it went in */
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
@@ -397,8 +402,8 @@ enum { /* terms of eq. 3; a mask */
 #define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
 
 /* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale), sigmoid(opacity),
-   softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first ASG weights are log lambda, log mu and
-   the logit of F0 less that of 0.04; the others rest. */
+   softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first ASG weights are log lambda, log mu,
+   the logit of F0 less that of 0.04 and that of the shadow's softness; the others rest. */
 enum {
     SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
     SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
@@ -712,6 +717,9 @@ typedef struct ssdgs_splat_view {
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
     ssdgs_real *tile_sums;      /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
+    ssdgs_real *falls;          /* (tiles, 4, 4, 4, 4, 4) a light's: tiles' micro-tiles, rows first, their pixels, of each the
+                                   distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5, 0.1, or
+                                   1e30, and what is left behind all; not set in tiles without a Gaussian. NULL: nobody asks */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -740,15 +748,17 @@ typedef struct ssdgs_frame {
     uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
     ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
-    int layer_count;            /* 0, or 4 + light_count: the specular term is deferred, color has none; in training also
-                                   before it joins */
-    ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; M of each light */
-    ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth */
+    int layer_count;            /* 0, or 4 + 3 light_count: light is deferred, color is scattering alone */
+    ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; of each light M;
+                                   D; the shadow network's answer, v_g, softness */
+    ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth; NULL: light is deferred */
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;         /* (3, h, w) without background */
     ssdgs_real *layer_pixels;   /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where nothing is; for
                                    components and training */
     ssdgs_real *transmittance;  /* (h, w) */
+    ssdgs_real *pixel_visibility, *pixel_shadow; /* (lights, h, w) v, S where light is deferred; as layer_pixels */
+    int visibility_given;       /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other means */
     /* backward */
     ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
     ssdgs_real *normal_gradient; /* (4, h, w) dL/d(the normals' layer), dL/d(its alpha, the ones' layer); NULL = 0 */
@@ -919,11 +929,16 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
+#define SSDGS__NEVER ((ssdgs_real)1e30)
+#define SSDGS__FALLS 3       /* levels of transmittance whose distances a light's map holds, before what is left behind all */
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
-#define SSDGS__LAYERS 6      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, M of one light */
+#define SSDGS__LAYERS 8      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, three of one light */
+#define SSDGS__LIGHT_LAYER 5 /* the first light's: M, D, residual of S; the next light's follow */
+#define SSDGS__PER_LIGHT 3
+#define SSDGS__DEPTH_LAYER 3
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
-#define SSDGS__LOBE 10       /* rows: Q (6), normal (3), F0 */
+#define SSDGS__LOBE 11       /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
 
 enum { /* rows of a block's geometry */
@@ -946,6 +961,7 @@ typedef struct ssdgs__tile {
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
     int cue, flux, orthographic; /* whether the light pass finds them */
+    ssdgs_real *falls; /* of the tile in a light's map, or NULL */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -959,7 +975,7 @@ typedef struct ssdgs__product {
 typedef struct ssdgs__lighting {
     ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
     int directional, angular, dipole, diffuse, specular, shadow, scattering;
-    int residual_shadow, per_channel_optics, shadow_on_scattering, deferred;
+    int residual_shadow, refined_shadow, per_channel_optics, shadow_on_scattering, deferred;
     ssdgs_real view[12], inverse_fx, inverse_fy, cx, cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
 } ssdgs__lighting;
 
@@ -972,8 +988,9 @@ typedef struct ssdgs__kernels {
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
     void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, size_t, int);
-    void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *);
-    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *, ssdgs_real *);
+    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
+                               ssdgs_real *);
     void (*lobe)(const ssdgs_real *, ssdgs_real *);
     void (*lobe_backward)(const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
@@ -991,8 +1008,8 @@ typedef struct ssdgs__kernels {
     void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
                    const ssdgs_real *, ssdgs_real *);
     void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
-                            ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                            ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
     void (*depth_normals)(const ssdgs_camera *, const ssdgs_real *, size_t, int, ssdgs_real, ssdgs_real *);
     void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
     void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
@@ -1015,6 +1032,7 @@ static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5, 4.5, 4.5,
 #if SSDGS__NEON
 static const uint32_t ssdgs__lane_bits[4] = {1, 2, 4, 8};
 #endif
+static const ssdgs_real ssdgs__fall[SSDGS__FALLS] = {(ssdgs_real)0.9, (ssdgs_real)0.5, (ssdgs_real)0.1};
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {
     (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
@@ -1050,6 +1068,32 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
     return tile->x + 4 * (micro & 3) + (lane & 3) < tile->width && tile->y + 4 * (micro >> 2) + (lane >> 2) < tile->height
         ? (ssdgs_real)1
                                                                                                                         : (ssdgs_real)-1;
+}
+
+/* ---- a light's map of where transmittance falls ---- */
+
+/* At a distance, the transmittances t of the lanes in `bits` have fallen below their next level or several. */
+static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t, ssdgs_real distance,
+                              ssdgs_real *next, unsigned char *level) {
+    for (; bits; bits &= bits - 1) {
+        const int lane = ssdgs__lowest_bit(bits);
+        ssdgs_real *at = tile->falls + (16 * micro + lane) * (SSDGS__FALLS + 1);
+        int l = level[lane];
+        while (l < SSDGS__FALLS && t[lane] < ssdgs__fall[l]) at[l++] = distance;
+        level[lane] = (unsigned char)l;
+        next[lane] = l < SSDGS__FALLS ? ssdgs__fall[l] : -1;
+    }
+}
+
+/* Closes the list of each pixel, of `levels` so far. */
+static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *levels, const ssdgs_real *transmittance) {
+    int i;
+    for (i = 0; i < 256; i++) {
+        ssdgs_real *at = tile->falls + i * (SSDGS__FALLS + 1);
+        int l;
+        for (l = levels[i]; l < SSDGS__FALLS; l++) at[l] = SSDGS__NEVER;
+        at[SSDGS__FALLS] = transmittance[i];
+    }
 }
 
 /* ---- scalar lanes ---- */
@@ -1837,7 +1881,8 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed, sums, histogram;
+    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed, sums, falls;
+    ssdgs__buffer histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -1859,7 +1904,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels, transmittance;
     ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
-    ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums;
+    ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known;
     int view_room;
@@ -2189,7 +2234,7 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
     known = known && kept->lights_ready && frame->light_count == kept->light_count &&
         !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
         ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
-        !(frame->terms & ~kept->terms & SSDGS_SCATTERING_TERM); /* which alone asks for depth cue and flux */
+        !(frame->terms & ~kept->terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
     for (i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
         for (j = 0; j < 3; j++) known = known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
@@ -2289,14 +2334,17 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
-    if (frame->settings.asg == SSDGS_ASG_DEFERRED && (training || frame->terms & SSDGS_SPECULAR_TERM) && frame->light_count) {
-        frame->layer_count = SSDGS__LAYERS - 2 + frame->light_count;
+    if (frame->settings.asg == SSDGS_ASG_DEFERRED && frame->light_count) {
+        frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
         SSDGS__RESERVE(m->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
-        if (components || training)
+        if (components || training) {
             SSDGS__RESERVE(m->layer_pixels, frame->layer_pixels, ssdgs_real, pixels * 3 * (size_t)(frame->layer_count + 1));
+            SSDGS__RESERVE(m->pixel_visibility, frame->pixel_visibility, ssdgs_real, pixels * (size_t)frame->light_count);
+            SSDGS__RESERVE(m->pixel_shadow, frame->pixel_shadow, ssdgs_real, pixels * (size_t)frame->light_count);
+        }
         if (training) SSDGS__RESERVE(m->layer_gradient, frame->layer_gradient, ssdgs_real, n * 4 * (size_t)frame->layer_count);
     }
-    if (components) {
+    if (components && !frame->layer_count) {
         SSDGS__RESERVE(m->component[0], frame->diffuse, ssdgs_real, n * 4);
         SSDGS__RESERVE(m->component[1], frame->specular, ssdgs_real, n * 4);
         SSDGS__RESERVE(m->component[2], frame->scattering, ssdgs_real, n * 4);
@@ -2619,6 +2667,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
+    t.falls = v->falls ? v->falls + (size_t)index * 256 * (SSDGS__FALLS + 1) : NULL;
     return t;
 }
 
@@ -2693,7 +2742,12 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             SSDGS__RESERVE(m->seen, v->tile_seen, uint16_t, v->instances + 1);
             v->tile_needed = NULL;
             if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
-        } else SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
+        } else {
+            SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
+            v->falls = NULL;
+            if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
+                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real, (size_t)(v->tiles_x * v->tiles_y) * 256 * (SSDGS__FALLS + 1));
+        }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
     if (!frame->views->kept) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
@@ -2718,7 +2772,7 @@ typedef struct ssdgs__block_layout {
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                          /* within the block */
     size_t inputs, pairs, outs, lobe;                                    /* scratch of both directions */
-    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, dspecular, dvisibility, scratch; /* and of the backward */
+    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility, scratch; /* and of the backward */
 } ssdgs__block_layout;
 
 /* Rows of all layers' outputs. */
@@ -2754,7 +2808,8 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.dgauss = l.lobe + b * SSDGS__LOBE;
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
-    l.dspecular = l.dcolor + b * 3;
+    l.ddiffuse = l.dcolor + b * 3;
+    l.dspecular = l.ddiffuse + b * 3;
     l.dvisibility = l.dspecular + b * 3;
     l.dnet = l.dvisibility + b;
     l.dnet2 = l.dnet + b * (size_t)(l.widest + 1);
@@ -2787,6 +2842,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
     k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
     k.residual_shadow = s->residual_shadow;
+    k.refined_shadow = s->shadow_layers > 0;
     k.per_channel_optics = s->per_channel_optics;
     k.shadow_on_scattering = s->shadow_on_scattering;
     k.deferred = frame->layer_count > 0;
@@ -3325,6 +3381,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         for (s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s]];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
+    if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0), *shadow = NULL,
@@ -3354,12 +3411,19 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
         if (lighting->deferred) {
-            ssdgs__layer_store(frame, SSDGS__LAYERS - 2 + light, at, live, outs + 3 * SSDGS__BLOCK);
-            memset(outs + 3 * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *outs);
+            const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
+            ssdgs__layer_store(frame, layer, at, live, outs + 3 * SSDGS__BLOCK);
+            ssdgs__layer_store(frame, layer + 1, at, live, outs);
+            memset(outs, 0, 6 * SSDGS__BLOCK * sizeof *outs);
+            for (s = 0; s < live; s++) {
+                ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
+                to[0] = lighting->shadow && shadow ? shadow[s] : 0;
+                to[1] = part[l->visibility + (size_t)s];
+                to[2] = scratch[l->lobe + 10 * SSDGS__BLOCK + (size_t)s];
+            }
         }
     }
     if (frame->layer_count) {
-        k->lobe(gauss, scratch + l->lobe);
         for (i = 0; i < 3; i++) ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
         for (s = 0; s < live; s++) {
             ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
@@ -3385,7 +3449,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         for (i = 0; i < frame->layer_count && black; i++) memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
         for (c = 0; c < SSDGS__OUTS && black; c++) color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
         color[3] = (ssdgs_real)black;
-        if (!frame->components) continue;
+        if (!frame->diffuse) continue;
         {
             ssdgs_real raw[4], q[4], r[9];
             for (i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
@@ -3420,7 +3484,7 @@ static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
     for (g = begin ? from : 0; g < last; g++) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
         if (frame->seen[g] != SSDGS_GLIMPSED) continue;
-        for (p = 0; p < (frame->components ? 6 : 1); p++) memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
+        for (p = 0; p < (frame->diffuse ? 6 : 1); p++) memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
         for (p = 0; p < frame->layer_count; p++)
             memcpy(ssdgs__layer(frame, p) + 4 * g, ssdgs__layer(frame, p) + 4 * from, 4 * sizeof(ssdgs_real));
     }
@@ -3519,7 +3583,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         *dcolor = scratch + l->dcolor;
     ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
-    ssdgs_real *dspecular = scratch + l->dspecular, *dlobe = scratch + l->lobe;
+    ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse, *dlobe = scratch + l->lobe;
+    ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK, dresidual[3 * SSDGS__BLOCK];
     const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
     int light, s, c;
@@ -3532,6 +3597,11 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live, dlobe + 3 * c * SSDGS__BLOCK);
         ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
         memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK, SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
+        memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe);
+        for (light = 0; light < frame->light_count; light++) {
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__LIGHT_LAYER + 1 + SSDGS__PER_LIGHT * light), at, live, rows);
+            for (s = 0; s < SSDGS__BLOCK; s++) dlobe[10 * SSDGS__BLOCK + s] += rows[2 * SSDGS__BLOCK + s];
+        }
         k->lobe_backward(gauss, dlobe, dgauss);
     }
     for (light = 0; light < frame->light_count; light++) {
@@ -3542,11 +3612,16 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16, *dinputs;
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
-        if (lighting->deferred)
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__LAYERS - 2 + light), at, live, dspecular);
+        if (lighting->deferred) {
+            const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
+        }
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
-                           lighting->deferred ? dspecular : dcolor, dgauss, drows,
-                           scratch + l->transposed - SSDGS__BLOCK, dnet, dvisibility);
+                           lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor, dgauss, drows,
+                           dshadow, dnet, dvisibility);
+        for (s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
@@ -3556,7 +3631,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
-            memcpy(dnet, scratch + l->transposed - SSDGS__BLOCK, SSDGS__BLOCK * sizeof *dnet);
+            memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
                                               part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists, l->shadow[0],
@@ -3692,6 +3767,69 @@ typedef struct ssdgs__composite_job {
     ssdgs__lighting *lightings; /* NULL: without the layers */
 } ssdgs__composite_job;
 
+/* Transmittance at a distance from the light through one pixel of its map: linear from level to level. */
+static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance) {
+    const int tile = (y >> 4) * map->tiles_x + (x >> 4);
+    const ssdgs_real *falls = map->falls +
+        ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) * (SSDGS__FALLS + 1);
+    int level = 0, i;
+    if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
+    for (i = 0; i < SSDGS__FALLS; i++) level += distance > falls[i];
+    if (!level) return 1;
+    if (level == SSDGS__FALLS || falls[level] >= SSDGS__NEVER) return falls[SSDGS__FALLS];
+    return ssdgs__fall[level - 1] + (ssdgs__fall[level] - ssdgs__fall[level - 1]) * (distance - falls[level - 1]) /
+                                        (falls[level] - falls[level - 1]);
+}
+
+/* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
+static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias) {
+    const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1), half = (ssdgs_real)0.5;
+    ssdgs_real t[3], u, w, inverse_z, distance, row[2];
+    int i, x, y;
+    for (i = 0; i < 3; i++)
+        t[i] = map->view[4 * i] * at[0] + map->view[4 * i + 1] * at[1] + map->view[4 * i + 2] * at[2] + map->view[4 * i + 3];
+    if (!(t[2] > map->near_plane)) return -1;
+    inverse_z = map->orthographic ? 1 : 1 / t[2];
+    u = map->fx * t[0] * inverse_z + map->cx - half;
+    w = map->fy * t[1] * inverse_z + map->cy - half;
+    if (!(u >= -half && w >= -half && u <= wide + half && w <= high + half)) return -1;
+    u = u < 0 ? 0 : u > wide ? wide : u;
+    w = w < 0 ? 0 : w > high ? high : w;
+    distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
+    distance -= bias + (ssdgs_real)1e-5 * distance + (map->visible ? map->depth[map->order[0]] : 0); /* no shadow by rounding */
+    x = u < wide ? (int)u : map->width - 2;
+    y = w < high ? (int)w : map->height - 2;
+    u -= (ssdgs_real)x;
+    w -= (ssdgs_real)y;
+    for (i = 0; i < 2; i++)
+        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance) + u * ssdgs__passed(map, x + 1, y + i, distance);
+    return (1 - w) * row[0] + w * row[1];
+}
+
+/* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at their depth. Where
+   no map knows it, that of their Gaussians. */
+static void ssdgs__look(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
+                        const ssdgs_real *layers, ssdgs_real *sight) {
+    const ssdgs_real bias = frame->settings.light_bias * frame->settings.length_unit;
+    int i, c, view;
+    for (i = 0; i < 256; i++) {
+        const int lane = i / 16 * 64 + i % 16;
+        const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
+        ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3));
+        ssdgs_real y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2)), at[3], z, passed = -1;
+        sight[lane] = 1;
+        if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
+        z = depth[0] / depth[32];
+        x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
+        y = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
+        for (c = 0; c < 3; c++) at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
+        for (view = 1; view < frame->view_count && passed < 0; view++)
+            if (frame->views[view].light == light && frame->views[view].falls)
+                passed = ssdgs__passed_to(frame->views + view, at, bias);
+        sight[lane] = passed < 0 ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32] : passed;
+    }
+}
+
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -3699,7 +3837,8 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
     const int layers = job->lightings && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], *glow = pixels + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
+    ssdgs_real sight[SSDGS__TILE_LAYER];
     int layer, light;
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
@@ -3707,13 +3846,24 @@ static void ssdgs__composite_task(void *data, int index) {
         memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
     for (layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
         ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
-    for (light = 0; layers > 1 && light < frame->light_count; light++) {
-        if (light) {
-            color[0] = ssdgs__layer(frame, SSDGS__LAYERS - 2 + light);
-            k->composite(&tile, 1, color, glow);
-            ssdgs__layer_pixels_store(frame, &tile, SSDGS__LAYERS - 1 + light, glow);
+    for (light = 0; job->lightings && light < frame->light_count; light++) {
+        const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
+        const size_t plane = (size_t)tile.width * (size_t)tile.height * (size_t)light;
+        if (layers > 1) {
+            for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
+            if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
+            if (frame->visibility_given) ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, sight);
+            else ssdgs__look(frame, job->lightings + light, light, &tile, pixels, sight);
+        } else memset(sight, 0, sizeof sight);
+        for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
+            ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
+        if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, sight);
+        if (frame->pixel_shadow) {
+            ssdgs_real *planes[2];
+            planes[0] = frame->pixel_visibility + plane;
+            planes[1] = frame->pixel_shadow + plane;
+            ssdgs__tile_store(&tile, sight, 2, planes);
         }
-        k->highlight(job->lightings + light, &tile, pixels);
     }
     ssdgs__tile_store(&tile, pixels, 4, job->planes);
 }
@@ -3769,34 +3919,36 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 1);
     const size_t plane = (size_t)v->width * (size_t)v->height;
-    const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1, last = (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
-    const int glints = deferred && frame->terms & SSDGS_SPECULAR_TERM ? frame->light_count : 0;
+    const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1;
+    const int lit = SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
     const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER], sight[SSDGS__TILE_LAYER];
     ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
     int layer, light, c;
     if (!tile.count) return;
     memset(sums, 0, tile.count * job->stride * sizeof *sums);
     for (c = 0; c < 4; c++) ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
-    for (layer = 0; layer < layers - deferred; layer++)
+    for (layer = 0; layer < (deferred ? SSDGS__LIGHT_LAYER : 1); layer++)
         for (c = 0; c < 3; c++)
             ssdgs__tile_load(&tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
                              pixels + layer * SSDGS__TILE_LAYER);
     ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
-    if (deferred && !glints) memset(pixels + last, 0, SSDGS__TILE_LAYER * sizeof *pixels); /* there is no M yet */
     for (c = 0; deferred && frame->normal_gradient && c < 4; c++)
         ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c % 3 + 2 * (c / 3),
                          gradient + (c < 3 ? 4 : 3) * SSDGS__TILE_LAYER);
-    for (light = glints - 1; light >= 0; light--) { /* the first one's M is walked with the other layers */
-        const int m = SSDGS__LAYERS - 1 + light;
-        for (c = 0; c < 3; c++) ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, m, c), c, pixels + last);
-        k->highlight_backward(job->lightings + light, &tile, pixels, gradient,
+    for (light = deferred ? frame->light_count - 1 : -1; light >= 0; light--) { /* the first's are walked with the others */
+        const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
+        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+            for (c = 0; c < 3; c++)
+                ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c, pixels + lit + layer * SSDGS__TILE_LAYER);
+        ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, sight);
+        k->highlight_backward(job->lightings + light, &tile, pixels, sight, gradient,
                               job->highlight_sums + (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
         if (!light) continue;
-        color[0] = ssdgs__layer(frame, m - 1);
-        ssdgs__gradient_product(pixels + last, gradient + last, 1, 0);
-        k->composite_backward(&tile, 1, color, gradient + last, sums, job->stride, m);
+        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
+        ssdgs__gradient_product(pixels + lit, gradient + lit, SSDGS__PER_LIGHT, 0);
+        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, sums, job->stride, first);
     }
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
     ssdgs__gradient_product(pixels, gradient, layers, 1);
@@ -3984,6 +4136,29 @@ static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes
     ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task, &job);
 }
 
+/* Three planes of a frame whose light is deferred: 0 diffuse, 1 specular, 2 scattering, 3 the normal, 4 S, depth. */
+static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, ssdgs_real *planes) {
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const ssdgs_real *depth = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0);
+    size_t i;
+    int light, c;
+    for (c = 0; c < 3; c++) {
+        const ssdgs_real *scattering = ssdgs__layer_plane(frame, 0, c), *all = frame->pixels + pixels * (size_t)c;
+        const ssdgs_real *normal = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER + 1, c);
+        ssdgs_real *to = planes + pixels * (size_t)c;
+        for (i = 0; i < pixels; i++)
+            to[i] = component == 1 ? all[i] - scattering[i] : component == 2 ? scattering[i] : component == 3 ? normal[i]
+                : component == 4 && c == 1 ? depth[i] : 0;
+        for (light = 0; light < frame->light_count; light++) {
+            const ssdgs_real *shadow = frame->pixel_shadow + pixels * (size_t)light;
+            const ssdgs_real *d = ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c);
+            for (i = 0; i < pixels && component < 2; i++) to[i] += (component ? -d[i] : d[i]) * shadow[i];
+            for (i = 0; i < pixels && component == 4 && c == 0; i++)
+                to[i] += shadow[i] * (1 - frame->transmittance[i]) / (ssdgs_real)frame->light_count;
+        }
+    }
+}
+
 SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
                                        const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_context *context;
@@ -4016,13 +4191,13 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
         const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
         if (!to[c]) continue;
-        if (c == 1 && frame.layer_count) {
-            for (i = 0; i < pixels * 3; i++) planes[i] = frame.pixels[i] - frame.layer_pixels[i];
-        } else ssdgs__composite_tiles(&frame, from[c], planes, NULL);
+        if (frame.layer_count) ssdgs__deferred_component(&frame, c, planes);
+        else ssdgs__composite_tiles(&frame, from[c], planes, NULL);
         ssdgs__write_rows(&frame, planes, 3, stride, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
-        ssdgs__composite_tiles(&frame, frame.shadow, planes, NULL);
+        if (frame.layer_count) ssdgs__deferred_component(&frame, 4, planes);
+        else ssdgs__composite_tiles(&frame, frame.shadow, planes, NULL);
         if (image->shadow) ssdgs__write_rows(&frame, planes, 1, stride, NULL, image->shadow);
         if (image->depth) ssdgs__write_rows(&frame, planes + pixels, 1, stride, NULL, image->depth);
     }
@@ -6320,7 +6495,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     ssdgs__block_layout layout;
     size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
     ssdgs_frame frame;
-    double across;
+    double across, map;
     if (!settings || !options || width < 1 || height < 1) return 0;
     memset(&frame, 0, sizeof frame);
     frame.settings = *settings;
@@ -6340,6 +6515,9 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) + 160;
     fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
         6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
+    /* a light's map inside of the scene, of Gaussians on surfaces */
+    map = settings->light_map_size ? settings->light_map_size : 6 * sqrt((double)n) < 512 ? 6 * sqrt((double)n) : 512;
+    if (layers > 1) fixed += 6 * (SSDGS__FALLS + 1) * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
@@ -7384,7 +7562,9 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
    of its entries for the other to pick from. */
 SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
-    R transmittance[16][16], met[16][16]; /* met: sum of blend weight x distance */
+    R transmittance[16][16], met[16][16], next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
+    unsigned char fallen[16][16];
+    const int all = flux || tile->falls;
     F(batch) applied, sampled;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
@@ -7394,13 +7574,15 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
             met[micro][v] = 0;
+            next[micro][v] = tile->falls ? ssdgs__fall[0] : -1;
         }
-    while (sampling < tile->count || (flux && applying < tile->count)) {
+    memset(fallen, 0, sizeof fallen);
+    while (sampling < tile->count || (all && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
         V lanes[SSDGS__BATCH][3][SSDGS__NV], energy[SSDGS__BATCH][SSDGS__NV]; /* the sums before the lanes are added up */
         R history[2][SSDGS__BATCH][16]; /* transmittance and met, before the first applied and after each; 63 at most */
         int samples = 0, applies = 0;
-        while (sampling < tile->count || (flux && applying < tile->count)) {
+        while (sampling < tile->count || (all && applying < tile->count)) {
             const int sample = sampling < tile->count && tile->depth[tile->list[sampling].gaussian] - tile->bias <=
                                                              tile->depth[tile->list[applying].gaussian];
             F(batch) *batch = sample ? &sampled : &applied;
@@ -7449,11 +7631,16 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
+                    unsigned fell;
                     alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     if (cue || flux) w = VMUL(alpha, t[v]);
                     if (flux) energy[index][v] = VFMA(omega[v], w, energy[index][v]);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
+                    fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
+                    if (fell)
+                        ssdgs__falls_note(tile, micro, fell, history[0][index + 1], applied.record[index][6], next[micro],
+                                          fallen[micro]);
                     if (!cue) continue;
                     b[v] = VFMA(w, distance, b[v]);
                     VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
@@ -7484,6 +7671,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
         for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
+    if (tile->falls) ssdgs__falls_end(tile, fallen[0], transmittance[0]);
 }
 
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
@@ -7560,6 +7748,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
 
 SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const *color, R *pixels) {
     if (layers == 1) F(composite_layers)(1, tile, color, pixels);
+    else if (layers == SSDGS__PER_LIGHT) F(composite_layers)(SSDGS__PER_LIGHT, tile, color, pixels);
     else F(composite_layers)(SSDGS__LAYERS, tile, color, pixels);
 }
 
@@ -7648,6 +7837,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *sums, size_t stride,
                                      int slot) {
     if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, sums, stride, slot);
+    else if (layers == SSDGS__PER_LIGHT)
+        F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, sums, stride, slot);
     else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, sums, stride, slot);
 }
 
@@ -8145,49 +8336,102 @@ SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
     return sum;
 }
 
-/* Adds the light's specular term to layer 0. */
-SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers) {
+/* What arrives at pixels: eq. 8 with a visibility between the map's and the Gaussians', as soft as these are. */
+typedef struct F(arrival) { V inverse_cover, residual, gauss, soft, map, visibility, factor; } F(arrival);
+
+SSDGS__FI void F(arrival_lanes)(F(arrival) *a, const ssdgs__lighting *k, const R *layers, V map) {
+    const R *more = layers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
+    V logit;
+    a->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), VSET(SSDGS__THIN)));
+    a->residual = VMUL(VLOAD(more), a->inverse_cover);
+    a->gauss = VMUL(VLOAD(more + 16), a->inverse_cover);
+    a->soft = VMUL(VLOAD(more + 32), a->inverse_cover);
+    a->map = map;
+    a->visibility = a->factor = VFMA(a->soft, VSUB(a->gauss, map), map);
+    logit = a->residual;
+    if (k->refined_shadow && k->residual_shadow) {
+        const V v = VMAX(VSET(0.01), VMIN(VSET(0.99), a->visibility));
+        logit = VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), logit);
+    }
+    if (k->refined_shadow) a->factor = F(sigmoid)(logit);
+    if (!k->shadow) a->factor = VSET(1);
+}
+
+/* Writes the gradient of the layer with the residual, returns what goes to the cover, times that. */
+SSDGS__FI V F(arrival_backward)(const F(arrival) *a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
+    R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
+    V dresidual = VSET(0), dvisibility, dgauss, dsoft;
+    if (!k->shadow) dfactor = VSET(0);
+    dvisibility = dfactor;
+    if (k->refined_shadow) dresidual = VMUL(dfactor, VFNMA(a->factor, a->factor, a->factor));
+    if (k->refined_shadow && k->residual_shadow) {
+        const V inside = VMUL(VSUB(a->visibility, VSET(0.01)), VSUB(VSET(0.99), a->visibility));
+        dvisibility = VSEL(VLT(VSET(0), inside), VDIV(dresidual, VFNMA(a->visibility, a->visibility, a->visibility)), VSET(0));
+    } else if (k->refined_shadow) dvisibility = VSET(0);
+    dgauss = VMUL(dvisibility, a->soft);
+    dsoft = VMUL(dvisibility, VSUB(a->gauss, a->map));
+    VSTORE(dmore, VMUL(dresidual, a->inverse_cover));
+    VSTORE(dmore + 16, VMUL(dgauss, a->inverse_cover));
+    VSTORE(dmore + 32, VMUL(dsoft, a->inverse_cover));
+    return VFMA(dresidual, a->residual, VFMA(dgauss, a->gauss, VMUL(dsoft, a->soft)));
+}
+
+/* Adds the light's diffuse and specular terms to layer 0. sight: visibility, in; S, out. */
+SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers, R *sight) {
     int micro, v, c;
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
-        R *at = layers + micro * 64, *m = at + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+        R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER, *s = sight + micro * 64;
         F(pixel_centres)(tile, micro, px, py);
-        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW) {
+        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
+            F(arrival) arrival;
             F(glint) g;
-            V value;
+            V value, factor;
+            F(arrival_lanes)(&arrival, k, at, VLOAD(s));
+            factor = arrival.factor;
+            VSTORE(s + 16, factor);
+            for (c = 0; c < 3; c++)
+                VSTORE(at + 16 * c, VFMA(factor, VLOAD(m + SSDGS__TILE_LAYER + 16 * c), VLOAD(at + 16 * c)));
             if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
             F(glint_lanes)(&g, k, pixel, at);
-            value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0));
+            value = VMUL(factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0)));
             for (c = 0; c < 3; c++) VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
         }
     }
 }
 
 /* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes layer 5; adds to sums (SSDGS__HIGHLIGHT_SUMS). */
-SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers, R *gradient, R *sums) {
+SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers, const R *sight,
+                                     R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
     int micro, v, i, j;
     for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
         for (v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
-        const R *at = layers + micro * 64, *m = at + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
-        R *d = gradient + micro * 64, *dm = d + (SSDGS__LAYERS - 1) * SSDGS__TILE_LAYER;
+        const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER, *s = sight + micro * 64;
+        R *d = gradient + micro * 64, *dm = d + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
         F(pixel_centres)(tile, micro, px, py);
-        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW) {
+        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
+            F(arrival) arrival;
             F(glint) g;
             V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum, radial, along,
-                ddepth, dat[3], dray, dcover, to;
+                ddepth, dat[3], dray, dcover, to, dfactor = VSET(0);
             R *dlayer = d + SSDGS__TILE_LAYER;
+            F(arrival_lanes)(&arrival, k, at, VLOAD(s));
             F(glint_lanes)(&g, k, pixel, at);
             glow = F(glow)(k, g.q);
             value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
             for (i = 0; i < 3; i++) {
-                VSTORE(dm + 16 * i, VMUL(VLOAD(d + 16 * i), value));
-                push = VFMA(VLOAD(d + 16 * i), VLOAD(m + 16 * i), push);
+                const V pull = VMUL(VLOAD(d + 16 * i), arrival.factor);
+                VSTORE(dm + 16 * i, VMUL(pull, value));
+                VSTORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
+                push = VFMA(pull, VLOAD(m + 16 * i), push);
+                dfactor = VFMA(VLOAD(d + 16 * i), VFMA(value, VLOAD(m + 16 * i), VLOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
             }
+            dcover = F(arrival_backward)(&arrival, k, dfactor, d);
             push = VSEL(g.half, push, VSET(0));
             dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
             push = VMUL(push, g.microfacet);
@@ -8255,19 +8499,19 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             dlayer += 2 * SSDGS__TILE_LAYER;
             VSTORE(dlayer, VFMA(ddepth, g.inverse_cover, VLOAD(dlayer)));
             VSTORE(dlayer + 16, VFMA(df0, g.inverse_cover, VLOAD(dlayer + 16)));
-            /* Q, depth and F0 are over A, A > |N| */
-            dcover = VFMA(dq[0], g.q[0], VFMA(dq[1], g.q[1], VFMA(ddepth, g.depth, VMUL(df0, g.f0))));
+            /* all of these are over A, A > |N| */
+            dcover = VFMA(dq[0], g.q[0], VFMA(dq[1], g.q[1], VFMA(ddepth, g.depth, VFMA(df0, g.f0, dcover))));
             VSTORE(dlayer + 32, VFNMA(dcover, g.inverse_cover, VLOAD(dlayer + 32)));
         }
     }
     for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
 }
 
-/* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on. */
+/* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on, softness of its logit. */
 SSDGS__FI V F(sharpness)(V raw) { return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw))); }
 SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_LOGIT))); }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0. */
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0, softness. */
 SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
@@ -8281,6 +8525,7 @@ SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
         }
         for (i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
         VSTORE(rows + 9 * SSDGS__BLOCK + s, F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
+        VSTORE(rows + 10 * SSDGS__BLOCK + s, F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
     }
 }
 
@@ -8288,7 +8533,7 @@ SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
 SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        V raw[4], q[4], r[9], dr[9], dq[4], inverse_q, f0;
+        V raw[4], q[4], r[9], dr[9], dq[4], inverse_q, f0, soft;
         R *out = dgauss + SSDGS_FRAME * SSDGS__BLOCK + s;
         for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
         inverse_q = F(rotation)(raw, q, r);
@@ -8313,6 +8558,9 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         f0 = F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
         out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
         VSTORE(out, VFMA(VFNMA(f0, f0, f0), VLOAD(drows + 9 * SSDGS__BLOCK + s), VLOAD(out)));
+        soft = F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
+        out += SSDGS__BLOCK;
+        VSTORE(out, VFMA(VFNMA(soft, soft, soft), VLOAD(drows + 10 * SSDGS__BLOCK + s), VLOAD(out)));
     }
 }
 
@@ -8427,7 +8675,8 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
         V profile = VSET(0), unit[3];
         R *o = out + s;
         for (c = 0; c < 3; c++) {
-            const V power = VMUL(irradiance, VSET(k->intensity[c])), lit = VMUL(power, factor);
+            const V power = VMUL(irradiance, VSET(k->intensity[c])), shaded = VMUL(power, factor);
+            const V lit = k->deferred ? power : shaded;
             if (k->diffuse) {
                 const V kd = F(softplus)(VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
                 const V f = VMUL(VMUL(kd, VSET(0.31830988618379067)), VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
@@ -8446,48 +8695,50 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
                                             VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, NULL);
                 }
                 VSTORE(o + (6 + c) * SSDGS__BLOCK,
-                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? lit : power, VLOAD(o + (6 + c) * SSDGS__BLOCK)));
+                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power, VLOAD(o + (6 + c) * SSDGS__BLOCK)));
             }
         }
         VSTORE(o + 9 * SSDGS__BLOCK, VADD(factor, VLOAD(o + 9 * SSDGS__BLOCK)));
     }
 }
 
-/* dcolor (3, BLOCK), dspecular for the specular term alone: dcolor, unless that is deferred. Adds to dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
+/* dcolor (3, BLOCK), ddiffuse and dspecular for those terms alone: dcolor, unless they are deferred. Adds to dgauss; writes
+   drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
 SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
-                                  const R *optics, const R *dcolor, const R *dspecular, R *dgauss, R *drows, R *dshadow, R *doptics,
-                                  R *dvisibility) {
+                                  const R *optics, const R *dcolor, const R *ddiffuse, const R *dspecular, R *dgauss, R *drows,
+                                  R *dshadow, R *doptics, R *dvisibility) {
     int s, c, i;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
             factor = F(shadow_factor)(k, visibility, shadow, s);
         const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s), gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
-        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), profile = VSET(0), unit[3], d[3],
-            dunit[3];
+        const V direct = k->deferred ? VSET(1) : factor;
+        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0), profile = VSET(0),
+            unit[3], d[3], dunit[3];
         for (i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
         for (c = 0; c < 3; c++) {
-            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                lit = VMUL(VMUL(g, irradiance), factor);
-            V surface = VSET(0); /* what S multiplies, per irradiance */
+            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
             if (k->diffuse) { /* (c_d / pi) f_d S */
                 const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
-                const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067));
+                const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067)), surface = VMUL(kd, cosine);
+                const V push = VMUL(VLOAD(ddiffuse + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
+                    lit = VMUL(VMUL(push, irradiance), direct);
                 R *out = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
                 VSTORE(out, VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(out)));
-                surface = VMUL(kd, cosine);
                 dcosine = VFMA(lit, kd, dcosine);
+                dirradiance = VFMA(VMUL(push, direct), surface, dirradiance);
+                ddirect = VFMA(VMUL(push, irradiance), surface, ddirect);
             }
             if (k->specular) { /* c_s f_s S */
                 const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
                 const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                    glint = VMUL(VMUL(push, irradiance), factor), shine = VMUL(ks, gloss);
+                    glint = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
                 R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
                 VSTORE(out, VFMA(VMUL(glint, gloss), F(sigmoid)(raw), VLOAD(out)));
                 dgloss = VFMA(glint, ks, dgloss);
-                dirradiance = VFMA(VMUL(push, factor), shine, dirradiance);
-                dfactor = VFMA(VMUL(push, irradiance), shine, dfactor);
+                dirradiance = VFMA(VMUL(push, direct), shine, dirradiance);
+                ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
             }
-            dirradiance = VFMA(VMUL(g, factor), surface, dirradiance);
             if (k->scattering) { /* c_sss f_sss */
                 const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s), kss = F(softplus)(raw);
                 R *out = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
@@ -8500,7 +8751,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 }
                 VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
                 dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
-                if (k->shadow_on_scattering) surface = VFMA(kss, profile, surface);
+                if (k->shadow_on_scattering) dfactor = VFMA(VMUL(g, irradiance), VMUL(kss, profile), dfactor);
                 dprofile = VMUL(lamp, kss);
                 for (i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
                 if (k->per_channel_optics)
@@ -8510,7 +8761,6 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                         dunit[i] = VSET(0);
                     }
             }
-            dfactor = VFMA(VMUL(g, irradiance), surface, dfactor);
         }
         if (k->scattering) {
             if (!k->per_channel_optics)
@@ -8519,6 +8769,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
                    VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
         }
+        if (!k->deferred) dfactor = VADD(dfactor, ddirect); /* else S is the pixel's for these two */
         if (k->shadow && !shadow) VSTORE(dvisibility + s, dfactor);
         if (k->shadow && shadow) {
             const V dlogit = VMUL(dfactor, VFNMA(factor, factor, factor)), v = VLOAD(visibility + s);

@@ -491,7 +491,7 @@ static void test_network(const char *name, int shadow, int residual, int default
         dother = reals((size_t)(l.widest + 1) * BLOCK);
         dweights = reals(count);
         slot = reals(ssdgs__slot_gradient_size(sizes, layers));
-        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, one, dgauss, drows, shadow ? dnet : dother,
+        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, one, one, dgauss, drows, shadow ? dnet : dother,
                                     shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
         dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, sizes[0], slot);

@@ -60,6 +60,8 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
         if (frame->flux) memcpy(frame->flux, fixed->flux, n * sizeof(ssdgs_real));
         memcpy(frame->visibility, fixed->visibility, n * sizeof(ssdgs_real));
         memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
+        frame->visibility_given = frame->layer_count > 0;
+        if (frame->visibility_given) memcpy(frame->pixel_visibility, fixed->pixel_visibility, pixels * (size_t)s->light_count * sizeof(ssdgs_real));
     }
     for (i = 0; i < COUNT; i++) frame->seen[i] = 1;
     if (ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE)) exit(1);
@@ -124,7 +126,7 @@ static void run(const scene *s) {
     ssdgs_model *model = NULL;
     ssdgs_frame frame, fixed;
     ssdgs_photo photo;
-    ssdgs_real *gradient, *global_gradient, *visibility, *cue, *flux;
+    ssdgs_real *gradient, *global_gradient, *visibility, *pixel_visibility, *cue, *flux;
     double value[9], pose[6], light_gradient[3];
     size_t first[SSDGS__GLOBAL_GROUPS + 1], stride;
     int group, c, i;
@@ -137,16 +139,19 @@ static void run(const scene *s) {
     gradient = (ssdgs_real *)malloc(stride * SSDGS_CHANNELS * sizeof *gradient);
     global_gradient = (ssdgs_real *)malloc(model->global_count * sizeof *gradient);
     visibility = (ssdgs_real *)malloc(COUNT * 2 * sizeof *visibility);
+    pixel_visibility = (ssdgs_real *)malloc(SIDE * SIDE * 2 * sizeof *pixel_visibility);
     cue = (ssdgs_real *)malloc(COUNT * 2 * sizeof *cue);
     flux = (ssdgs_real *)malloc(COUNT * 2 * sizeof *flux);
     memcpy(gradient, frame.gradient, stride * SSDGS_CHANNELS * sizeof *gradient);
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
     memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
+    if (frame.layer_count) memcpy(pixel_visibility, frame.pixel_visibility, SIDE * SIDE * (size_t)s->light_count * sizeof *pixel_visibility);
     if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
     fixed = frame;
     fixed.flux = flux;
     fixed.visibility = visibility;
+    fixed.pixel_visibility = pixel_visibility;
     fixed.depth_cue = cue;
     memset(&photo, 0, sizeof photo);
     photo.camera = camera;
@@ -207,6 +212,7 @@ static void run(const scene *s) {
     free(gradient);
     free(global_gradient);
     free(visibility);
+    free(pixel_visibility);
     free(cue);
     free(flux);
     ssdgs_model_destroy(model);
@@ -514,7 +520,7 @@ int main(void) {
     run(&s);
     s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
     run(&s);
-    s = base, s.name = "geometric ASG", s.settings.asg = SSDGS_ASG_GEOMETRIC;
+    s = base, s.name = "geometric ASG, shadow on scattering", s.settings.asg = SSDGS_ASG_GEOMETRIC, s.settings.shadow_on_scattering = 1;
     run(&s);
     s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;
     s.options.stop = 0.4;

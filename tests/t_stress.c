@@ -60,8 +60,9 @@ static ssdgs_settings full(void) { /* every term, small networks, a map whose si
     return s;
 }
 
-static ssdgs_settings lambert(double bias, int map) { /* Lambert's term and the measured visibility, no networks */
+static ssdgs_settings lambert(ssdgs_asg asg, double bias, int map) { /* Lambert's term and the measured visibility, no networks */
     ssdgs_settings s = full();
+    s.asg = (int)asg;
     s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     s.shadow_layers = 0;
     s.light_bias = (ssdgs_real)bias;
@@ -432,7 +433,7 @@ static void row_07(void) { /* log scales are clamped to +-20 at use, infinite on
 static void row_10(void) { /* a disc: one scale of 0 */
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, 0, 1);
-    ssdgs_model *model = cloud(lambert(0, 64), 200);
+    ssdgs_model *model = cloud(lambert(SSDGS_ASG_DEFERRED, 0, 64), 200);
     int k, i;
     for (k = 0; k < 2; k++) {
         for (i = 0; i < 200; i++) set(model, i, SSDGS_LOG_SCALE + 2, 1, k ? -INFINITE : -20);
@@ -852,8 +853,8 @@ static void row_29(void) { /* views that are no rigid motion: an error; within 1
 /* ---- 4.2 light, shading, scattering ---- */
 
 /* The scene under this light, and turned: the largest difference of the pictures. The second one is in b. */
-static double turned(const ssdgs_light *light, const double q[4], int map) {
-    ssdgs_model *model = cloud(lambert(0.05, map), 300);
+static double turned(ssdgs_asg asg, const ssdgs_light *light, const double q[4], int map) {
+    ssdgs_model *model = cloud(lambert(asg, 0.05, map), 300);
     ssdgs_camera camera = ahead();
     ssdgs_light moved = *light;
     show(model, &camera, &moved, 1, NULL, &a);
@@ -872,16 +873,17 @@ static void random_turn(int i, double q[4]) {
 }
 
 static void row_31(void) { /* a light straight above, below, beside: as the same scene turned, but for the map's pixels */
-    double q[4], d, worst = 0;
-    int i;
-    for (i = 0; i < 6; i++) {
+    double q[4], d, worst = 0, mean = 0;
+    int i, k;
+    for (i = 0; i < 12; i++) {
         const double side = i & 1 ? -3 : 3;
-        const ssdgs_light light = lamp(i / 2 == 0 ? side : 0, i / 2 == 1 ? side : 0, 2 + (i / 2 == 2 ? side : 0), 3);
-        random_turn(i, q);
-        d = turned(&light, q, 256);
-        worst = d > worst ? d : worst;
+        const ssdgs_light light = lamp(i / 2 % 3 == 0 ? side : 0, i / 2 % 3 == 1 ? side : 0, 2 + (i / 2 % 3 == 2 ? side : 0), 3);
+        random_turn(i % 6, q);
+        d = turned(i < 6 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED, &light, q, 256);
+        if (i < 6) worst = d > worst ? d : worst;
+        else for (k = 0, d = 0; k < PIXELS; k++) mean += fabs((double)(a.shadow[k] - b.shadow[k])) / (6 * PIXELS);
     }
-    CHECK(worst < 1e-3);
+    CHECK(worst < 1e-3 && mean < 4e-3); /* pixels' own shadows show those of the map: 1.5e-3 on average */
 }
 
 static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1e-8 from it: finite. The nearer, the brighter, to
@@ -900,7 +902,7 @@ static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1
         if (i == 2) trains(model, &camera, &light);
     }
     ssdgs_model_destroy(model);
-    model = make(lambert(0, 64), 1);
+    model = make(lambert(SSDGS_ASG_GEOMETRIC, 0, 64), 1);
     put(model, 0, 0, 0, 2, -3, 20);
     for (i = 0; i < 24; i++) { /* its normal is +z: 4 -> 4.8e-7 */
         const double d = 4 / pow(2, i);
@@ -931,39 +933,44 @@ static void row_33(void) { /* a light a million extents away is a directional on
 
 static void row_34(void) { /* Gaussians all around the light, in each of 14 directions one, first free, then behind another of
                               opacity 1/2. The middles, edges and corners of the cube's faces are no different */
-    ssdgs_model *model = make(lambert(0, 256), 28);
+    static const ssdgs_asg forms[2] = {SSDGS_ASG_GEOMETRIC, SSDGS_ASG_DEFERRED};
+    ssdgs_model *model;
     ssdgs_camera camera;
     const ssdgs_light light = lamp(centre[0], centre[1], centre[2], 1);
     ssdgs_real eye[3], at[3], up[3];
-    double worst = 0;
-    int i, k, shaded;
-    for (shaded = 0; shaded < 2; shaded++)
-        for (i = 0; i < 14; i++) {
-            double d[3], e[3], norm = 0, s;
-            int j;
-            for (j = 0; j < 14; j++) { /* all of them, then a look at number i */
-                for (k = 0, norm = 0; k < 3; k++)
-                    d[k] = j < 6 ? (j / 2 == k) * (j & 1 ? -1 : 1) : (j >> k & 1 ? -1 : 1), norm += d[k] * d[k];
-                for (k = 0; k < 3; k++) d[k] /= sqrt(norm);
-                put(model, 2 * j, centre[0] + 2 * d[0], centre[1] + 2 * d[1], centre[2] + 2 * d[2], -4, 3);
-                put(model, 2 * j + 1, centre[0] + d[0], centre[1] + d[1], centre[2] + d[2], -2, shaded ? 0 : -20);
-                if (j == i) memcpy(e, d, sizeof e);
+    double worst[2] = {0, 0};
+    int i, k, shaded, form;
+    for (form = 0; form < 2; form++) {
+        model = make(lambert(forms[form], 0, 256), 28);
+        for (shaded = 0; shaded < 2; shaded++)
+            for (i = 0; i < 14; i++) {
+                double d[3], e[3], norm = 0, s;
+                int j;
+                for (j = 0; j < 14; j++) { /* all of them, then a look at number i */
+                    for (k = 0, norm = 0; k < 3; k++)
+                        d[k] = j < 6 ? (j / 2 == k) * (j & 1 ? -1 : 1) : (j >> k & 1 ? -1 : 1), norm += d[k] * d[k];
+                    for (k = 0; k < 3; k++) d[k] /= sqrt(norm);
+                    put(model, 2 * j, centre[0] + 2 * d[0], centre[1] + 2 * d[1], centre[2] + 2 * d[2], -4, 3);
+                    put(model, 2 * j + 1, centre[0] + d[0], centre[1] + d[1], centre[2] + d[2], -2, shaded ? 0 : -20);
+                    if (j == i) memcpy(e, d, sizeof e);
+                }
+                for (k = 0; k < 3; k++) { /* from the side */
+                    at[k] = (ssdgs_real)(centre[k] + 2 * e[k]);
+                    eye[k] = (ssdgs_real)(centre[k] + 2 * e[k] + 0.3 * (e[(k + 1) % 3] - e[(k + 2) % 3]) + (i < 6 ? 0 : 0.2 * e[k]));
+                    up[k] = (ssdgs_real)e[k];
+                }
+                camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, H);
+                show(model, &camera, &light, 1, NULL, &a);
+                CHECK(a.stats.light_views == 6);
+                s = (double)a.shadow[CENTRE] / (double)a.alpha[CENTRE];
+                s = fabs(s - (shaded ? 0.5 : 1));
+                worst[form] = s > worst[form] ? s : worst[form];
+                if (!shaded) CHECK(s < 1e-6);
             }
-            for (k = 0; k < 3; k++) { /* from the side */
-                at[k] = (ssdgs_real)(centre[k] + 2 * e[k]);
-                eye[k] = (ssdgs_real)(centre[k] + 2 * e[k] + 0.3 * (e[(k + 1) % 3] - e[(k + 2) % 3]) + (i < 6 ? 0 : 0.2 * e[k]));
-                up[k] = (ssdgs_real)e[k];
-            }
-            camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, H);
-            show(model, &camera, &light, 1, NULL, &a);
-            CHECK(a.stats.light_views == 6);
-            s = (double)a.shadow[CENTRE] / (double)a.alpha[CENTRE];
-            s = fabs(s - (shaded ? 0.5 : 1));
-            worst = s > worst ? s : worst;
-            if (!shaded) CHECK(s < 1e-6);
-        }
-    CHECK(worst < 0.03); /* footprints are averages, and at a cube's corner the affine projection is 4% off */
-    ssdgs_model_destroy(model);
+        ssdgs_model_destroy(model);
+    }
+    CHECK(worst[0] < 0.03); /* footprints are averages, and at a cube's corner the affine projection is 4% off */
+    CHECK(worst[1] < 0.06); /* half of it looked up, between the distances of two levels */
 }
 
 static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative ones and those that are not finite are refused */
@@ -1096,21 +1103,23 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
 
 static void row_46(void) { /* the shadow's error falls with the map's resolution; a floor blurs less than an added variance */
     enum { FINEST = 5 };
+    static const double tolerance[4] = {5e-5, 5e-4, 1e-2, 1e-3};
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(2, -2, 0, 1);
     static picture finest;
     ssdgs_render_options coarse = ssdgs_render_options_default();
     double error[2][FINEST];
-    int blur, step, sub, i;
+    int blur, step, sub, asg, i;
     coarse.light_detail = (ssdgs_real)0.01;
-    for (sub = 0; sub < 2; sub++) {
+    for (sub = 0; sub < 4; sub++) {
+        asg = sub < 2 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
         for (blur = SSDGS_BLUR_FLOOR; blur >= SSDGS_BLUR_ADD; blur--)
             for (step = FINEST; step >= -1; step--) { /* 512 .. 16, then 1, which is rounded up to 16 */
-                ssdgs_settings settings = lambert(0, step < 0 ? 1 : 16 << step);
+                ssdgs_settings settings = lambert((ssdgs_asg)asg, 0, step < 0 ? 1 : 16 << step);
                 ssdgs_model *model;
                 settings.light_blur = blur;
                 model = cloud(settings, 300);
-                for (i = 0; sub && i < 300; i++) set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
+                for (i = 0; sub % 2 && i < 300; i++) set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
                 show(model, &camera, &light, 1, NULL, step == FINEST && blur ? &finest : &a);
                 if (step < 0) { /* a hundredth of it too */
                     show(model, &camera, &light, 1, &coarse, &a);
@@ -1124,8 +1133,8 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
                     error[blur][step] += fabs((double)(a.shadow[i] - finest.shadow[i])) / PIXELS;
                 b = a;
             }
-        for (blur = 0; blur < 2 - sub; blur++) CHECK(error[blur][4] < error[blur][2] && error[blur][2] < error[blur][0]);
-        CHECK(error[SSDGS_BLUR_FLOOR][3] < (sub ? 5e-4 : 5e-5)); /* at 128^2, measured 1.8e-4 and 1.8e-5 */
+        for (blur = 0; blur < 2 - sub % 2; blur++) CHECK(error[blur][4] < error[blur][2] && error[blur][2] < error[blur][0]);
+        CHECK(error[SSDGS_BLUR_FLOOR][3] < tolerance[sub]); /* at 128^2, measured 1.8e-5, 1.8e-4; pixels' own 3.2e-3, 3.4e-4 */
         for (step = 1; step < FINEST; step++) CHECK(error[SSDGS_BLUR_FLOOR][step] < error[SSDGS_BLUR_ADD][step]);
     }
 }
@@ -1138,7 +1147,7 @@ static void row_47(void) { /* the cube of maps about a light in the scene: ten r
     int i, k;
     for (i = 0; i < 10; i++) {
         random_turn(100 + i, q);
-        turned(&light, q, 64);
+        turned(i % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, &light, q, 64);
         CHECK(a.stats.light_views == 6 && b.stats.light_views == 6);
         for (k = 0, d = 0; k < PIXELS; k++) d += fabs((double)(a.shadow[k] - b.shadow[k])) / PIXELS;
         spread = d > spread ? d : spread;
@@ -1151,7 +1160,7 @@ static void row_48(void) { /* the bias: 0 shadows all that is behind, a huge one
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, -2, 1);
     static const double biases[4] = {0, 0.8, 1.2, 1e30}; /* in units of 1/2: the Gaussians are 1/2 apart */
-    ssdgs_settings settings = lambert(-0.001, 64);
+    ssdgs_settings settings = lambert(SSDGS_ASG_GEOMETRIC, -0.001, 64);
     ssdgs_model *model = NULL;
     int i;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
@@ -1159,14 +1168,16 @@ static void row_48(void) { /* the bias: 0 shadows all that is behind, a huge one
     settings.light_bias = (ssdgs_real)NOT_A_NUMBER;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
     CHECK(strstr(ssdgs_error_message(context), "light_bias = NaN"));
-    for (i = 0; i < 4; i++) {
+    for (i = 0; i < 8; i++) {
         double want;
-        model = make(lambert(biases[i], 256), 2);
+        model = make(lambert(i % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, biases[i / 2], 256), 2);
         put(model, 0, 0, 0, 2, -1, 0); /* alpha 1/2 wide, in front of a small one */
         put(model, 1, 0, 0, 2.5, -4, 5);
+        set(model, 0, SSDGS_ASG_WEIGHT + 3, 1, 40); /* S is the Gaussians' */
+        set(model, 1, SSDGS_ASG_WEIGHT + 3, 1, 40);
         show(model, &camera, &light, 1, NULL, &a);
                 /* the front one's weight, and the other's 1/2 opacity(5) of light 1/2 or 1 */
-        want = (double)a.alpha[CENTRE] - (i < 2 ? 0.5 * ((double)a.alpha[CENTRE] - 0.5) : 0);
+        want = (double)a.alpha[CENTRE] - (i < 4 ? 0.5 * ((double)a.alpha[CENTRE] - 0.5) : 0);
         CHECK(fabs((double)a.shadow[CENTRE] - want) < 2e-3);
         ssdgs_model_destroy(model);
     }
@@ -1190,7 +1201,8 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
         show(model, &camera, &light, 1, &options, &a);
         options.terms = SSDGS_ALL_TERMS & ~terms[t];
         show(model, &camera, &light, 1, &options, &b);
-        CHECK(distance(a.color, b.color, 3 * PIXELS) < 1e-36 && peak(&a) > 0.01 && a.stats.blackened == 0);
+        CHECK(distance(a.color, b.color, 3 * PIXELS) < (t == 2 ? 1e-6 * peak(&a) : 1e-36)); /* a mean of ones is 1 but for rounding */
+        CHECK(peak(&a) > 0.01 && a.stats.blackened == 0);
         if (t == 1) CHECK(a.stats.network_work > 0 && b.stats.network_work <= 0);
         if (t == 2) CHECK(a.stats.light_views == 1 && b.stats.light_views == 0);
         ssdgs_model_destroy(model);
