@@ -3808,8 +3808,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 
 /* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at their depth. Where
    no map knows it, that of their Gaussians. */
-static void ssdgs__look(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
-                        const ssdgs_real *layers, ssdgs_real *sight) {
+static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
+                                    const ssdgs_real *layers, ssdgs_real *sight) {
     const ssdgs_real bias = frame->settings.light_bias * frame->settings.length_unit;
     int i, c, view;
     for (i = 0; i < 256; i++) {
@@ -3853,7 +3853,7 @@ static void ssdgs__composite_task(void *data, int index) {
             for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
             if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
             if (frame->visibility_given) ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, sight);
-            else ssdgs__look(frame, job->lightings + light, light, &tile, pixels, sight);
+            else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, sight);
         } else memset(sight, 0, sizeof sight);
         for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
             ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
