@@ -538,17 +538,19 @@ static void row_60(void) {
 /* Many steps: memory settles, parameters stay bounded. */
 static void row_61(void) {
     ssdgs_train_options o = short_run(full ? 100000 : 2000 / SLOW);
+    ssdgs_settings settings = ssdgs_settings_default();
     meter m;
     training t;
     size_t live, calls;
     int i;
     memset(&m, 0, sizeof m);
     make_photos(16);
+    settings.light_map_size = 64; /* else it grows as Gaussians shrink */
     o.initial_points = o.max_gaussians = 50;
     o.densify_every = 100;
     o.opacity_reset_every = 700;
     o.densify_until = 60000;
-    t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, NULL, &o, PHOTOS);
+    t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
     steps(&t, o.iterations / 4);
     live = m.live;
     for (i = 1; i < 4; i++) {
