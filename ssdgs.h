@@ -5868,7 +5868,7 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->n = n;
     r->group = group;
     r->bad = 0;
-    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* so rate x gradient is finite where the square of the gradient is */
+    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
     r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
     r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
     r->first_chunk = job->chunks;
@@ -8949,10 +8949,10 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
 
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
    Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that flushes subnormals
-   finds the same. */
+   finds the same. Those beyond 1e18 count as that: no square and no product with a rate overflows. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
     V g = VLOAD(gradient), m, v;
-    g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), g);
+    g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
     m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
     v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
     m = VSEL(VLT(VABS(m), VSET(1e-30)), VSET(0), m);

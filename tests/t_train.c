@@ -645,9 +645,9 @@ static void test_adam(void) {
         memset(&frame, 0, sizeof frame);
         frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
         frame.global_gradient = frame.gradient + planes;
-        for (i = 0; i < values; i++) { /* of all sizes: those below 1e-18 count as 0 */
+        for (i = 0; i < values; i++) { /* of all sizes: those below 1e-18 count as 0, those beyond 1e18 as that */
             const double u = ssdgs__uniform((uint64_t)step, i);
-            gradient[step][i] = (ssdgs_real)((u < 0.4 ? u - 0.9 : u + 0.1) * (i % 16 < 15 ? pow(10, -(double)(i % 16)) : 8e-19));
+            gradient[step][i] = (ssdgs_real)((u < 0.4 ? u - 0.9 : u + 0.1) * (i % 16 < 14 ? pow(10, -(double)(i % 16)) : i % 16 < 15 ? 1e30 : 8e-19));
         }
         for (g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
         terms[step] = step & 1 ? ALL : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
@@ -660,7 +660,7 @@ static void test_adam(void) {
         for (g = 0; g < SSDGS__PLANE_GROUPS && i / stride >= (size_t)ssdgs__group_plane[g + 1];) g++;
         while (i >= planes && i - planes >= first[g - SSDGS__PLANE_GROUPS + 1]) g++;
         for (step = 0; step < STEPS; step++) {
-            const double slope = fabs((double)gradient[step][i]) < 1e-18 ? 0 : (double)gradient[step][i];
+            const double raw = (double)gradient[step][i], slope = fabs(raw) < 1e-18 ? 0 : fmin(fmax(raw, -1e18), 1e18);
             const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0 ? 0 : past > 1 ? 1 : past;
             const ssdgs_rate rate = rates[learning[g].rate];
             if ((g + step) % 3 == 0 || !(learning[g].terms & terms[step])) continue;
