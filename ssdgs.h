@@ -733,7 +733,6 @@ typedef struct ssdgs_frame {
     const ssdgs_light *lights;
     int light_count;
     int terms;                  /* to render, after settings and options */
-    int components;             /* 1: per-Gaussian components are wanted */
     int training;               /* 1: network activations are kept for the backward */
     int frozen[2];              /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
@@ -2281,7 +2280,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->light_count = model->settings.baked ? 0 : light_count;
     if (model->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     frame->terms = model->settings.terms & frame->options.terms;
-    frame->components = components;
     frame->training = training;
     for (i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] *
@@ -2641,6 +2639,11 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
+/* Depth or distance of the nearest Gaussian of a view. */
+static SSDGS__INLINE ssdgs_real ssdgs__nearest(const ssdgs_splat_view *view) {
+    return view->visible ? view->depth[view->order[0]] : 0;
+}
+
 /* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ====
    Tiles of all views in one loop: the camera's walk and the light pass run side by side. */
 
@@ -2660,7 +2663,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.stop = frame->options.stop;
     t.max_error = frame->options.max_error;
     t.bias = frame->settings.light_bias * frame->settings.length_unit;
-    t.depth_origin = v->visible ? v->depth[v->order[0]] : 0;
+    t.depth_origin = ssdgs__nearest(v);
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
@@ -3597,12 +3600,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live, dlobe + 3 * c * SSDGS__BLOCK);
         ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
         memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK, SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
-        memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe);
-        for (light = 0; light < frame->light_count; light++) {
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__LIGHT_LAYER + 1 + SSDGS__PER_LIGHT * light), at, live, rows);
-            for (s = 0; s < SSDGS__BLOCK; s++) dlobe[10 * SSDGS__BLOCK + s] += rows[2 * SSDGS__BLOCK + s];
-        }
-        k->lobe_backward(gauss, dlobe, dgauss);
+        memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
@@ -3617,6 +3615,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
+            for (s = 0; s < SSDGS__BLOCK; s++) dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
                            lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor, dgauss, drows,
@@ -3640,6 +3639,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
+    if (frame->layer_count) k->lobe_backward(gauss, dlobe, dgauss);
     for (c = 0; c < SSDGS_CHANNELS; c++)
         for (s = 0; s < live; s++)
             frame->gradient[(size_t)c * frame->gaussians.stride + at[s]] = dgauss[c * SSDGS__BLOCK + s];
@@ -3796,7 +3796,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
     distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-5 * distance + (map->visible ? map->depth[map->order[0]] : 0); /* no shadow by rounding */
+    distance -= bias + (ssdgs_real)1e-5 * distance + ssdgs__nearest(map); /* no shadow by rounding */
     x = u < wide ? (int)u : map->width - 2;
     y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
@@ -8277,7 +8277,8 @@ typedef struct F(glint) {
 } F(glint);
 
 SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pixel[2], const R *layers) {
-    const R *q = layers + SSDGS__TILE_LAYER, *more = layers + 3 * SSDGS__TILE_LAYER, *normal = layers + 4 * SSDGS__TILE_LAYER;
+    const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
+        *normal = more + SSDGS__TILE_LAYER;
     V at[3], d2;
     int i, j;
     g->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(more + 32), VSET(SSDGS__THIN)));
@@ -8336,40 +8337,45 @@ SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
     return sum;
 }
 
+/* Eq. 8: S of a visibility and the shadow network's answer. */
+SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, V visibility, V answer) {
+    const V v = VMAX(VSET(0.01), VMIN(VSET(0.99), visibility));
+    if (!k->shadow) return VSET(1);
+    if (!k->refined_shadow) return visibility;
+    return F(sigmoid)(k->residual_shadow ? VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), answer) : answer);
+}
+
+/* dL/dS becomes the visibility's; returns the answer's. */
+SSDGS__FI V F(shadow_factor_backward)(const ssdgs__lighting *k, V visibility, V factor, V *d) {
+    const V danswer = VMUL(*d, VFNMA(factor, factor, factor)); /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
+    const VM inside = VAND(VLT(VSET(0.01), visibility), VLT(visibility, VSET(0.99)));
+    if (k->shadow && !k->refined_shadow) return VSET(0);
+    *d = VSET(0);
+    if (!k->shadow) return VSET(0);
+    if (k->residual_shadow) *d = VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0));
+    return danswer;
+}
+
 /* What arrives at pixels: eq. 8 with a visibility between the map's and the Gaussians', as soft as these are. */
 typedef struct F(arrival) { V inverse_cover, residual, gauss, soft, map, visibility, factor; } F(arrival);
 
 SSDGS__FI void F(arrival_lanes)(F(arrival) *a, const ssdgs__lighting *k, const R *layers, V map) {
     const R *more = layers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
-    V logit;
     a->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), VSET(SSDGS__THIN)));
     a->residual = VMUL(VLOAD(more), a->inverse_cover);
     a->gauss = VMUL(VLOAD(more + 16), a->inverse_cover);
     a->soft = VMUL(VLOAD(more + 32), a->inverse_cover);
     a->map = map;
-    a->visibility = a->factor = VFMA(a->soft, VSUB(a->gauss, map), map);
-    logit = a->residual;
-    if (k->refined_shadow && k->residual_shadow) {
-        const V v = VMAX(VSET(0.01), VMIN(VSET(0.99), a->visibility));
-        logit = VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), logit);
-    }
-    if (k->refined_shadow) a->factor = F(sigmoid)(logit);
-    if (!k->shadow) a->factor = VSET(1);
+    a->visibility = VFMA(a->soft, VSUB(a->gauss, map), map);
+    a->factor = F(shadow_factor)(k, a->visibility, a->residual);
 }
 
 /* Writes the gradient of the layer with the residual, returns what goes to the cover, times that. */
 SSDGS__FI V F(arrival_backward)(const F(arrival) *a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
-    V dresidual = VSET(0), dvisibility, dgauss, dsoft;
-    if (!k->shadow) dfactor = VSET(0);
-    dvisibility = dfactor;
-    if (k->refined_shadow) dresidual = VMUL(dfactor, VFNMA(a->factor, a->factor, a->factor));
-    if (k->refined_shadow && k->residual_shadow) {
-        const V inside = VMUL(VSUB(a->visibility, VSET(0.01)), VSUB(VSET(0.99), a->visibility));
-        dvisibility = VSEL(VLT(VSET(0), inside), VDIV(dresidual, VFNMA(a->visibility, a->visibility, a->visibility)), VSET(0));
-    } else if (k->refined_shadow) dvisibility = VSET(0);
-    dgauss = VMUL(dvisibility, a->soft);
-    dsoft = VMUL(dvisibility, VSUB(a->gauss, a->map));
+    V dvisibility = dfactor;
+    const V dresidual = F(shadow_factor_backward)(k, a->visibility, a->factor, &dvisibility);
+    const V dgauss = VMUL(dvisibility, a->soft), dsoft = VMUL(dvisibility, VSUB(a->gauss, a->map));
     VSTORE(dmore, VMUL(dresidual, a->inverse_cover));
     VSTORE(dmore + 16, VMUL(dgauss, a->inverse_cover));
     VSTORE(dmore + 32, VMUL(dsoft, a->inverse_cover));
@@ -8401,7 +8407,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
     }
 }
 
-/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes layer 5; adds to sums (SSDGS__HIGHLIGHT_SUMS). */
+/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7; adds to sums (SSDGS__HIGHLIGHT_SUMS). */
 SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers, const R *sight,
                                      R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
@@ -8645,17 +8651,6 @@ SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r,
 
 /* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light ==== */
 
-/* The shadow factor from the network's output row. */
-SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, const R *visibility, const R *network, int s) {
-    V v;
-    if (!k->shadow) return VSET(1);
-    v = VLOAD(visibility + s);
-    if (!network) return v;
-    if (!k->residual_shadow) return F(sigmoid)(VLOAD(network + s));
-    v = VMAX(VSET(0.01), VMIN(VSET(0.99), v));
-    return F(sigmoid)(VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), VLOAD(network + s)));
-}
-
 /* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
 SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
     const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1,
@@ -8671,7 +8666,7 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
     int s, c;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-            factor = F(shadow_factor)(k, visibility, shadow, s);
+            factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
         V profile = VSET(0), unit[3];
         R *o = out + s;
         for (c = 0; c < 3; c++) {
@@ -8710,7 +8705,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
     int s, c, i;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-            factor = F(shadow_factor)(k, visibility, shadow, s);
+            factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
         const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s), gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
         const V direct = k->deferred ? VSET(1) : factor;
         V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0), profile = VSET(0),
@@ -8770,16 +8765,9 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                    VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
         }
         if (!k->deferred) dfactor = VADD(dfactor, ddirect); /* else S is the pixel's for these two */
-        if (k->shadow && !shadow) VSTORE(dvisibility + s, dfactor);
-        if (k->shadow && shadow) {
-            const V dlogit = VMUL(dfactor, VFNMA(factor, factor, factor)), v = VLOAD(visibility + s);
-            VSTORE(dshadow + s, dlogit);
-            if (k->residual_shadow) { /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
-                const VM inside = VAND(VLT(VSET(0.01), v), VLT(v, VSET(0.99)));
-                VSTORE(dvisibility + s, VSEL(inside, VDIV(dlogit, VMAX(VFNMA(v, v, v), VSET(1e-3))), VSET(0)));
-            } else {
-                VSTORE(dvisibility + s, VSET(0));
-            }
+        if (k->shadow) {
+            VSTORE(dshadow + s, F(shadow_factor_backward)(k, VLOAD(visibility + s), factor, &dfactor));
+            VSTORE(dvisibility + s, dfactor);
         }
         VSTORE(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, dirradiance);
         VSTORE(drows + SSDGS__COSINE * SSDGS__BLOCK + s, dcosine);

@@ -452,6 +452,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     k.dipole = SSDGS_DIPOLE_JENSEN;
     k.scattering = !shadow;
     k.shadow = k.diffuse = shadow;
+    k.refined_shadow = shadow;
     k.residual_shadow = residual;
     k.per_channel_optics = settings.per_channel_optics;
     {
