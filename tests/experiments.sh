@@ -1,7 +1,8 @@
 #!/bin/sh
 # The paper's experiments with this library, and others: sh tests/experiments.sh BUILD DATA ITERATIONS SCENE:BACKGROUND...
 # Writes BUILD/experiments/EXPERIMENTS.md, with the findings of tests/EXPERIMENTS.md after the tables. A run that is there already
-# is not repeated: delete its log to have it again.
+# is not repeated: delete its log to have it again. Runs go side by side, one thread and one core each: LIST=1 makes this script name
+# its runs on descriptor 3, and RUN=1 do one of them: BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
 set -eu
 build=$1 data=$2 iterations=$3
 shift 3
@@ -11,15 +12,17 @@ mkdir -p "$out"
 # run SCENE:BACKGROUND NAME OPTION...: trains and tests; leaves the path of its log in $log.
 run() {
     scene=${1%%:*} background=${1##*:} name=$2
+    [ -z "${LIST-}" ] || { echo "$*" >&3; log=/dev/null; return; }
     shift 2
     log=$out/$scene.$iterations.$name.log
     if ! grep -q '^training:' "$log" 2>/dev/null; then
         echo "$scene: $name $*" >&2
-        "$build/train" "$data/$scene" -o "$out/$scene.$name.ply" --background "$background" --iterations "$iterations" "$@" \
-            >"$log.part" 2>"$out/last.err" || { cat "$out/last.err" >&2; exit 1; }
+        "$build/train" "$data/$scene" -o "$out/$scene.$name.ply" --background "$background" --iterations "$iterations" --threads 1 \
+            "$@" >"$log.part" 2>"$log.err" || { cat "$log.err" >&2; exit 1; }
         mv "$log.part" "$log"
     fi
 }
+if [ -n "${RUN-}" ]; then run "$@"; exit; fi
 
 # PSNR and SSIM of the log's line that begins with $1.
 psnr() { sed -n "s/^$1: PSNR \([0-9.]*\) .*/\1/p" "$log"; }
@@ -55,9 +58,9 @@ details() {
     printf '| --- | --- | --- | --- | --- | --- | --- | --- |\n'
     for s in $scenes; do
         run "$s" "$name" "$@"
-        sed -n -e 's/.*: \([0-9]*\) Gaussians, trained in \([0-9:]*\), peak memory \([0-9]* MiB\).*/\1 | \2 | \3/p' "$log" >"$log.cost"
+        cost=$(sed -n 's/.*: \([0-9]*\) Gaussians, trained in \([0-9:]*\), peak memory \([0-9]* MiB\).*/\1 | \2 | \3/p' "$log")
         echo "| ${s%%:*} | $(psnr test) | $(ssim test) | $(sed -n 's/^test: .* FLIP \([0-9.]*\) .*/\1/p' "$log") |" \
-            "$(psnr training) | $(cat "$log.cost") |"
+            "$(psnr training) | $cost |"
     done
 }
 
@@ -66,16 +69,23 @@ details() {
 sheet() {
     for s in $scenes; do
         scene=${s%%:*}
-        [ "$out/$scene.$2.png" -nt "$out/$scene.$2.ply" ] || "$build/relight" "$out/$scene.$2.ply" "$data/$scene" \
+        [ "$out/$scene.$2.png" -nt "$out/$scene.$2.ply" ] || look relight "$out/$scene.$2.ply" "$data/$scene" \
             --background "${s##*:}" --out "$out/frames" --sheet "$out/$scene.$2.png" >&2
     done
     image "$1" "$2"
 }
 
+# look PROGRAM OPTION...: at runs that are done
+look() {
+    program=$1
+    shift
+    [ -n "${LIST-}" ] || "$build/$program" "$@"
+}
+
 # image LABEL NAME: puts BUILD/experiments/SCENE.NAME.png of the first scene into the text.
 image() {
     mkdir -p "$out/images"
-    cp "$out/${scenes%%:*}.$2.png" "$out/images"
+    [ -n "${LIST-}" ] || cp "$out/${scenes%%:*}.$2.png" "$out/images"
     printf '\n%s:\n\n![%s](images/%s)\n' "$1" "$1" "${scenes%%:*}.$2.png"
 }
 
@@ -86,17 +96,24 @@ show() {
     for s in $scenes; do
         models=
         for m in "$@"; do models="$models $out/${s%%:*}.$m.ply"; done
-        "$build/show" "$kind" "$out/${s%%:*}.$name.png" "$data/${s%%:*}" "${s##*:}" $models >&2
+        look show "$kind" "$out/${s%%:*}.$name.png" "$data/${s%%:*}" "${s##*:}" $models >&2
     done
 }
 
+text=$out/EXPERIMENTS.md.part
+if [ -n "${LIST-}" ]; then
+    text=/dev/null
+else
+    LIST=1 sh "$0" "$build" "$data" "$iterations" "$@" 3>&1 >/dev/null | sort -u |
+        RUN=1 xargs -P "$(getconf _NPROCESSORS_ONLN)" -L 1 sh "$0" "$build" "$data" "$iterations"
+fi
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
 {
     cat <<TEXT
 # Experiments
 
-Made by \`make experiments\`: $iterations iterations for every run, the schedule scaled to them, on ${cpu:-an unknown CPU} with
-$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo '?') threads. Figures are PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the
+Made by \`make experiments\`: $iterations iterations for every run, the schedule scaled to them, on one thread of
+${cpu:-an unknown CPU} each, as many side by side as there are cores. Figures are PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the
 training photographs, after them the time of the training. The paper's figures are means over its 8 scenes with 60,000 to 100,000
 iterations: compare differences, not values. Runs with other seeds differ by 0.1 to 0.3 dB.
 TEXT
@@ -141,10 +158,10 @@ TEXT
     for s in $scenes; do
         scene=${s%%:*}
         [ -f "$data/$scene/transforms_train_disturbed.json" ] || continue
-        log=$out/$scene.$iterations.refined.log
+        run "$s" refined --train-json transforms_train_disturbed.json --refine
         echo "| $scene | $(psnr 'test (each.*)') |" \
-            "$("$build/show" poses "$data/$scene/transforms_train.json" "$data/$scene/transforms_train_disturbed.json") |" \
-            "$("$build/show" poses "$data/$scene/transforms_train.json" "$out/$scene.refined.ply.refined.json") |"
+            "$(look show poses "$data/$scene/transforms_train.json" "$data/$scene/transforms_train_disturbed.json") |" \
+            "$(look show poses "$data/$scene/transforms_train.json" "$out/$scene.refined.ply.refined.json") |"
     done
 
     printf '\n## Shadows, lights, views\n'
@@ -154,11 +171,11 @@ TEXT
     image 'One view under six lights, six views under one light, none of them in training (as Figure 10)' sweeps
     for s in $scenes; do
         scene=${s%%:*} frames=
-        "$build/relight" "$out/$scene.default.ply" "$data/$scene" --trajectory --background "${s##*:}" --out "$out/$scene.trajectory" >&2
+        look relight "$out/$scene.default.ply" "$data/$scene" --trajectory --background "${s##*:}" --out "$out/$scene.trajectory" >&2
         for i in 0000 0030 0060 0090 0120 0165 0195 0225 0255 0285 0315 0345 0375 0405 0435 0465; do
             frames="$frames $out/$scene.trajectory/$i.png"
         done
-        "$build/show" strip "$out/$scene.trajectory.png" 8 $frames
+        look show strip "$out/$scene.trajectory.png" 8 $frames >&2
     done
     image 'The path of Appendix D: the light goes round, the camera to the back, the light round again, the camera returns' trajectory
 
@@ -187,6 +204,7 @@ TEXT
     row 'scattering network 128 wide' '' wide --set scattering_width=128
     printf '\n'
     sed -n '/^## Findings/,$p' tests/EXPERIMENTS.md
-} >"$out/EXPERIMENTS.md.part"
-mv "$out/EXPERIMENTS.md.part" "$out/EXPERIMENTS.md"
+} >"$text"
+[ -z "${LIST-}" ] || exit 0
+mv "$text" "$out/EXPERIMENTS.md"
 echo "$out/EXPERIMENTS.md"
