@@ -34,7 +34,7 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts (BENCH=--quick: a minute)
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
 
-experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours) into tests/EXPERIMENTS.md
+experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours; PARTS="components ..." alone) into tests/EXPERIMENTS.md
 	sh tests/experiments.sh $(BUILD) "$(DATA)" $(ITERATIONS) $(SCENES)
 	mkdir -p tests/images
 	cp $(BUILD)/experiments/EXPERIMENTS.md tests

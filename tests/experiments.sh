@@ -1,8 +1,9 @@
 #!/bin/sh
 # The paper's experiments with this library, and others: sh tests/experiments.sh BUILD DATA ITERATIONS SCENE:BACKGROUND...
-# Writes BUILD/experiments/EXPERIMENTS.md, with the findings of tests/EXPERIMENTS.md after the tables. A run that is there already
-# is not repeated: delete its log to have it again. Runs go side by side, one thread and one core each: LIST=1 makes this script name
-# its runs on descriptor 3, and RUN=1 do one of them: BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
+# Writes BUILD/experiments/EXPERIMENTS.md, with the findings of tests/EXPERIMENTS.md after the tables. PARTS="FUNCTION..." makes those
+# sections alone and keeps the others. A run that is there already is not repeated: delete its log to have it again. Runs go side by
+# side, one thread and one core each: LIST=1 makes this script name its runs on descriptor 3, and RUN=1 do one of them:
+# BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
 set -eu
 build=$1 data=$2 iterations=$3
 shift 3
@@ -28,9 +29,9 @@ if [ -n "${RUN-}" ]; then run "$@"; exit; fi
 psnr() { sed -n "s/^$1: PSNR \([0-9.]*\) .*/\1/p" "$log"; }
 ssim() { sed -n "s/^$1: PSNR .* SSIM \([0-9.]*\) .*/\1/p" "$log"; }
 
-# head_line TITLE FIRST_COLUMN PAPER_COLUMN
+# head_line FIRST_COLUMN PAPER_COLUMN
 head_line() {
-    printf '\n## %s\n\n| %s | %s |' "$1" "$2" "$3"
+    printf '\n| %s | %s |' "$1" "$2"
     for s in $scenes; do printf ' %s |' "${s%%:*}"; done
     printf ' options |\n| --- | --- |'
     for s in $scenes; do printf ' --- |'; done
@@ -100,37 +101,24 @@ show() {
     done
 }
 
-text=$out/EXPERIMENTS.md.part
-if [ -n "${LIST-}" ]; then
-    text=/dev/null
-else
-    LIST=1 sh "$0" "$build" "$data" "$iterations" "$@" 3>&1 >/dev/null | sort -u |
-        RUN=1 xargs -P "$(getconf _NPROCESSORS_ONLN)" -L 1 sh "$0" "$build" "$data" "$iterations"
-fi
-cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
-{
-    cat <<TEXT
-# Experiments
-
-Made by \`make experiments\`: $iterations iterations for every run, the schedule scaled to them, on one thread of
-${cpu:-an unknown CPU} each, as many side by side as there are cores. Figures are PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the
-training photographs, after them the time of the training. The paper's figures are means over its 8 scenes with 60,000 to 100,000
-iterations: compare differences, not values. Runs with other seeds differ by 0.1 to 0.3 dB.
-TEXT
-    printf '\n## Default configuration\n'
+default_configuration() {
     details default
     printf '\nPublished configuration (`--preset published`)\n'
     details published --preset published
+}
 
-    head_line 'Reflectance components (Tables 2 and 4)' 'terms' paper
+components() {
+    head_line 'terms' paper
     row 'A: diffuse' '20.07 (20.92)' a --terms diffuse
     row 'B: diffuse, specular' '20.17 (21.17)' b --terms diffuse,specular
     row 'C: diffuse, specular, scattering: no shadow' '22.88 (23.82)' c --terms diffuse,specular,scattering
     row 'D: all' '33.29 (34.69)' default
     row 'E: all but specular' '31.64 (32.06)' e --terms diffuse,shadow,scattering
     row 'F: all but scattering' '32.10 (32.60)' f --terms diffuse,specular,shadow
+}
 
-    head_line 'Training schedules (Tables 2 and 4)' 'order' paper
+schedules() {
+    head_line 'order' paper
     row 'H: all from the start' '31.72 (32.17)' joint --schedule joint
     row 'I: diffuse, shadow, scattering, specular' '33.29 (34.69)' progressive --schedule progressive
     row 'J: last two swapped' '32.08 (32.71)' swapped --schedule swapped
@@ -141,15 +129,19 @@ TEXT
     sheet 'I, diffuse, shadow, scattering, specular' progressive
     sheet 'J, last two swapped' swapped
     sheet 'K, all after diffuse' default
+}
 
-    head_line 'Shadow also on scattering (eq. 14, Table 5)' 'shadow on' 'paper (9 scenes)'
+shadow_on_scattering() {
+    head_line 'shadow on' 'paper (9 scenes)'
     row 'diffuse and specular' '33.00 (34.37)' default
     row 'all terms' '32.13 (33.14)' shadow_on_scattering --set shadow_on_scattering=1
     sheet 'Shadow on all terms (above, under K, on diffuse and specular)' shadow_on_scattering
     show backlit backlit default shadow_on_scattering
     image 'A photograph lit from behind, shadow on diffuse and specular, on all terms (as Figure 13)' backlit
+}
 
-    head_line 'Disturbed cameras and lights' 'training' 'paper (SSS-GS scenes, its own noise)'
+refinement() {
+    head_line 'training' 'paper (SSS-GS scenes, its own noise)'
     row 'true poses and lights' '' default
     row 'disturbed' '37.44' disturbed --train-json transforms_train_disturbed.json
     row 'disturbed, refined' '38.35' refined --train-json transforms_train_disturbed.json --refine
@@ -163,8 +155,9 @@ TEXT
             "$(look show poses "$data/$scene/transforms_train.json" "$data/$scene/transforms_train_disturbed.json") |" \
             "$(look show poses "$data/$scene/transforms_train.json" "$out/$scene.refined.ply.refined.json") |"
     done
+}
 
-    printf '\n## Shadows, lights, views\n'
+sweeps() {
     show pipeline pipeline default
     image 'What the light leaves behind the object, coarse visibility, refined shadow, rendering (as Figure 3)' pipeline
     show sweeps sweeps default
@@ -178,14 +171,18 @@ TEXT
         look show strip "$out/$scene.trajectory.png" 8 $frames >&2
     done
     image 'The path of Appendix D: the light goes round, the camera to the back, the light round again, the camera returns' trajectory
+}
 
-    head_line 'Dipole forms and profiles' 'form' paper
+dipoles() {
+    head_line 'form' paper
     row 'Jensen et al. 2001' '' default
     row 'eq. 5 as printed' '' printed --set dipole=1
     row 'as released' '' released --set dipole=2
     row "Burley's profile" '' burley --set dipole=3
+}
 
-    head_line 'The default configuration, one change at a time' 'change' paper
+changes() {
+    head_line 'change' paper
     row none '' default
     row 'stored values instead of linear light' '' stored --transfer none
     row 'a specular term per Gaussian' '' geometric --set asg=0
@@ -202,7 +199,45 @@ TEXT
     row 'none halved for its shadow' '' no_halving --set densify_shadow=0
     row 'scattering network 32 wide' '' narrow --set scattering_width=32
     row 'scattering network 128 wide' '' wide --set scattering_width=128
-    printf '\n'
+}
+
+# part FUNCTION TITLE: a section; where PARTS does not name it, the one that tests/EXPERIMENTS.md has.
+part() {
+    case " ${PARTS-$1} " in
+        *" $1 "*)
+            printf '\n## %s\n\nCommit %s, %s iterations, %s.\n' "$2" "$(git rev-parse --short HEAD 2>/dev/null || echo unknown)" \
+                "$iterations" "${cpu:-unknown CPU}"
+            "$1" ;;
+        *) echo; TITLE="## $2" awk '/^## / { inside = $0 == ENVIRON["TITLE"] } inside' tests/EXPERIMENTS.md | sed '$ { /^$/d; }' ;;
+    esac
+}
+
+text=$out/EXPERIMENTS.md.part
+if [ -n "${LIST-}" ]; then
+    text=/dev/null
+else
+    LIST=1 sh "$0" "$build" "$data" "$iterations" "$@" 3>&1 >/dev/null | sort -u |
+        RUN=1 xargs -P "$(getconf _NPROCESSORS_ONLN)" -r -L 1 sh "$0" "$build" "$data" "$iterations"
+fi
+cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
+{
+    cat <<TEXT
+# Experiments
+
+Made by \`make experiments\`: runs go side by side, one thread and one core each, the schedule scaled to the iterations. Figures are
+PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the training photographs, after them the time of the
+training. The paper's figures are means over its 8 scenes with 60,000 to 100,000 iterations: compare differences, not values. Runs
+with other seeds differ by 0.1 to 0.3 dB.
+TEXT
+    part default_configuration 'Default configuration'
+    part components 'Reflectance components (Tables 2 and 4)'
+    part schedules 'Training schedules (Tables 2 and 4)'
+    part shadow_on_scattering 'Shadow also on scattering (eq. 14, Table 5)'
+    part refinement 'Disturbed cameras and lights'
+    part sweeps 'Shadows, lights, views'
+    part dipoles 'Dipole forms and profiles'
+    part changes 'The default configuration, one change at a time'
+    echo
     sed -n '/^## Findings/,$p' tests/EXPERIMENTS.md
 } >"$text"
 [ -z "${LIST-}" ] || exit 0
