@@ -80,15 +80,15 @@ WHAT IT COMPUTES
   c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The 8 ASG bases and both networks
   are shared by all Gaussians.
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
-  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, but no sines of wo and few
-  of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
+  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and what true dipole transport
+  brings to x from wherever the light enters (five sums, of lengths from short to long; held fixed in training), but no sines
+  of wo and few of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
   by less than light_bias casts no shadow. Direct light is deferred (ssdgs_asg): Gaussians blend what they would reflect
   without shadow, their normals, sharpness and F0, and f_s and S are each pixel's own. A narrow highlight passes over one
   Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a pixel carries over to other
-  views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows it. transport = 1 lets
-  the scattering network see besides what true dipole transport brings to x from where the light enters.
+  views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows it.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
-  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue; the shadow network's output is S,
+  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow network's output is S,
   no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where light
   is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
@@ -156,8 +156,8 @@ SPEED
   ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was measured
   ssdgs_render_options_fast()     max_error 1/8, light_detail 0.6, alpha_threshold 1/200: less than 0.1 dB
   max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in any pixel, and
-  they are blended in the colour of the Gaussian before them instead, a neighbour in the Morton order that training
-  leaves. `make bench` shows what each of these costs and gains.
+  they are blended in the colour of the Gaussian before them instead, a neighbour in the order that training leaves
+  (halved across the longest side, again and again). `make bench` shows what each of these costs and gains.
   Left out without any change of a bit: what no pixel blends; neurons that are 0 for 64 neighbouring Gaussians; terms and
   networks not in use, gradients of those that rest; components and planes nobody asked for. And what the last frame on
   the context found, where model, options and camera, or lights, are the same: a camera at rest needs no projection, order
@@ -419,7 +419,7 @@ typedef struct ssdgs_settings {
     int asg;                  /* ssdgs_asg; deferred */
     int per_channel_optics;   /* 1: sigma_s, sigma_a for each colour channel */
     int depth_cue;            /* 1: the scattering network sees the depth cue; positions are in length units */
-    int transport;            /* 1: it also sees the light that true dipole transport brings from where it really enters */
+    int transport;            /* 1: it also sees the light that true dipole transport brings from where it enters */
     int residual_shadow;      /* 1: the shadow network corrects the logit of the visibility; positions in length units */
     int shadow_on_scattering; /* 1: eq. 14, the ablation */
     int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
@@ -1696,7 +1696,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.terms = SSDGS_ALL_TERMS;
     s.transfer = SSDGS_TRANSFER_SRGB;
     s.asg = SSDGS_ASG_DEFERRED;
-    s.per_channel_optics = s.depth_cue = s.residual_shadow = 1;
+    s.per_channel_optics = s.depth_cue = s.transport = s.residual_shadow = 1;
     s.scattering_layers = 3;
     s.scattering_width = 64;
     s.light_octaves = 1;
@@ -1715,7 +1715,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     ssdgs_settings s = ssdgs_settings_default();
     s.transfer = SSDGS_TRANSFER_NONE;
     s.asg = SSDGS_ASG_GEOMETRIC;
-    s.per_channel_optics = s.depth_cue = s.residual_shadow = 0;
+    s.per_channel_optics = s.depth_cue = s.transport = s.residual_shadow = 0;
     s.scattering_layers = 6;
     s.scattering_width = 256;
     s.view_octaves = s.light_octaves = 4;
@@ -1891,7 +1891,7 @@ typedef struct ssdgs__kept {
     ssdgs_camera camera;
     ssdgs_render_options options;
     int terms, light_count;
-    int camera_ready, lights_ready, shadows_ready, bounds_ready;
+    int camera_ready, lights_ready, shadows_ready, transport_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
 } ssdgs__kept;
 
@@ -1905,7 +1905,7 @@ typedef struct ssdgs__frame_memory {
     ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known;
+    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known, transport, transport_known;
     int view_room;
     ssdgs__kept kept;
     ssdgs__bounds scene;
@@ -2240,6 +2240,7 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
     }
     kept->lights_ready = known;
     kept->shadows_ready = kept->shadows_ready && known && now->bf16 == old->bf16;
+    kept->transport_ready = kept->transport_ready && known;
     kept->camera = *a;
     kept->options = *now;
     kept->terms = frame->terms;
@@ -2301,7 +2302,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (result) return result;
     views = m->views.memory;
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    if (frame->views != views) m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = 0;
+    if (frame->views != views)
+        m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = m->kept.transport_ready = 0;
     if (!m->kept.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
         frame->views[0].light = -1;
@@ -3155,13 +3157,14 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
 }
 
 /* ---- true dipole transport ----
-   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. Of Gaussians in Morton
-   order this is an octree. */
+   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. In the order that
+   training leaves they are compact. */
 
 typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
 
 #define SSDGS__LEVELS 12
 #define SSDGS__SOURCES 512
+#define SSDGS__NEAR 256         /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
 #define SSDGS__SOFT 0.02        /* in length units; distances are sqrt(r^2 + soft^2) */
 #define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
 
@@ -3247,6 +3250,188 @@ static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, 
     return SSDGS_OK;
 }
 
+/* The middle of some lanes' positions (3, BLOCK) and how far they reach from it. */
+static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle[3]) {
+    ssdgs_real reach2 = 0;
+    int s, c;
+    for (c = 0; c < 3; c++) {
+        ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
+        for (s = 1; s < lanes; s++) {
+            const ssdgs_real at = x[c * SSDGS__BLOCK + s];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
+        }
+        middle[c] = (low + high) / 2;
+    }
+    for (s = 0; s < lanes; s++) {
+        ssdgs_real distance2 = 0;
+        for (c = 0; c < 3; c++) distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
+        reach2 = distance2 > reach2 ? distance2 : reach2;
+    }
+    return SSDGS__SQRT(reach2);
+}
+
+/* Whether a node is a point for what reaches so far from a middle. */
+static int ssdgs__is_far(const ssdgs__node *node, const ssdgs_real middle[3], ssdgs_real reach) {
+    const ssdgs_real room = node->radius * SSDGS__FAR + reach;
+    ssdgs_real distance2 = 0;
+    int c;
+    for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
+    return distance2 > room * room;
+}
+
+/* What transport has gathered from so far for some of a block's groups of 16 Gaussians, a mask. */
+typedef struct ssdgs__gather {
+    const ssdgs_frame *frame;
+    const ssdgs_real *flux, *x;
+    ssdgs_real *sources, *sums, scale[2];
+    int count, groups;
+} ssdgs__gather;
+
+static void ssdgs__gather_flush(ssdgs__gather *g) {
+    int s;
+    for (s = 0; s < SSDGS__BLOCK; s += 16)
+        if (g->groups >> s / 16 & 1) g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
+    g->count = 0;
+}
+
+static void ssdgs__gather_point(ssdgs__gather *g, ssdgs_real x, ssdgs_real y, ssdgs_real z, ssdgs_real flux) {
+    ssdgs_real *source = g->sources + 4 * g->count++;
+    source[0] = x, source[1] = y, source[2] = z, source[3] = flux;
+    if (g->count == SSDGS__SOURCES) ssdgs__gather_flush(g);
+}
+
+/* The Gaussians of a lowest node, one by one. */
+static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
+    const size_t n = (size_t)g->frame->gaussians.count, stride = g->frame->gaussians.stride;
+    const ssdgs_real *x = g->frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
+    size_t i;
+    for (i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
+        if (g->flux[i] > 0) ssdgs__gather_point(g, x[i], x[stride + i], x[2 * stride + i], g->flux[i]);
+}
+
+typedef struct ssdgs__transport_job {
+    const ssdgs_frame *frame;
+    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters */
+    size_t node_count;
+    int blocks;                 /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
+    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
+    ssdgs_real *sums;           /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
+    unsigned char *known;       /* (lights, blocks) masks of groups of 16 known for lights at rest, or NULL */
+} ssdgs__transport_job;
+
+/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance.
+   The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for all of the block or for a group. */
+static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x, int groups,
+                                   ssdgs_real *sums) {
+    const ssdgs_frame *frame = job->frame;
+    const size_t n = (size_t)frame->gaussians.count;
+    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
+    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
+    ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
+    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], near[SSDGS__NEAR];
+    const int levels = ssdgs__levels(n, first);
+    int depth = 0, level_of[8 * SSDGS__LEVELS], near_count = 0, k, s, i;
+    ssdgs__gather g;
+    g.frame = frame;
+    g.flux = frame->flux + n * (size_t)light;
+    g.sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4;
+    g.count = 0;
+    g.x = x;
+    g.sums = sums;
+    g.groups = groups;
+    g.scale[0] = soft * soft;
+    g.scale[1] = (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
+    for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
+        const size_t at = stack[--depth];
+        const int level = level_of[depth];
+        const ssdgs__node *node = nodes + first[level] + at;
+        size_t part;
+        if (!(node->flux > 0)) continue;
+        if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+        else if (level) {
+            for (part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
+                stack[depth] = part;
+                level_of[depth++] = level - 1;
+            }
+        } else if (near_count < SSDGS__NEAR) near[near_count++] = at;
+        else ssdgs__gather_leaf(&g, at);
+    }
+    ssdgs__gather_flush(&g);
+    for (s = 0; s < SSDGS__BLOCK; s += 16) {
+        g.groups = groups & 1 << s / 16;
+        if (!g.groups) continue;
+        reach = ssdgs__reach(x + s, 16, middle);
+        for (i = 0; i < near_count; i++) {
+            const ssdgs__node *node = nodes + near[i];
+            if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+            else ssdgs__gather_leaf(&g, near[i]);
+        }
+        ssdgs__gather_flush(&g);
+    }
+    for (k = 0; k < SSDGS__LENGTHS; k++) {
+        const ssdgs_real scale = (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
+        for (s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
+    }
+}
+
+/* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
+static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)blocks * slot / SSDGS__SLOTS); }
+
+/* Groups with a Gaussian to be shaded, where they are not known. */
+static void ssdgs__transport_task(void *data, int slot) {
+    const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
+    const ssdgs_frame *frame = job->frame;
+    const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
+    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
+    ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
+    int block, light, s, k;
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++) {
+        const size_t first = (size_t)block * SSDGS__BLOCK;
+        int seen = 0;
+        for (s = 0; s < SSDGS__BLOCK; s++) {
+            const size_t at = first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
+            for (k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
+            seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
+        }
+        for (light = 0; light < frame->light_count; light++) {
+            const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
+            const int groups = job->known ? seen & ~job->known[at] : seen;
+            if (!groups) continue;
+            ssdgs__transport_block(job, light, slot, x, groups, sums);
+            for (k = 0; k < SSDGS__LENGTHS; k++)
+                for (s = 0; s < SSDGS__BLOCK; s++)
+                    if (groups >> s / 16 & 1) job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] = sums[k * SSDGS__BLOCK + s];
+            if (job->known) job->known[at] = (unsigned char)(job->known[at] | groups);
+        }
+    }
+}
+
+/* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
+static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
+    ssdgs_context *context = frame->context;
+    ssdgs__kept *kept = &frame->memory->kept;
+    const int at_rest = frame->view_count > 1 && frame->views[1].kept;
+    ssdgs__transport_job job;
+    ssdgs_result result;
+    size_t blocks;
+    job.frame = frame;
+    job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    blocks = (size_t)job.blocks * (size_t)frame->light_count;
+    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real, blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
+    SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
+    result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
+    if (result) return result;
+    if (at_rest && !kept->transport_ready) memset(job.known, 0, blocks); /* room from the first frame on, use from the second */
+    if (!at_rest) job.known = NULL;
+    kept->transport_ready = at_rest;
+    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
+    *sums = job.sums;
+    return SSDGS_OK;
+}
+
 typedef struct ssdgs__shade_job {
     ssdgs_frame *frame;
     ssdgs__block_layout layout;
@@ -3256,9 +3441,7 @@ typedef struct ssdgs__shade_job {
     ssdgs_real *shadow_logit;   /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
     uint64_t *counts;           /* per slot: multiplications done, those of all neurons, shadows kept */
-    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters, or NULL */
-    size_t node_count;
-    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
+    const ssdgs_real *transport; /* of ssdgs__transport_job, or NULL */
     uint32_t *packed[2];        /* bf16 weights of the scattering and the shadow network, or NULL */
     ssdgs_real *activations, *scratch, *slots, *lane_slots;
 } ssdgs__shade_job;
@@ -3289,72 +3472,6 @@ static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const siz
     }
 }
 
-/* True dipole transport to a block's Gaussians: cue_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance,
-   in units of the irradiance that they have themselves. The profiles integrate to 1 over a plane. What is far, or small, counts
-   as one point. */
-static void ssdgs__transport_block(const ssdgs__shade_job *job, int light, int slot, const ssdgs_real *x,
-                                   const ssdgs_real *irradiance, ssdgs_real *cues) {
-    const ssdgs_frame *frame = job->frame;
-    const size_t n = (size_t)frame->gaussians.count;
-    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
-    const ssdgs_real *flux = frame->flux + n * (size_t)light;
-    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * frame->gaussians.stride;
-    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
-    ssdgs_real *sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4, scale[2], middle[3], reach = 0;
-    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS];
-    const int levels = ssdgs__levels(n, first);
-    int depth = 0, level_of[8 * SSDGS__LEVELS], k, s, c, m = 0;
-    scale[0] = soft * soft;
-    scale[1] = -1 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
-    for (c = 0; c < 3; c++) {
-        ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
-        for (s = 1; s < SSDGS__BLOCK; s++) {
-            const ssdgs_real at = x[c * SSDGS__BLOCK + s];
-            low = at < low ? at : low;
-            high = at > high ? at : high;
-        }
-        middle[c] = (low + high) / 2;
-        reach += (high - low) * (high - low) / 4;
-    }
-    reach = SSDGS__SQRT(reach);
-    memset(cues, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *cues);
-    for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
-        const size_t at = stack[--depth];
-        const int level = level_of[depth];
-        const ssdgs__node *node = nodes + first[level] + at;
-        ssdgs_real distance2 = 0, room;
-        size_t i;
-        if (!(node->flux > 0)) continue;
-        for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
-        room = node->radius * SSDGS__FAR + reach;
-        if (distance2 > room * room) {
-            for (c = 0; c < 3; c++) sources[4 * m + c] = node->x[c];
-            sources[4 * m++ + 3] = node->flux;
-        } else if (level) {
-            for (i = 8 * at; i < 8 * at + 8 && first[level - 1] + i < first[level]; i++) {
-                stack[depth] = i;
-                level_of[depth++] = level - 1;
-            }
-        } else {
-            for (i = 8 * at; i < 8 * at + 8 && i < n; i++) {
-                if (!(flux[i] > 0)) continue;
-                for (c = 0; c < 3; c++) sources[4 * m + c] = position[(size_t)c * frame->gaussians.stride + i];
-                sources[4 * m++ + 3] = flux[i];
-            }
-        }
-        if (m > SSDGS__SOURCES - 8) {
-            frame->context->k->transport(sources, m, x, scale, cues);
-            m = 0;
-        }
-    }
-    frame->context->k->transport(sources, m, x, scale, cues);
-    for (k = 0; k < SSDGS__LENGTHS; k++) {
-        const ssdgs_real length = (ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit;
-        for (s = 0; s < SSDGS__BLOCK; s++)
-            cues[k * SSDGS__BLOCK + s] *= (ssdgs_real)0.15915494309189535 / (length * irradiance[s]);
-    }
-}
-
 static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
     return frame->layers + (size_t)layer * 4 * (size_t)frame->gaussians.count;
 }
@@ -3367,12 +3484,12 @@ static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t
         for (c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot, ssdgs_real *memory,
+static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory,
                                ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
-    const size_t n = (size_t)frame->gaussians.count;
+    const size_t n = (size_t)frame->gaussians.count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
     uint32_t *pairs = (uint32_t *)(void *)(scratch + l->pairs);
     const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
@@ -3394,6 +3511,10 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             const size_t of_light = n * (size_t)light + at[s];
             part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
             part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
+            for (i = 0; job->transport && i < SSDGS__LENGTHS; i++) /* in units of the irradiance of its own */
+                part[l->transport + (size_t)(i * SSDGS__BLOCK + s)] =
+                    job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK +
+                                   at[s] % SSDGS__BLOCK] / part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
         }
         if (l->shadow_layers) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;
@@ -3405,8 +3526,6 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             } else lists->shadows_kept += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
-            if (job->nodes) ssdgs__transport_block(job, light, slot, gauss + SSDGS_POSITION * SSDGS__BLOCK,
-                                                   part + l->rows + SSDGS__IRRADIANCE * SSDGS__BLOCK, part + l->transport);
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
             ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0], pairs,
                                    lists, inputs, part + l->scattering_at);
@@ -3471,14 +3590,12 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
 }
 
 
-/* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
-static int ssdgs__slot_begin(const ssdgs__shade_job *job, int slot) { return (int)((int64_t)job->blocks * slot / SSDGS__SLOTS); }
 
-/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, in Morton order. */
+/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, as training leaves them. */
 static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
     const ssdgs_frame *frame = job->frame;
     ssdgs_real *const planes[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal, frame->shadow};
-    const int begin = ssdgs__slot_begin(job, slot), end = ssdgs__slot_begin(job, slot + 1);
+    const int begin = ssdgs__slot_begin(job->blocks, slot), end = ssdgs__slot_begin(job->blocks, slot + 1);
     const size_t n = (size_t)frame->gaussians.count, last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
     size_t from, g;
     int p;
@@ -3498,8 +3615,8 @@ static void ssdgs__shade_task(void *data, int slot) {
     ssdgs__row_lists lists;
     int block;
     ssdgs__row_lists_fill(&lists);
-    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
-        ssdgs__shade_block(job, block, &lists, slot,
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++)
+        ssdgs__shade_block(job, block, &lists,
                            job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
     if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
@@ -3557,8 +3674,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     }
     job.counts = kept->counts;
     if (frame->flux && frame->settings.transport && frame->light_count) {
-        SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
-        result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
+        result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
     }
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
@@ -3653,7 +3769,7 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
     ssdgs__row_lists_fill(&lists);
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
     memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
-    for (block = ssdgs__slot_begin(job, slot); block < ssdgs__slot_begin(job, slot + 1); block++)
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++)
         ssdgs__shade_backward_block(job, block, &lists, slot);
 }
 
@@ -6006,31 +6122,46 @@ static int ssdgs__key_compare(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Puts the Gaussians listed (keys, their indices in the low halves) in Morton order and drops the others. Neighbours in space
-   then share a block, whose neurons live and die together, and the cache. scratch: count values. */
+/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each half likewise, down to
+   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact. */
+static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
+    size_t node, half, i, c;
+    while (count > 8) {
+        const ssdgs_real *along = position;
+        double longest = -1;
+        for (c = 0; c < 3; c++) {
+            const ssdgs_real *x = position + c * stride;
+            double low = 1e30, high = -1e30;
+            for (i = 0; i < count; i++) {
+                const double at = (double)x[(uint32_t)keys[i]];
+                low = at < low ? at : low;
+                high = at > high ? at : high;
+            }
+            if (high - low > longest) longest = high - low, along = x;
+        }
+        for (i = 0; i < count; i++) {
+            const float x = (float)along[(uint32_t)keys[i]];
+            uint32_t bits;
+            memcpy(&bits, &x, sizeof bits);
+            bits = bits >> 31 ? ~bits : bits | 0x80000000u; /* in the order of the numbers */
+            keys[i] = (uint64_t)bits << 32 | (uint32_t)keys[i];
+        }
+        qsort(keys, count, sizeof *keys, ssdgs__key_compare);
+        for (node = 8; 8 * node < count;) node *= 8;
+        half = (count / 2 + node - 1) / node * node;
+        ssdgs__split(position, stride, keys, half);
+        keys += half;
+        count -= half;
+    }
+}
+
+/* Puts the Gaussians listed in the order of such halves and drops the others. Neighbours in space then share a block, whose neurons
+   live and die together, the cache, and a node of what transport gathers from. scratch: count values. */
 static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count, ssdgs_real *scratch) {
     ssdgs_real *const planes[3] = {trainer->model->gaussians, trainer->mean, trainer->square};
-    double low[3], longest = 1e-30;
     size_t i, c;
-    int bit, part;
-    for (c = 0; c < 3; c++) {
-        const ssdgs_real *x = planes[0] + (SSDGS_POSITION + c) * trainer->stride;
-        double high = -1e30;
-        low[c] = 1e30;
-        for (i = 0; i < count; i++) {
-            const double at = (double)x[(uint32_t)keys[i]];
-            low[c] = at < low[c] ? at : low[c];
-            high = at > high ? at : high;
-        }
-        if (high - low[c] > longest) longest = high - low[c];
-    }
-    for (i = 0; i < count; i++)
-        for (c = 0; c < 3; c++) {
-            const double at = (double)planes[0][(SSDGS_POSITION + c) * trainer->stride + (uint32_t)keys[i]] - low[c];
-            const uint32_t cell = at > 0 && at <= longest ? (uint32_t)(at / longest * 1023) : 0;
-            for (bit = 0; bit < 10; bit++) keys[i] |= (uint64_t)(cell >> bit & 1u) << (32 + 3 * bit + (int)c);
-        }
-    qsort(keys, count, sizeof *keys, ssdgs__key_compare);
+    int part;
+    ssdgs__split(planes[0] + SSDGS_POSITION * trainer->stride, trainer->stride, keys, count);
     for (part = 0; part < 3; part++)
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             ssdgs_real *plane = planes[part] + c * trainer->stride;
@@ -6518,6 +6649,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     /* a light's map inside of the scene, of Gaussians on surfaces */
     map = settings->light_map_size ? settings->light_map_size : 6 * sqrt((double)n) < 512 ? 6 * sqrt((double)n) : 512;
     if (layers > 1) fixed += 6 * (SSDGS__FALLS + 1) * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
+    if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS; /* sums, flux, nodes; sources */
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
@@ -7843,11 +7975,11 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
 }
 
 /* ==== >>transport_kernel ====
-   sources (count, 4): x, y, z, flux; x (3, BLOCK); scale: soft^2, -1 / longest length. Adds flux exp(-r / l_k) / r to sums
-   (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l, its squares for the others. */
+   sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest length.
+   Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l, its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
     int s, i, k;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (s = 0; s < 16; s += SSDGS__VW) {
         const V px = VLOAD(x + s), py = VLOAD(x + SSDGS__BLOCK + s), pz = VLOAD(x + 2 * SSDGS__BLOCK + s);
         const V soft = VSET(scale[0]), longest = VSET(scale[1]);
         V sum[SSDGS__LENGTHS];
@@ -7856,7 +7988,7 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
             const R *source = sources + 4 * i;
             const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])), dz = VSUB(pz, VSET(source[2]));
             const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))), weight = VDIV(VSET(source[3]), r);
-            V e = VEXP(VMUL(r, longest));
+            V e = F(exp2)(VMUL(r, longest));
             SSDGS__UNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
                 sum[k] = VFMA(weight, e, sum[k]);
                 e = VMUL(e, e);

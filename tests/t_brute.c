@@ -845,6 +845,7 @@ static void test_permutation(void) {
     for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         if (!contexts[isa][0]) continue;
         full_scene(3000001, 93, 61);
+        s.settings.transport = 0; /* which gathers from nodes of neighbours in this order */
         render(contexts[isa][0], image);
         for (i = s.count - 1; i > 0; i--) {
             const int j = integer(0, i);

@@ -415,6 +415,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     size_t count;
     if (!gold_open(&file, name)) return;
     settings.view_octaves = settings.light_octaves = 4;
+    settings.transport = 0;
     settings.residual_shadow = residual;
     settings.shadow_width = 32;
     settings.shadow_layers = 4;
@@ -609,6 +610,7 @@ static void test_full(const char *name, int defaults) {
     int c;
     if (!gold_open(&file, name)) return;
     settings.asg = SSDGS_ASG_GEOMETRIC;
+    settings.transport = 0;
     settings.pixel_variance = (ssdgs_real)0.3;
     settings.view_octaves = settings.light_octaves = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];

@@ -1194,7 +1194,7 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
         ssdgs_model *model;
         settings.shadow_layers = 0;
         settings.light_bias = (ssdgs_real)(t == 2 ? 1e30 : 0.06); /* S = 1 */
-        settings.depth_cue = t != 2; /* which a bias takes away too, and which is of the scattering */
+        settings.depth_cue = settings.transport = t != 2; /* which need the light pass, too, for the scattering */
         model = cloud(settings, 300);
         for (i = 0; t < 2 && i < 300; i++) set(model, i, t ? SSDGS_SCATTERING : SSDGS_SPECULAR, 3, -INFINITE);
         options.terms = SSDGS_ALL_TERMS;

@@ -987,7 +987,7 @@ static void test_half_shadow(void) {
     p = model->gaussians;
     stride = model->capacity;
     ssdgs__rotation_scalar(raw, q, r);
-    for (half = 0, i = 0; i < 3; i++) { /* Morton order: the first is still the first; halves start without momentum */
+    for (half = 0, i = 0; i < 3; i++) { /* the first is still the first; halves start without momentum */
         for (c = 0; c < SSDGS_CHANNELS; c++) CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i && trainer->square[(size_t)c * stride + (size_t)i] == !i);
         CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 && trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
         if (i == 0) continue;
