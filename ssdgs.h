@@ -80,16 +80,18 @@ WHAT IT COMPUTES
   c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The 8 ASG bases and both networks
   are shared by all Gaussians.
   ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
-  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and what true dipole transport
-  brings to x from wherever the light enters (five sums, of lengths from short to long; held fixed in training), but no sines
-  of wo and few of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where what lies nearer to the light
-  by less than light_bias casts no shadow. Direct light is deferred (ssdgs_asg): Gaussians blend what they would reflect
-  without shadow, their normals, sharpness and F0, and f_s and S are each pixel's own. A narrow highlight passes over one
-  Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a pixel carries over to other
-  views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows it.
+  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and what true dipole
+  transport brings to x from wherever the light enters (five sums, of lengths from short to long; held fixed in training),
+  but no sines of wo and few of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where
+  what lies nearer to the light by less than light_bias casts no shadow. Direct light is deferred (ssdgs_asg): Gaussians
+  blend what they would reflect without shadow, their normals, sharpness and F0, and f_s and S are each pixel's own. A
+  narrow highlight passes over one Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a
+  pixel carries over to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place
+  shows it.
   ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
-  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow network's output is S,
-  no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
+  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow
+  network's output is S, no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor
+  for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where light
   is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
   surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Diffuse alone
@@ -161,8 +163,8 @@ SPEED
   Left out without any change of a bit: what no pixel blends; neurons that are 0 for 64 neighbouring Gaussians; terms and
   networks not in use, gradients of those that rest; components and planes nobody asked for. And what the last frame on
   the context found, where model, options and camera, or lights, are the same: a camera at rest needs no projection, order
-  and tiles, lights at rest no maps and no shadow network. Writing through ssdgs_model_get() needs a new call of it each
-  time, which is how the library knows. ssdgs_render_stats tells what was left out.
+  and tiles, lights at rest no maps, no shadow network and no transport. Writing through ssdgs_model_get() needs a new call
+  of it each time, which is how the library knows. ssdgs_render_stats tells what was left out.
 
 SIMD
   The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit ARM), and for
@@ -232,6 +234,7 @@ CONTENTS, search for the tag
   >>frame           memory of a frame, its views, the lights' cameras, what is kept from the last
   >>project         records, order, instances, tile lists
   >>shadow          visibility and depth cue from the lights, which Gaussians the camera sees
+  >>transport       what comes to them from where the light enters
   >>shade           geometry, networks and colour of the Gaussians seen
   >>composite       blending over tiles and its backward
   >>render          the stages in order
@@ -2768,6 +2771,283 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
+/* ==== >>transport  true dipole transport: what comes to the Gaussians seen from where the light enters ====
+   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. In the order that
+   training leaves they are compact. */
+
+typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
+
+#define SSDGS__LEVELS 12
+#define SSDGS__SOURCES 512
+#define SSDGS__NEAR 256         /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
+#define SSDGS__SOFT 0.02        /* in length units; distances are sqrt(r^2 + soft^2) */
+#define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
+
+/* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
+static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
+    int levels = 0;
+    first[0] = 0;
+    do {
+        n = (n + 7) / 8;
+        first[levels + 1] = first[levels] + n;
+    } while (++levels < SSDGS__LEVELS && n > 1);
+    return levels;
+}
+
+typedef struct ssdgs__node_job { const ssdgs_frame *frame; ssdgs__node *nodes; size_t count; } ssdgs__node_job;
+
+/* Grows a node by one of its parts, whose flux is not 0. */
+static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
+    int c;
+    node->flux += flux;
+    for (c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
+}
+
+static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real radius) {
+    ssdgs_real distance2 = 0;
+    int c;
+    for (c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
+    radius += SSDGS__SQRT(distance2);
+    node->radius = radius > node->radius ? radius : node->radius;
+}
+
+/* The lowest nodes of a chunk of Gaussians, all lights. */
+static void ssdgs__node_task(void *data, int chunk) {
+    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
+    const ssdgs_model_view *g = &job->frame->gaussians;
+    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK;
+    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
+    int light, pass;
+    size_t at, i;
+    for (light = 0; light < job->frame->light_count; light++)
+        for (at = begin / 8; 8 * at < end; at++) {
+            ssdgs__node *node = job->nodes + job->count * (size_t)light + at;
+            memset(node, 0, sizeof *node);
+            for (pass = 0; pass < 2; pass++)
+                for (i = 8 * at; i < 8 * at + 8 && i < end; i++) {
+                    const ssdgs_real x[3] = {plane[i], plane[g->stride + i], plane[2 * g->stride + i]};
+                    const ssdgs_real flux = job->frame->flux[n * (size_t)light + i];
+                    if (!(flux > 0)) continue;
+                    if (pass) ssdgs__node_reach(node, x, 0);
+                    else ssdgs__node_add(node, x, flux);
+                }
+        }
+}
+
+static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, size_t *count) {
+    ssdgs_context *context = frame->context;
+    size_t first[SSDGS__LEVELS + 1], i;
+    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
+    ssdgs__node_job job;
+    int light, level, pass;
+    *count = first[levels];
+    SSDGS__RESERVE(frame->memory->nodes, job.nodes, ssdgs__node, *count * (size_t)frame->light_count + 1);
+    job.frame = frame;
+    job.count = *count;
+    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
+    for (light = 0; light < frame->light_count; light++)
+        for (level = 1; level < levels; level++) {
+            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1];
+            ssdgs__node *const end = below + (first[level] - first[level - 1]), *node = end;
+            for (; below < end; node++) {
+                memset(node, 0, sizeof *node);
+                for (pass = 0; pass < 2; pass++)
+                    for (i = 0; i < 8 && below + i < end; i++) {
+                        if (!(below[i].flux > 0)) continue;
+                        if (pass) ssdgs__node_reach(node, below[i].x, below[i].radius);
+                        else ssdgs__node_add(node, below[i].x, below[i].flux);
+                    }
+                below += below + 8 < end ? 8 : end - below;
+            }
+        }
+    *nodes = job.nodes;
+    return SSDGS_OK;
+}
+
+/* The middle of some lanes' positions (3, BLOCK) and how far they reach from it. */
+static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle[3]) {
+    ssdgs_real reach2 = 0;
+    int s, c;
+    for (c = 0; c < 3; c++) {
+        ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
+        for (s = 1; s < lanes; s++) {
+            const ssdgs_real at = x[c * SSDGS__BLOCK + s];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
+        }
+        middle[c] = (low + high) / 2;
+    }
+    for (s = 0; s < lanes; s++) {
+        ssdgs_real distance2 = 0;
+        for (c = 0; c < 3; c++) distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
+        reach2 = distance2 > reach2 ? distance2 : reach2;
+    }
+    return SSDGS__SQRT(reach2);
+}
+
+/* Whether a node is a point for what reaches so far from a middle. */
+static int ssdgs__is_far(const ssdgs__node *node, const ssdgs_real middle[3], ssdgs_real reach) {
+    const ssdgs_real room = node->radius * SSDGS__FAR + reach;
+    ssdgs_real distance2 = 0;
+    int c;
+    for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
+    return distance2 > room * room;
+}
+
+/* What transport has gathered from so far for some of a block's groups of 16 Gaussians, a mask. */
+typedef struct ssdgs__gather {
+    const ssdgs_frame *frame;
+    const ssdgs_real *flux, *x;
+    ssdgs_real *sources, *sums, scale[2];
+    int count, groups;
+} ssdgs__gather;
+
+static void ssdgs__gather_flush(ssdgs__gather *g) {
+    int s;
+    for (s = 0; s < SSDGS__BLOCK; s += 16)
+        if (g->groups >> s / 16 & 1) g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
+    g->count = 0;
+}
+
+static void ssdgs__gather_point(ssdgs__gather *g, ssdgs_real x, ssdgs_real y, ssdgs_real z, ssdgs_real flux) {
+    ssdgs_real *source = g->sources + 4 * g->count++;
+    source[0] = x, source[1] = y, source[2] = z, source[3] = flux;
+    if (g->count == SSDGS__SOURCES) ssdgs__gather_flush(g);
+}
+
+/* The Gaussians of a lowest node, one by one. */
+static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
+    const size_t n = (size_t)g->frame->gaussians.count, stride = g->frame->gaussians.stride;
+    const ssdgs_real *x = g->frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
+    size_t i;
+    for (i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
+        if (g->flux[i] > 0) ssdgs__gather_point(g, x[i], x[stride + i], x[2 * stride + i], g->flux[i]);
+}
+
+typedef struct ssdgs__transport_job {
+    const ssdgs_frame *frame;
+    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters */
+    size_t node_count;
+    int blocks;                 /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
+    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
+    ssdgs_real *sums;           /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
+    unsigned char *known;       /* (lights, blocks) masks of groups of 16 known for lights at rest, or NULL */
+} ssdgs__transport_job;
+
+/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance.
+   The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for all of the block or for a group. */
+static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x, int groups,
+                                   ssdgs_real *sums) {
+    const ssdgs_frame *frame = job->frame;
+    const size_t n = (size_t)frame->gaussians.count;
+    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
+    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
+    ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
+    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], near[SSDGS__NEAR];
+    const int levels = ssdgs__levels(n, first);
+    int depth = 0, level_of[8 * SSDGS__LEVELS], near_count = 0, k, s, i;
+    ssdgs__gather g;
+    g.frame = frame;
+    g.flux = frame->flux + n * (size_t)light;
+    g.sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4;
+    g.count = 0;
+    g.x = x;
+    g.sums = sums;
+    g.groups = groups;
+    g.scale[0] = soft * soft;
+    g.scale[1] = (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
+    for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
+        const size_t at = stack[--depth];
+        const int level = level_of[depth];
+        const ssdgs__node *node = nodes + first[level] + at;
+        size_t part;
+        if (!(node->flux > 0)) continue;
+        if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+        else if (level) {
+            for (part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
+                stack[depth] = part;
+                level_of[depth++] = level - 1;
+            }
+        } else if (near_count < SSDGS__NEAR) near[near_count++] = at;
+        else ssdgs__gather_leaf(&g, at);
+    }
+    ssdgs__gather_flush(&g);
+    for (s = 0; s < SSDGS__BLOCK; s += 16) {
+        g.groups = groups & 1 << s / 16;
+        if (!g.groups) continue;
+        reach = ssdgs__reach(x + s, 16, middle);
+        for (i = 0; i < near_count; i++) {
+            const ssdgs__node *node = nodes + near[i];
+            if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+            else ssdgs__gather_leaf(&g, near[i]);
+        }
+        ssdgs__gather_flush(&g);
+    }
+    for (k = 0; k < SSDGS__LENGTHS; k++) {
+        const ssdgs_real scale = (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
+        for (s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
+    }
+}
+
+/* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
+static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)blocks * slot / SSDGS__SLOTS); }
+
+/* Groups with a Gaussian to be shaded, where they are not known. */
+static void ssdgs__transport_task(void *data, int slot) {
+    const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
+    const ssdgs_frame *frame = job->frame;
+    const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
+    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
+    ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
+    int block, light, s, k;
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++) {
+        const size_t first = (size_t)block * SSDGS__BLOCK;
+        int seen = 0;
+        for (s = 0; s < SSDGS__BLOCK; s++) {
+            const size_t at = first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
+            for (k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
+            seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
+        }
+        for (light = 0; light < frame->light_count; light++) {
+            const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
+            const int groups = job->known ? seen & ~job->known[at] : seen;
+            if (!groups) continue;
+            ssdgs__transport_block(job, light, slot, x, groups, sums);
+            for (k = 0; k < SSDGS__LENGTHS; k++)
+                for (s = 0; s < SSDGS__BLOCK; s++)
+                    if (groups >> s / 16 & 1)
+                        job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] = sums[k * SSDGS__BLOCK + s];
+            if (job->known) job->known[at] = (unsigned char)(job->known[at] | groups);
+        }
+    }
+}
+
+/* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
+static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
+    ssdgs_context *context = frame->context;
+    ssdgs__kept *kept = &frame->memory->kept;
+    const int at_rest = frame->view_count > 1 && frame->views[1].kept;
+    ssdgs__transport_job job;
+    ssdgs_result result;
+    size_t blocks;
+    job.frame = frame;
+    job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    blocks = (size_t)job.blocks * (size_t)frame->light_count;
+    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real, blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
+    SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
+    result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
+    if (result) return result;
+    if (at_rest && !kept->transport_ready) memset(job.known, 0, blocks); /* room from the first frame on, use from the second */
+    if (!at_rest) job.known = NULL;
+    kept->transport_ready = at_rest;
+    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
+    *sums = job.sums;
+    return SSDGS_OK;
+}
+
 /* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks: geometry, both networks, colour ==== */
 
 /* How a block's memory is laid out, in values. What the backward asks for again: the Gaussians' channels and, per light, the
@@ -3154,282 +3434,6 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
                 in[i].levels);
         else for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
     }
-}
-
-/* ---- true dipole transport ----
-   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. In the order that
-   training leaves they are compact. */
-
-typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
-
-#define SSDGS__LEVELS 12
-#define SSDGS__SOURCES 512
-#define SSDGS__NEAR 256         /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
-#define SSDGS__SOFT 0.02        /* in length units; distances are sqrt(r^2 + soft^2) */
-#define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
-
-/* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
-static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
-    int levels = 0;
-    first[0] = 0;
-    do {
-        n = (n + 7) / 8;
-        first[levels + 1] = first[levels] + n;
-    } while (++levels < SSDGS__LEVELS && n > 1);
-    return levels;
-}
-
-typedef struct ssdgs__node_job { const ssdgs_frame *frame; ssdgs__node *nodes; size_t count; } ssdgs__node_job;
-
-/* Grows a node by one of its parts, whose flux is not 0. */
-static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
-    int c;
-    node->flux += flux;
-    for (c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
-}
-
-static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real radius) {
-    ssdgs_real distance2 = 0;
-    int c;
-    for (c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
-    radius += SSDGS__SQRT(distance2);
-    node->radius = radius > node->radius ? radius : node->radius;
-}
-
-/* The lowest nodes of a chunk of Gaussians, all lights. */
-static void ssdgs__node_task(void *data, int chunk) {
-    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
-    const ssdgs_model_view *g = &job->frame->gaussians;
-    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK;
-    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
-    const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
-    int light, pass;
-    size_t at, i;
-    for (light = 0; light < job->frame->light_count; light++)
-        for (at = begin / 8; 8 * at < end; at++) {
-            ssdgs__node *node = job->nodes + job->count * (size_t)light + at;
-            memset(node, 0, sizeof *node);
-            for (pass = 0; pass < 2; pass++)
-                for (i = 8 * at; i < 8 * at + 8 && i < end; i++) {
-                    const ssdgs_real x[3] = {plane[i], plane[g->stride + i], plane[2 * g->stride + i]};
-                    const ssdgs_real flux = job->frame->flux[n * (size_t)light + i];
-                    if (!(flux > 0)) continue;
-                    if (pass) ssdgs__node_reach(node, x, 0);
-                    else ssdgs__node_add(node, x, flux);
-                }
-        }
-}
-
-static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, size_t *count) {
-    ssdgs_context *context = frame->context;
-    size_t first[SSDGS__LEVELS + 1], i;
-    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
-    ssdgs__node_job job;
-    int light, level, pass;
-    *count = first[levels];
-    SSDGS__RESERVE(frame->memory->nodes, job.nodes, ssdgs__node, *count * (size_t)frame->light_count + 1);
-    job.frame = frame;
-    job.count = *count;
-    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
-    for (light = 0; light < frame->light_count; light++)
-        for (level = 1; level < levels; level++) {
-            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1];
-            ssdgs__node *const end = below + (first[level] - first[level - 1]), *node = end;
-            for (; below < end; node++) {
-                memset(node, 0, sizeof *node);
-                for (pass = 0; pass < 2; pass++)
-                    for (i = 0; i < 8 && below + i < end; i++) {
-                        if (!(below[i].flux > 0)) continue;
-                        if (pass) ssdgs__node_reach(node, below[i].x, below[i].radius);
-                        else ssdgs__node_add(node, below[i].x, below[i].flux);
-                    }
-                below += below + 8 < end ? 8 : end - below;
-            }
-        }
-    *nodes = job.nodes;
-    return SSDGS_OK;
-}
-
-/* The middle of some lanes' positions (3, BLOCK) and how far they reach from it. */
-static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle[3]) {
-    ssdgs_real reach2 = 0;
-    int s, c;
-    for (c = 0; c < 3; c++) {
-        ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
-        for (s = 1; s < lanes; s++) {
-            const ssdgs_real at = x[c * SSDGS__BLOCK + s];
-            low = at < low ? at : low;
-            high = at > high ? at : high;
-        }
-        middle[c] = (low + high) / 2;
-    }
-    for (s = 0; s < lanes; s++) {
-        ssdgs_real distance2 = 0;
-        for (c = 0; c < 3; c++) distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
-        reach2 = distance2 > reach2 ? distance2 : reach2;
-    }
-    return SSDGS__SQRT(reach2);
-}
-
-/* Whether a node is a point for what reaches so far from a middle. */
-static int ssdgs__is_far(const ssdgs__node *node, const ssdgs_real middle[3], ssdgs_real reach) {
-    const ssdgs_real room = node->radius * SSDGS__FAR + reach;
-    ssdgs_real distance2 = 0;
-    int c;
-    for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
-    return distance2 > room * room;
-}
-
-/* What transport has gathered from so far for some of a block's groups of 16 Gaussians, a mask. */
-typedef struct ssdgs__gather {
-    const ssdgs_frame *frame;
-    const ssdgs_real *flux, *x;
-    ssdgs_real *sources, *sums, scale[2];
-    int count, groups;
-} ssdgs__gather;
-
-static void ssdgs__gather_flush(ssdgs__gather *g) {
-    int s;
-    for (s = 0; s < SSDGS__BLOCK; s += 16)
-        if (g->groups >> s / 16 & 1) g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
-    g->count = 0;
-}
-
-static void ssdgs__gather_point(ssdgs__gather *g, ssdgs_real x, ssdgs_real y, ssdgs_real z, ssdgs_real flux) {
-    ssdgs_real *source = g->sources + 4 * g->count++;
-    source[0] = x, source[1] = y, source[2] = z, source[3] = flux;
-    if (g->count == SSDGS__SOURCES) ssdgs__gather_flush(g);
-}
-
-/* The Gaussians of a lowest node, one by one. */
-static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
-    const size_t n = (size_t)g->frame->gaussians.count, stride = g->frame->gaussians.stride;
-    const ssdgs_real *x = g->frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
-    size_t i;
-    for (i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
-        if (g->flux[i] > 0) ssdgs__gather_point(g, x[i], x[stride + i], x[2 * stride + i], g->flux[i]);
-}
-
-typedef struct ssdgs__transport_job {
-    const ssdgs_frame *frame;
-    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters */
-    size_t node_count;
-    int blocks;                 /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
-    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
-    ssdgs_real *sums;           /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
-    unsigned char *known;       /* (lights, blocks) masks of groups of 16 known for lights at rest, or NULL */
-} ssdgs__transport_job;
-
-/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance.
-   The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for all of the block or for a group. */
-static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x, int groups,
-                                   ssdgs_real *sums) {
-    const ssdgs_frame *frame = job->frame;
-    const size_t n = (size_t)frame->gaussians.count;
-    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
-    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
-    ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
-    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], near[SSDGS__NEAR];
-    const int levels = ssdgs__levels(n, first);
-    int depth = 0, level_of[8 * SSDGS__LEVELS], near_count = 0, k, s, i;
-    ssdgs__gather g;
-    g.frame = frame;
-    g.flux = frame->flux + n * (size_t)light;
-    g.sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4;
-    g.count = 0;
-    g.x = x;
-    g.sums = sums;
-    g.groups = groups;
-    g.scale[0] = soft * soft;
-    g.scale[1] = (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
-    memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
-    for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
-        const size_t at = stack[--depth];
-        const int level = level_of[depth];
-        const ssdgs__node *node = nodes + first[level] + at;
-        size_t part;
-        if (!(node->flux > 0)) continue;
-        if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
-        else if (level) {
-            for (part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
-                stack[depth] = part;
-                level_of[depth++] = level - 1;
-            }
-        } else if (near_count < SSDGS__NEAR) near[near_count++] = at;
-        else ssdgs__gather_leaf(&g, at);
-    }
-    ssdgs__gather_flush(&g);
-    for (s = 0; s < SSDGS__BLOCK; s += 16) {
-        g.groups = groups & 1 << s / 16;
-        if (!g.groups) continue;
-        reach = ssdgs__reach(x + s, 16, middle);
-        for (i = 0; i < near_count; i++) {
-            const ssdgs__node *node = nodes + near[i];
-            if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
-            else ssdgs__gather_leaf(&g, near[i]);
-        }
-        ssdgs__gather_flush(&g);
-    }
-    for (k = 0; k < SSDGS__LENGTHS; k++) {
-        const ssdgs_real scale = (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
-        for (s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
-    }
-}
-
-/* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
-static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)blocks * slot / SSDGS__SLOTS); }
-
-/* Groups with a Gaussian to be shaded, where they are not known. */
-static void ssdgs__transport_task(void *data, int slot) {
-    const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
-    const ssdgs_frame *frame = job->frame;
-    const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
-    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
-    ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
-    int block, light, s, k;
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++) {
-        const size_t first = (size_t)block * SSDGS__BLOCK;
-        int seen = 0;
-        for (s = 0; s < SSDGS__BLOCK; s++) {
-            const size_t at = first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
-            for (k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
-            seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
-        }
-        for (light = 0; light < frame->light_count; light++) {
-            const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
-            const int groups = job->known ? seen & ~job->known[at] : seen;
-            if (!groups) continue;
-            ssdgs__transport_block(job, light, slot, x, groups, sums);
-            for (k = 0; k < SSDGS__LENGTHS; k++)
-                for (s = 0; s < SSDGS__BLOCK; s++)
-                    if (groups >> s / 16 & 1) job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] = sums[k * SSDGS__BLOCK + s];
-            if (job->known) job->known[at] = (unsigned char)(job->known[at] | groups);
-        }
-    }
-}
-
-/* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
-static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
-    ssdgs_context *context = frame->context;
-    ssdgs__kept *kept = &frame->memory->kept;
-    const int at_rest = frame->view_count > 1 && frame->views[1].kept;
-    ssdgs__transport_job job;
-    ssdgs_result result;
-    size_t blocks;
-    job.frame = frame;
-    job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
-    blocks = (size_t)job.blocks * (size_t)frame->light_count;
-    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
-    SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real, blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
-    SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
-    result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
-    if (result) return result;
-    if (at_rest && !kept->transport_ready) memset(job.known, 0, blocks); /* room from the first frame on, use from the second */
-    if (!at_rest) job.known = NULL;
-    kept->transport_ready = at_rest;
-    ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
-    *sums = job.sums;
-    return SSDGS_OK;
 }
 
 typedef struct ssdgs__shade_job {
@@ -6155,8 +6159,8 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
     }
 }
 
-/* Puts the Gaussians listed in the order of such halves and drops the others. Neighbours in space then share a block, whose neurons
-   live and die together, the cache, and a node of what transport gathers from. scratch: count values. */
+/* Puts the Gaussians listed in the order of such halves and drops the others. Neighbours in space then share a block, whose
+   neurons live and die together, the cache, and a node of what transport gathers from. scratch: count values. */
 static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count, ssdgs_real *scratch) {
     ssdgs_real *const planes[3] = {trainer->model->gaussians, trainer->mean, trainer->square};
     size_t i, c;
@@ -6649,7 +6653,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     /* a light's map inside of the scene, of Gaussians on surfaces */
     map = settings->light_map_size ? settings->light_map_size : 6 * sqrt((double)n) < 512 ? 6 * sqrt((double)n) : 512;
     if (layers > 1) fixed += 6 * (SSDGS__FALLS + 1) * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
-    if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS; /* sums, flux, nodes; sources */
+    if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
@@ -7976,7 +7980,8 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
 
 /* ==== >>transport_kernel ====
    sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest length.
-   Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l, its squares for the others. */
+   Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l,
+   its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
     int s, i, k;
     for (s = 0; s < 16; s += SSDGS__VW) {

@@ -193,7 +193,7 @@ changes() {
     row 'four octaves of wo and wi' '' octaves --set view_octaves=4 --set light_octaves=4
     row 'no shadow network' '' no_shadow_net --set shadow_layers=0
     row 'no light bias' '' no_bias --set light_bias=0
-    row 'true dipole transport' '' transport --set transport=1
+    row 'no transport' '' no_transport --set transport=0
     row 'camera pass adds 0.3 px^2' '' variance --set pixel_variance=0.3
     row 'none dropped for its weight' '' no_prune --set prune_weight=0
     row 'none halved for its shadow' '' no_halving --set densify_shadow=0
