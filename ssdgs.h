@@ -6362,13 +6362,14 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
 }
 
 /* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
-   away from the centre. */
+   away from the centre; in the order of ssdgs__split. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const int n = o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians;
     double volume = 1;
     ssdgs_result result;
+    uint64_t *order;
     int i, c;
     if (n < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points", n);
     result = ssdgs__trainer_grow(trainer, (size_t)n);
@@ -6397,7 +6398,11 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             for (c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
         }
     }
-    model->count = n;
+    order = (uint64_t *)ssdgs__allocate(trainer->context, (size_t)n * (sizeof *order + sizeof(ssdgs_real)));
+    if (!order) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < n; i++) order[i] = (uint64_t)i;
+    ssdgs__reorder(trainer, order, (size_t)n, (ssdgs_real *)(order + n));
+    ssdgs__release(trainer->context, order);
     return SSDGS_OK;
 }
 
