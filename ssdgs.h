@@ -2932,7 +2932,7 @@ typedef struct ssdgs__transport_job {
     int blocks;                 /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
     ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
     ssdgs_real *sums;           /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
-    unsigned char *known;       /* (lights, blocks) masks of groups of 16 known for lights at rest, or NULL */
+    unsigned char *known;       /* (lights, blocks) masks of groups of 16 whose sums are there: for as long as lights rest */
 } ssdgs__transport_job;
 
 /* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance.
@@ -3012,14 +3012,14 @@ static void ssdgs__transport_task(void *data, int slot) {
         }
         for (light = 0; light < frame->light_count; light++) {
             const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
-            const int groups = job->known ? seen & ~job->known[at] : seen;
+            const int groups = seen & ~job->known[at];
             if (!groups) continue;
             ssdgs__transport_block(job, light, slot, x, groups, sums);
             for (k = 0; k < SSDGS__LENGTHS; k++)
                 for (s = 0; s < SSDGS__BLOCK; s++)
                     if (groups >> s / 16 & 1)
                         job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] = sums[k * SSDGS__BLOCK + s];
-            if (job->known) job->known[at] = (unsigned char)(job->known[at] | groups);
+            job->known[at] = (unsigned char)(job->known[at] | groups);
         }
     }
 }
@@ -3028,21 +3028,22 @@ static void ssdgs__transport_task(void *data, int slot) {
 static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
     ssdgs_context *context = frame->context;
     ssdgs__kept *kept = &frame->memory->kept;
-    const int at_rest = frame->view_count > 1 && frame->views[1].kept;
     ssdgs__transport_job job;
-    ssdgs_result result;
-    size_t blocks;
+    size_t blocks, first[SSDGS__LEVELS + 1];
     job.frame = frame;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     blocks = (size_t)job.blocks * (size_t)frame->light_count;
     SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real, blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
-    result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
-    if (result) return result;
-    if (at_rest && !kept->transport_ready) memset(job.known, 0, blocks); /* room from the first frame on, use from the second */
-    if (!at_rest) job.known = NULL;
-    kept->transport_ready = at_rest;
+    job.nodes = (const ssdgs__node *)frame->memory->nodes.memory;
+    job.node_count = first[ssdgs__levels((size_t)frame->gaussians.count, first)];
+    if (!kept->transport_ready) {
+        const ssdgs_result result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
+        if (result) return result;
+        memset(job.known, 0, blocks);
+    }
+    kept->transport_ready = 1;
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
     return SSDGS_OK;

@@ -34,6 +34,15 @@ static ssdgs_model *make_model(int count, double size) {
     return model;
 }
 
+static void on_sphere(ssdgs_model *model, int count) {
+    int i, c;
+    for (i = 0; i < count; i++) {
+        const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u), a = 6.2831853 * draw(9000 + (uint64_t)i);
+        const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
+        for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
+    }
+}
+
 /* Puts a model's positions in the order that training leaves. */
 static void order(ssdgs_model *model, size_t count) {
     uint64_t *keys = (uint64_t *)malloc(count * sizeof *keys);
@@ -71,11 +80,7 @@ static void test_pairs(int sorted) {
     int i, c, s, k, light;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
-    for (i = 0; i < COUNT; i++) {
-        const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u), a = 6.2831853 * draw(9000 + (uint64_t)i);
-        const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
-        for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
-    }
+    on_sphere(model, COUNT);
     if (sorted) order(model, COUNT);
     begin(&frame, model, lights, 2);
     for (i = 0; i < 2 * COUNT; i++) frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
@@ -149,12 +154,8 @@ static void test_inputs(void) {
     int i, c, j, k, light;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
-    for (i = 0; i < COUNT; i++) {
-        const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u), a = 6.2831853 * draw(9000 + (uint64_t)i);
-        const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
-        for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
-        model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
-    }
+    on_sphere(model, COUNT);
+    for (i = 0; i < COUNT; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
     order(model, COUNT);
     begin_as(&frame, model, lights, 2, 1);
     if (!CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_SHADE))) exit(1);
@@ -228,14 +229,15 @@ static void test_flux(void) {
 static void test_bits(void) {
     enum { COUNT = 700 };
     static const ssdgs_real eye[2][3] = {{0, -2, (ssdgs_real)0.5}, {1, -2, 0}}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-    static ssdgs_real color[4][SIDE * SIDE * 3];
+    static ssdgs_real color[6][SIDE * SIDE * 3];
     ssdgs_light light;
     ssdgs_image image;
     int part, i, c, view;
     memset(&light, 0, sizeof light);
     light.position[0] = light.position[2] = 2;
     for (c = 0; c < 3; c++) light.intensity[c] = 9;
-    for (part = 0; part < 4; part++) { /* one thread; three; its camera moved there; without transport's light */
+    /* one thread; three; its camera moved there; without transport's light; its light moved there; a Gaussian did */
+    for (part = 0; part < 6; part++) {
         ssdgs_context_desc desc;
         ssdgs_context *own = NULL, *shared = context;
         ssdgs_model *model;
@@ -259,8 +261,11 @@ static void test_bits(void) {
         }
         memset(&image, 0, sizeof image);
         image.color = color[part];
-        for (view = part == 2 ? 0 : 1; view < 2; view++) {
-            const ssdgs_camera camera = ssdgs_camera_look_at(eye[view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
+        for (view = part == 2 || part > 3 ? 0 : 1; view < 2; view++) {
+            const ssdgs_real x = (ssdgs_real)(0.6 * draw(50000) - 0.3);
+            light.position[0] = part == 4 && !view ? -2 : 2;
+            if (part == 5) *ssdgs_model_get(model).gaussians = view ? x : x + 1;
+            const ssdgs_camera camera = ssdgs_camera_look_at(eye[part > 3 ? 1 : view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
             CHECK(!ssdgs_render(model, &camera, &light, 1, &image));
         }
         ssdgs_model_destroy(model);
@@ -269,6 +274,8 @@ static void test_bits(void) {
     CHECK(!memcmp(color[0], color[1], sizeof color[0]));
     CHECK(!memcmp(color[0], color[2], sizeof color[0]));
     CHECK(memcmp(color[0], color[3], sizeof color[0]));
+    CHECK(!memcmp(color[0], color[4], sizeof color[0]));
+    CHECK(!memcmp(color[0], color[5], sizeof color[0]));
 }
 
 int main(void) {
