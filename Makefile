@@ -48,18 +48,22 @@ $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
 	$(BUILD)/train examples/data/waxcow -o $@ --background black \
 	  $(if $(findstring published,$@),--preset published --iterations 1000,--iterations $(ITERATIONS))
 
-# Each program closes with "N passed, N failed"; one that does not counts as one failed.
-test: $(TESTS) $(EXAMPLES) $(BUILD)/show ## every test; SSDGS_GOLDEN=folder reads the golden files there
-	@passed=0; failed=0; for t in $(TESTS) $(BUILDS); do \
-	  echo "== $$t"; log=$(BUILD)/$${t##*/}.log; \
-	  case $$t in builds) sh tests/builds.sh $(BUILD) $(COMPILE) -O0;; */fuzz) $(RUN) $$t tests/fuzz/seeds/*/*;; *) $(RUN) $$t;; esac >$$log 2>&1; code=$$?; \
-	  cat $$log; p=0; f=1; \
-	  line=$$(sed -n '$$s/^\([0-9][0-9]*\) passed, \([0-9][0-9]*\) failed$$/p=\1 f=\2/p' $$log); \
-	  if [ -n "$$line" ]; then eval "$$line"; fi; \
-	  if [ $$code -ne 0 ] && [ $$f -eq 0 ]; then f=1; fi; \
-	  if [ $$code -ne 0 ]; then echo "$$t: exit $$code"; fi; \
-	  passed=$$((passed + p)); failed=$$((failed + f)); \
+# Each program closes with "N passed, N failed"; one that does not counts as one failed. With make -j they run side by side.
+LOGS = $(TESTS:=.log) $(BUILDS:%=$(BUILD)/%.log)
+KEEP_LOG = >$@ 2>&1 || echo "exit $$?" >>$@; echo "== $*"; cat $@
+test: $(LOGS) $(EXAMPLES) $(BUILD)/show ## every test; SSDGS_GOLDEN=folder reads the golden files there
+	@passed=0; failed=0; for log in $(LOGS); do \
+	  set -- $$(awk '/^exit / { if (!f) f = 1; next } { p = 0; f = 1 } /^[0-9]+ passed, [0-9]+ failed$$/ { p = $$1; f = $$3 + 0 } \
+	    END { print p + 0, f == "" ? 1 : f }' $$log); \
+	  [ $$2 -eq 0 ] || echo "failed: $$log"; \
+	  passed=$$((passed + $$1)); failed=$$((failed + $$2)); \
 	done; echo "$$passed passed, $$failed failed"; [ $$failed -eq 0 ]
+$(filter-out %/fuzz.log,$(TESTS:=.log)): %.log: %
+	@$(RUN) $* $(KEEP_LOG)
+$(BUILD)/fuzz.log: %.log: %
+	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
+$(BUILD)/builds.log: %.log: $(BUILD)/multi_a.o
+	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 
 test-asan: ## tests under the address sanitizer
 	$(MAKE) test BUILD=$(BUILD)/asan CFLAGS="-O1 -g -fsanitize=address -fno-omit-frame-pointer"
@@ -141,5 +145,5 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
-.PHONY: all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

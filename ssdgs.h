@@ -820,8 +820,10 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
 #if defined(__clang__)
 #define SSDGS__UNROLL _Pragma("clang loop unroll(full)")
+#define SSDGS__UNROLL_SCALAR /* its vectoriser does better */
 #elif __GNUC__ >= 8
 #define SSDGS__UNROLL _Pragma("GCC unroll 16")
+#define SSDGS__UNROLL_SCALAR _Pragma("GCC unroll 4") /* sixteenfold is slower, and half of the time to compile */
 #endif
 #elif defined(_MSC_VER)
 #define SSDGS__INLINE __forceinline
@@ -832,6 +834,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 #ifndef SSDGS__UNROLL
 #define SSDGS__UNROLL
+#define SSDGS__UNROLL_SCALAR
 #endif
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define SSDGS__PREFETCH(p) __builtin_prefetch(p)
@@ -7104,6 +7107,11 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 #define SSDGS__FI static SSDGS__INLINE SSDGS__TARGET
 #define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
 #define F(name) SSDGS__NAME(name)
+#if SSDGS__ISA == SSDGS__ISA_SCALAR
+#define VUNROLL SSDGS__UNROLL_SCALAR
+#else
+#define VUNROLL SSDGS__UNROLL
+#endif
 #define VNEG(a) VSUB(VSET(0), a)
 #define VABS(a) VMAX(a, VNEG(a))
 #define VDOT3(ax, ay, az, bx, by, bz) VFMA(az, bz, VFMA(ay, by, VMUL(ax, bx)))
@@ -7159,9 +7167,9 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
     int i;
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
     __m128 r[4];
-    SSDGS__UNROLL for (i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
+    VUNROLL for (i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-    SSDGS__UNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
+    VUNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
 #else
     for (i = 0; i < 16; i++)
         out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] = in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
@@ -7536,7 +7544,7 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
         least = VSET(log2_threshold - record[5] - (R)1e-3);
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
                 V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
                 V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
@@ -7579,7 +7587,7 @@ SSDGS__FI void F(batch_transpose)(F(batch) *batch, int count) {
         __m128i half[2];
         half[0] = _mm_packus_epi16(_mm_and_si128(a, low), _mm_and_si128(b, low));
         half[1] = _mm_packus_epi16(_mm_srli_epi16(a, 8), _mm_srli_epi16(b, 8));
-        SSDGS__UNROLL for (micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
+        VUNROLL for (micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
             batch->entries[micro] |= (uint64_t)(unsigned)_mm_movemask_epi8(half[micro / 8]) << i;
             half[micro / 8] = _mm_add_epi8(half[micro / 8], half[micro / 8]);
         }
@@ -7658,7 +7666,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
             int alive = 0;
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 over[v] = VLOAD(passed_over[micro] + v * SSDGS__VW);
             }
@@ -7666,7 +7674,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                 const int index = ssdgs__lowest_bit(left);
                 const uint32_t place = batch.place[index];
                 int any = 0, must = 0;
-                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha;
                     VM drawn, blended;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
@@ -7683,7 +7691,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                 blends[place] = (uint16_t)(blends[place] | (unsigned)(any != 0) << micro);
                 if (thrifty) needed[place] = (unsigned char)(needed[place] | (must != 0));
             }
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed_over[micro] + v * SSDGS__VW, over[v]);
                 alive |= VBITS(VGE(t[v], stop));
@@ -7754,7 +7762,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
             if (!(entries | sampled.entries[micro])) continue;
             F(pixel_centres)(tile, micro, px, py);
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 if (flux) {
                     V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
                     w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
@@ -7770,7 +7778,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             for (left = entries; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const V distance = VSET(applied.record[index][6]);
-                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w;
                     VM drawn;
                     unsigned fell;
@@ -7792,7 +7800,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 const int index = ssdgs__lowest_bit(left), then = ssdgs__highest_bit((entries & nearer[index]) << 1);
                 const V distance = VSET(sampled.record[index][6]);
                 V (*sum)[SSDGS__NV] = lanes[index];
-                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
                     V dx, dy, raw;
                     VM drawn;
@@ -7804,7 +7812,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                                               sum[2][v]);
                 }
             }
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
                 if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
             }
@@ -7847,13 +7855,13 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
             V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
             for (used = 0; left; left &= left - 1, used++) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
-                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha;
                     VM drawn, live = VGE(t[v], stop);
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
@@ -7862,26 +7870,26 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     last[v] = VSEL(live, t[v], last[v]);
                 }
             }
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
             for (layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
                 V c[SSDGS__LAYERS][3][SSDGS__NV];
-                SSDGS__UNROLL for (l = 0; l < at_once; l++)
-                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++)
-                        SSDGS__UNROLL for (i = 0; i < 3; i++)
+                VUNROLL for (l = 0; l < at_once; l++)
+                    VUNROLL for (v = 0; v < SSDGS__NV; v++)
+                        VUNROLL for (i = 0; i < 3; i++)
                             c[l][i][v] = VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 for (n = 0; n < used; n++)
-                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                         const V w = VLOAD(weight[n] + v * SSDGS__VW);
-                        SSDGS__UNROLL for (l = 0; l < at_once; l++)
-                            SSDGS__UNROLL for (i = 0; i < 3; i++)
+                        VUNROLL for (l = 0; l < at_once; l++)
+                            VUNROLL for (i = 0; i < 3; i++)
                                 c[l][i][v] = VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
                     }
-                SSDGS__UNROLL for (l = 0; l < at_once; l++)
-                    SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++)
-                        SSDGS__UNROLL for (i = 0; i < 3; i++)
+                VUNROLL for (l = 0; l < at_once; l++)
+                    VUNROLL for (v = 0; v < SSDGS__NV; v++)
+                        VUNROLL for (i = 0; i < 3; i++)
                             VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
             }
         }
@@ -7921,9 +7929,9 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
-                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
-                    SSDGS__UNROLL for (i = 0; i < 3; i++)
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (layer = 0; layer < layers; layer++)
+                    VUNROLL for (i = 0; i < 3; i++)
                         dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 product[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
@@ -7933,7 +7941,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 const int index = ssdgs__lowest_bit(left);
                 R *out = sums + (size_t)batch.place[index] * stride;
                 V sum[8 + 4 * SSDGS__LAYERS][SSDGS__NV];
-                SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w, shade, behind, g, gx, gy, before_it = t[v];
                     VM drawn;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
@@ -7942,8 +7950,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     w = VMUL(alpha, before_it);
                     shade = VDOT3(VSET(local[0][index][0]), VSET(local[0][index][1]), VSET(local[0][index][2]), dc[0][0][v], dc[0][1][v],
                                   dc[0][2][v]);
-                    SSDGS__UNROLL for (layer = 1; layer < layers; layer++)
-                        SSDGS__UNROLL for (i = 0; i < 3; i++) shade = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], shade);
+                    VUNROLL for (layer = 1; layer < layers; layer++)
+                        VUNROLL for (i = 0; i < 3; i++) shade = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], shade);
                     before[v] = VFMA(w, shade, before[v]);
                     behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
                     g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
@@ -7958,17 +7966,17 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     sum[5][v] = VMUL(gy, dy);
                     sum[6][v] = slot ? zero : w;
                     sum[7][v] = zero;
-                    SSDGS__UNROLL for (layer = 0; layer < layers; layer++) {
-                        SSDGS__UNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
+                    VUNROLL for (layer = 0; layer < layers; layer++) {
+                        VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
                         sum[11 + 4 * layer][v] = zero;
                     }
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
-                SSDGS__UNROLL for (layer = 0; layer < layers; layer++)
+                VUNROLL for (layer = 0; layer < layers; layer++)
                     F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer], sum[11 + 4 * layer]);
             }
-            SSDGS__UNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
             }
@@ -7994,18 +8002,18 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
         const V px = VLOAD(x + s), py = VLOAD(x + SSDGS__BLOCK + s), pz = VLOAD(x + 2 * SSDGS__BLOCK + s);
         const V soft = VSET(scale[0]), longest = VSET(scale[1]);
         V sum[SSDGS__LENGTHS];
-        SSDGS__UNROLL for (k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
+        VUNROLL for (k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
         for (i = 0; i < count; i++) {
             const R *source = sources + 4 * i;
             const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])), dz = VSUB(pz, VSET(source[2]));
             const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))), weight = VDIV(VSET(source[3]), r);
             V e = F(exp2)(VMUL(r, longest));
-            SSDGS__UNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
+            VUNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
                 sum[k] = VFMA(weight, e, sum[k]);
                 e = VMUL(e, e);
             }
         }
-        SSDGS__UNROLL for (k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
+        VUNROLL for (k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
     }
 }
 
@@ -8033,37 +8041,37 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(of
     const F(offsets) *const end = depth + p->depth;
     size_t out[6];
     int i, v;
-    SSDGS__UNROLL for (i = 0; i < rows; i++) {
+    VUNROLL for (i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
-        SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
+        VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
     }
     for (; depth < end; depth++) {
         const size_t at = depth->a;
         const R *b = columns + depth->b;
         V lanes[SSDGS__TV];
-        SSDGS__UNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
-        SSDGS__UNROLL for (i = 0; i < rows; i++) {
+        VUNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
+        VUNROLL for (i = 0; i < rows; i++) {
             const V weight = VSET(a[i][at]);
-            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
+            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
         }
     }
-    SSDGS__UNROLL for (i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
+    VUNROLL for (i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
     if (p->accumulate) {
-        SSDGS__UNROLL for (i = 0; i < rows; i++)
-            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
+        VUNROLL for (i = 0; i < rows; i++)
+            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
     }
     if (p->relu) {
-        SSDGS__UNROLL for (i = 0; i < rows; i++)
-            SSDGS__UNROLL for (v = 0; v < vectors; v++) sum[i][v] = VMAX(sum[i][v], VSET(0));
+        VUNROLL for (i = 0; i < rows; i++)
+            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VMAX(sum[i][v], VSET(0));
     }
     if (p->mask) {
-        SSDGS__UNROLL for (i = 0; i < rows; i++)
-            SSDGS__UNROLL for (v = 0; v < vectors; v++)
+        VUNROLL for (i = 0; i < rows; i++)
+            VUNROLL for (v = 0; v < vectors; v++)
                 sum[i][v] = VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
     }
-    SSDGS__UNROLL for (i = 0; i < rows; i++) {
+    VUNROLL for (i = 0; i < rows; i++) {
         R *const to = p->out + out[i];
-        SSDGS__UNROLL for (v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
+        VUNROLL for (v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
     }
 }
 
@@ -8130,18 +8138,18 @@ SSDGS__BF16_FI void F(dense_bf16_tile)(const int rows, const ssdgs__product *p, 
     __m512 sum[6][4];
     const int pairs = (p->depth + 1) / 2;
     int i, v, k;
-    SSDGS__UNROLL for (i = 0; i < rows; i++)
-        SSDGS__UNROLL for (v = 0; v < 4; v++) sum[i][v] = VSET(p->bias[row + i]);
+    VUNROLL for (i = 0; i < rows; i++)
+        VUNROLL for (v = 0; v < 4; v++) sum[i][v] = VSET(p->bias[row + i]);
     for (k = 0; k < pairs; k++, b += SSDGS__BLOCK) {
         __m512i lanes[4];
-        SSDGS__UNROLL for (v = 0; v < 4; v++) lanes[v] = _mm512_loadu_si512(b + 16 * v);
-        SSDGS__UNROLL for (i = 0; i < rows; i++) {
+        VUNROLL for (v = 0; v < 4; v++) lanes[v] = _mm512_loadu_si512(b + 16 * v);
+        VUNROLL for (i = 0; i < rows; i++) {
             const __m512i weight = _mm512_set1_epi32((int)a[(row + i) * pairs + k]);
-            SSDGS__UNROLL for (v = 0; v < 4; v++) sum[i][v] = _mm512_dpbf16_ps(sum[i][v], (__m512bh)weight, (__m512bh)lanes[v]);
+            VUNROLL for (v = 0; v < 4; v++) sum[i][v] = _mm512_dpbf16_ps(sum[i][v], (__m512bh)weight, (__m512bh)lanes[v]);
         }
     }
-    SSDGS__UNROLL for (i = 0; i < rows; i++)
-        SSDGS__UNROLL for (v = 0; v < 4; v++)
+    VUNROLL for (i = 0; i < rows; i++)
+        VUNROLL for (v = 0; v < 4; v++)
             VSTORE(p->out + (size_t)(row + i) * p->out_stride + 16 * v, p->relu ? VMAX(sum[i][v], VSET(0)) : sum[i][v]);
 }
 
@@ -9155,6 +9163,7 @@ static const ssdgs__kernels F(kernels) = {
 #undef VEXP
 #undef VLOG
 #undef VNEG
+#undef VUNROLL
 #undef VABS
 #undef VDOT3
 #undef F
