@@ -992,7 +992,7 @@ typedef struct ssdgs__kernels {
     void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
-    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, size_t, int);
+    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, int);
     void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *, ssdgs_real *);
     void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
                                ssdgs_real *);
@@ -4072,11 +4072,11 @@ static void ssdgs__composite_backward_task(void *data, int index) {
         if (!light) continue;
         for (layer = 0; layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
         ssdgs__gradient_product(pixels + lit, gradient + lit, SSDGS__PER_LIGHT, 0);
-        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, sums, job->stride, first);
+        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, pixels + lit, sums, job->stride, first);
     }
     for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
     ssdgs__gradient_product(pixels, gradient, layers, 1);
-    k->composite_backward(&tile, layers, color, gradient, sums, job->stride, 0);
+    k->composite_backward(&tile, layers, color, gradient, pixels, sums, job->stride, 0);
 }
 
 static void ssdgs__splat_gradient_task(void *data, int index) {
@@ -7902,17 +7902,23 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const 
     else F(composite_layers)(SSDGS__LAYERS, tile, color, pixels);
 }
 
-/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the pixel][16 lanes]. Per entry
-   adds to sums (n, stride) of g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w of slot 0, 0; from
-   8 + 4 slot on w dC of each layer. Walks front to back again: what lies behind an entry is the final pixel less what has been
-   passed, so alpha and T are the forward's, bit for bit. */
-SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color, const R *pixels, R *sums,
-                                            size_t stride, int slot) {
+/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the pixel][16 lanes]; scratch:
+   room for as many. Per entry adds to sums (n, stride) of g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend
+   weight w of slot 0, 0; from 8 + 4 slot on w dC of each layer, three and one without meaning. Walks front to back again: what
+   lies behind an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
+SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color, const R *pixels,
+                                            R *scratch, R *sums, size_t stride, int slot) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
+    const int wide = layers == SSDGS__LAYERS, width = 4 * layers; /* all layers: sums over pixels with lanes over their values */
     F(batch) batch;
-    R local[SSDGS__LAYERS][SSDGS__BATCH][4], passed[16][16], transmittance[16][16];
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], passed[16][16], transmittance[16][16];
     uint32_t from = 0;
-    int micro, v, i, n, layer;
+    int which[SSDGS__BATCH], used, micro, v, i, n, layer;
+    for (micro = 0; wide && micro < 16; micro++)
+        for (layer = 0; layer < layers; layer++)
+            for (i = 0; i < 16; i += 4)
+                F(transpose4)(pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16, scratch + (micro * 16 + i) * width + 4 * layer,
+                              (size_t)width);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             passed[micro][v] = 0;
@@ -7925,7 +7931,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
-            const R *pixel = pixels + micro * 64;
+            const R *pixel = pixels + micro * 64, *rows = scratch + micro * 16 * width;
             V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
@@ -7937,21 +7943,22 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
             }
-            for (; left; left &= left - 1) {
-                const int index = ssdgs__lowest_bit(left);
+            for (used = 0; left; left &= left - 1, used++) {
+                const int index = which[used] = ssdgs__lowest_bit(left);
                 R *out = sums + (size_t)batch.place[index] * stride;
-                V sum[8 + 4 * SSDGS__LAYERS][SSDGS__NV];
+                V sum[8 + 4 * SSDGS__PER_LIGHT][SSDGS__NV];
                 VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha, w, shade, behind, g, gx, gy, before_it = t[v];
+                    V dx, dy, raw, alpha, w, part[4], shade, behind, g, gx, gy, before_it = t[v];
                     VM drawn;
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
                     w = VMUL(alpha, before_it);
-                    shade = VDOT3(VSET(local[0][index][0]), VSET(local[0][index][1]), VSET(local[0][index][2]), dc[0][0][v], dc[0][1][v],
-                                  dc[0][2][v]);
-                    VUNROLL for (layer = 1; layer < layers; layer++)
-                        VUNROLL for (i = 0; i < 3; i++) shade = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], shade);
+                    part[0] = part[1] = part[2] = part[3] = zero; /* one chain of sums would be what all waits for */
+                    VUNROLL for (layer = 0; layer < layers; layer++)
+                        VUNROLL for (i = 0; i < 3; i++)
+                            part[layer & 3] = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
+                    shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
                     before[v] = VFMA(w, shade, before[v]);
                     behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
                     g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
@@ -7966,15 +7973,28 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     sum[5][v] = VMUL(gy, dy);
                     sum[6][v] = slot ? zero : w;
                     sum[7][v] = zero;
-                    VUNROLL for (layer = 0; layer < layers; layer++) {
+                    if (wide) VSTORE(weight[used] + v * SSDGS__VW, w);
+                    VUNROLL for (layer = 0; !wide && layer < layers; layer++) {
                         VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
                         sum[11 + 4 * layer][v] = zero;
                     }
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
-                VUNROLL for (layer = 0; layer < layers; layer++)
+                VUNROLL for (layer = 0; !wide && layer < layers; layer++)
                     F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer], sum[11 + 4 * layer]);
+            }
+            for (n = 0; wide && n < used; n++) {
+                R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
+                V sum[4 * SSDGS__LAYERS / SSDGS__VW];
+                VUNROLL for (v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
+                for (i = 0; i < 16; i++) {
+                    const V w = VSET(weight[n][i]);
+                    VUNROLL for (v = 0; v < width / SSDGS__VW; v++)
+                        sum[v] = VFMA(w, VLOAD(rows + i * width + v * SSDGS__VW), sum[v]);
+                }
+                VUNROLL for (v = 0; v < width / SSDGS__VW; v++)
+                    VSTORE(out + v * SSDGS__VW, VADD(VLOAD(out + v * SSDGS__VW), sum[v]));
             }
             VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
@@ -7984,12 +8004,12 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
     }
 }
 
-SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *sums, size_t stride,
-                                     int slot) {
-    if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, sums, stride, slot);
+SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *scratch, R *sums,
+                                     size_t stride, int slot) {
+    if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, scratch, sums, stride, slot);
     else if (layers == SSDGS__PER_LIGHT)
-        F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, sums, stride, slot);
-    else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, sums, stride, slot);
+        F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, scratch, sums, stride, slot);
+    else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, scratch, sums, stride, slot);
 }
 
 /* ==== >>transport_kernel ====
