@@ -992,7 +992,8 @@ typedef struct ssdgs__kernels {
     void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
-    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, int);
+    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, ssdgs_real *,
+                               size_t, int);
     void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *, ssdgs_real *);
     void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
                                ssdgs_real *);
@@ -1070,9 +1071,8 @@ static SSDGS__INLINE int ssdgs__highest_bit(uint64_t mask) { /* of 0: 0 */
 
 /* A walk's first transmittance: pixels outside the image can blend nothing. */
 static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *tile, int micro, int lane) {
-    return tile->x + 4 * (micro & 3) + (lane & 3) < tile->width && tile->y + 4 * (micro >> 2) + (lane >> 2) < tile->height
-        ? (ssdgs_real)1
-                                                                                                                        : (ssdgs_real)-1;
+    const int x = tile->x + 4 * (micro & 3) + (lane & 3), y = tile->y + 4 * (micro >> 2) + (lane >> 2);
+    return x < tile->width && y < tile->height ? (ssdgs_real)1 : (ssdgs_real)-1;
 }
 
 /* ---- a light's map of where transmittance falls ---- */
@@ -1463,7 +1463,8 @@ static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int thr
         ssdgs__release_to(allocator, pool);
         return NULL;
     }
-    if (!ssdgs__condition_create(&pool->start) || !ssdgs__condition_create(&pool->done)) { /* never seen to fail: leak nothing but the lock */
+    /* never seen to fail: leak nothing but the lock */
+    if (!ssdgs__condition_create(&pool->start) || !ssdgs__condition_create(&pool->done)) {
         ssdgs__mutex_destroy(&pool->mutex);
         ssdgs__release_to(allocator, pool->threads);
         ssdgs__release_to(allocator, pool);
@@ -3485,7 +3486,8 @@ static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
 }
 
 /* Rows of a block into a layer. */
-static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t at[SSDGS__BLOCK], int live, const ssdgs_real *rows) {
+static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t at[SSDGS__BLOCK], int live,
+                               const ssdgs_real *rows) {
     ssdgs_real *to = ssdgs__layer(frame, layer);
     int s, c;
     for (s = 0; s < live; s++)
@@ -3528,8 +3530,8 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             shadow = part + l->scattering_at - SSDGS__BLOCK;
             if (!ssdgs__shadow_recall(job, light, at, shadow)) {
                 ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists, inputs,
-                                       part + l->shadow_at);
+                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists,
+                                       inputs, part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
             } else lists->shadows_kept += SSDGS__BLOCK;
         }
@@ -3860,7 +3862,8 @@ static void ssdgs__tile_load(const ssdgs__tile *tile, const ssdgs_real *plane, i
     int micro, row;
     for (micro = 0; micro < 16; micro++)
         for (row = 0; row < 4; row++) {
-            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row, inside = y < tile->height ? tile->width - x : 0;
+            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row;
+            const int inside = y < tile->height ? tile->width - x : 0;
             const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
             ssdgs_real *to = values + micro * 64 + 16 * c + 4 * row;
             if (inside >= 4) memcpy(to, plane + at, 4 * sizeof *to);
@@ -4125,12 +4128,14 @@ static void ssdgs__highlight_gradient(ssdgs_frame *frame, const ssdgs__uncomposi
     ssdgs__global_groups(&frame->settings, first);
     for (tile = 0; tile < tiles; tile++)
         for (light = 0; light < frame->light_count; light++) {
-            const ssdgs_real *sum = job->highlight_sums + (tile * (size_t)frame->light_count + (size_t)light) * SSDGS__HIGHLIGHT_SUMS;
+            const size_t at = tile * (size_t)frame->light_count + (size_t)light;
+            const ssdgs_real *sum = job->highlight_sums + at * SSDGS__HIGHLIGHT_SUMS;
             for (i = 0; i < 3 && !light; i++) frame->light_gradient[i] += sum[i];
             ssdgs__eye_backward(frame, sum + 3);
             for (i = 0; i < 9; i++) frame->view_gradient[4 * (i / 3) + i % 3] += sum[6 + i];
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                for (i = 0; i < 2; i++) frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] += sum[15 + 2 * j + i];
+                for (i = 0; i < 2; i++)
+                    frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] += sum[15 + 2 * j + i];
                 frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] += sum[15 + 2 * SSDGS_ASG_COUNT + j];
             }
         }
@@ -5695,7 +5700,8 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
     if (t >= specular) terms |= SSDGS_SPECULAR_TERM;
     learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] = learns[SSDGS__G_MATERIAL] = !(t >= 9e3 && t < 16e3);
     learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] = !(t >= freeze_scattering && t < thaw_scattering);
-    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++) learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg || asg == SSDGS_ASG_DEFERRED;
+    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++)
+        learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg || asg == SSDGS_ASG_DEFERRED;
     return terms;
 }
 
@@ -6201,7 +6207,8 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
             ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * stride + at;
             if (halve && c != longest) continue;
             offset[c] = (double)ssdgs__exp_scalar(*scale) *
-                        (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF) : ssdgs__normal(key, (uint64_t)(3 * half + c)));
+                        (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF)
+                               : ssdgs__normal(key, (uint64_t)(3 * half + c)));
             *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
         }
         for (c = 0; c < 3; c++)
@@ -6601,7 +6608,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) grown = ssdgs__densify(trainer);
         if (grown) return grown;
         if (o->opacity_reset_every && trainer->iteration % o->opacity_reset_every == 0 &&
-            ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until) ssdgs__reset_opacity(trainer);
+            ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until)
+            ssdgs__reset_opacity(trainer);
     }
     if (stats) {
         stats->iteration = trainer->iteration;
@@ -7424,7 +7432,8 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
     }
 }
 
-/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes; view_slot (12) is overwritten. */
+/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes; view_slot (12) is
+   overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
                                    const R *splat, R *gradient, size_t gradient_stride, R *view_slot) {
     V view_sum[12][SSDGS__NV];
@@ -7917,8 +7926,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
     for (micro = 0; wide && micro < 16; micro++)
         for (layer = 0; layer < layers; layer++)
             for (i = 0; i < 16; i += 4)
-                F(transpose4)(pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16, scratch + (micro * 16 + i) * width + 4 * layer,
-                              (size_t)width);
+                F(transpose4)(pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16,
+                              scratch + (micro * 16 + i) * width + 4 * layer, (size_t)width);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             passed[micro][v] = 0;
@@ -7982,7 +7991,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
                 VUNROLL for (layer = 0; !wide && layer < layers; layer++)
-                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer], sum[11 + 4 * layer]);
+                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer],
+                            sum[11 + 4 * layer]);
             }
             for (n = 0; wide && n < used; n++) {
                 R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
@@ -8004,8 +8014,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
     }
 }
 
-SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *scratch, R *sums,
-                                     size_t stride, int slot) {
+SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *scratch,
+                                     R *sums, size_t stride, int slot) {
     if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, scratch, sums, stride, slot);
     else if (layers == SSDGS__PER_LIGHT)
         F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, scratch, sums, stride, slot);
@@ -8489,9 +8499,10 @@ SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pix
     }
     for (j = 0; j < 2; j++) {
         for (i = 0; i < 3; i++)
-            g->row[j][i] = VMUL(g->inverse_cover, VFMA(VLOAD(q + 16 * i), g->p[j][i],
-                                                       VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
-                                                            VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
+            g->row[j][i] =
+                VMUL(g->inverse_cover, VFMA(VLOAD(q + 16 * i), g->p[j][i],
+                                            VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
+                                                 VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
         g->q[j] = VDOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
     }
 }
