@@ -98,7 +98,7 @@ WHAT IT COMPUTES
   comes first, the other terms join together after 5,000 iterations of 60,000; shorter runs scale this, longer ones do not.
   In the paper's order, one term after the other, scattering learns the highlights by heart before specular is there.
   Density control clones or splits where the image pulls at a Gaussian, as published; it also halves what lies half in
-  shadow (densify_shadow) and drops what hardly shows (prune_weight).
+  shadow (densify_shadow) and drops what hardly shows (prune_weight) or lies outside of the outlines (prune_outside).
   ssdgs_train_options_published(): the paper's order and density control, 60,000 iterations.
 
 CONVENTIONS
@@ -624,6 +624,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
+    ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
+                                  its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
     ssdgs_rate camera_rate, light_rate;
 } ssdgs_train_options;
@@ -5649,6 +5651,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.densify_shadow = (ssdgs_real)0.5;
     o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
+    o.prune_outside = (ssdgs_real)0.02;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
@@ -5673,7 +5676,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
-    o.prune_weight = 0;
+    o.prune_weight = o.prune_outside = 0;
     return o;
 }
 
@@ -5744,6 +5747,12 @@ static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real backg
                                                                          : ((const uint16_t *)photo->pixels)[4 * i + (size_t)c]);
         for (c = 0; c < 3; c++) planes[pixels * (size_t)c + i] = v[3] * v[c] + (1 - v[3]) * background[c];
     }
+}
+
+/* 0 .. 65535, in steps of 257 where values are bytes. */
+static int ssdgs__photo_alpha(const ssdgs_photo *photo, size_t pixel) {
+    return photo->format == SSDGS_PIXELS_RGBA8 ? 257 * ((const uint8_t *)photo->pixels)[4 * pixel + 3]
+                                               : ((const uint16_t *)photo->pixels)[4 * pixel + 3];
 }
 
 /* exp(w) as a matrix, and the left Jacobian; both by series where the angle is small. */
@@ -6222,6 +6231,75 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
     for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
 }
 
+typedef struct ssdgs__outlines_job {
+    const ssdgs_trainer *trainer;
+    const ssdgs_camera *cameras; /* of the photographs, as refined so far */
+    unsigned char *outside;      /* per Gaussian */
+} ssdgs__outlines_job;
+
+/* Whether a camera has a place in the picture: 0 no, 1 yes, 2 yes and its photograph is transparent there and around. */
+static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent, const ssdgs_real x[3]) {
+    const int reach = (camera->width + 127) / 128;
+    ssdgs_real t[3], u, v;
+    int c, i;
+    for (c = 0; c < 3; c++) {
+        const ssdgs_real *row = camera->view + 4 * c;
+        t[c] = row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3];
+    }
+    if (!(t[2] > 0)) return 0;
+    u = camera->fx * t[0] / t[2] + camera->cx;
+    v = camera->fy * t[1] / t[2] + camera->cy;
+    if (!(u >= 0 && v >= 0 && u < (ssdgs_real)camera->width && v < (ssdgs_real)camera->height)) return 0;
+    for (i = 0; i < 5 && transparent; i++) { /* the centre and beside it */
+        const int px = (int)u + (i == 1 ? reach : i == 2 ? -reach : 0), py = (int)v + (i == 3 ? reach : i == 4 ? -reach : 0);
+        if (px < 0 || py < 0 || px >= camera->width || py >= camera->height) continue;
+        if (ssdgs__photo_alpha(photo, (size_t)py * (size_t)camera->width + (size_t)px)) return 1;
+    }
+    return transparent ? 2 : 1;
+}
+
+static void ssdgs__outlines_task(void *data, int chunk) {
+    const ssdgs__outlines_job *job = (const ssdgs__outlines_job *)data;
+    const ssdgs_trainer *trainer = job->trainer;
+    const size_t n = (size_t)trainer->model->count, begin = (size_t)chunk * SSDGS__CHUNK;
+    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const ssdgs_real *position = trainer->model->gaussians + (size_t)SSDGS_POSITION * trainer->stride;
+    size_t i;
+    int photo;
+    for (i = begin; i < end; i++) {
+        const ssdgs_real x[3] = {position[i], position[trainer->stride + i], position[2 * trainer->stride + i]};
+        int seen = 0, outside = 0;
+        for (photo = 0; photo < trainer->photo_count; photo++) {
+            const int side = ssdgs__outline_side(trainer->photos + photo, job->cameras + photo, trainer->transparent[photo], x);
+            seen += side > 0;
+            outside += side == 2;
+        }
+        job->outside[i] = (ssdgs_real)outside > trainer->options.prune_outside * (ssdgs_real)seen;
+    }
+}
+
+/* Marks the Gaussians outside of the object's outlines. */
+static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char *outside) {
+    ssdgs_context *context = trainer->context;
+    ssdgs_camera *cameras;
+    ssdgs__outlines_job job;
+    int i;
+    memset(outside, 0, (size_t)trainer->model->count);
+    if (!(trainer->options.prune_outside > 0)) return SSDGS_OK;
+    cameras = (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
+    if (!cameras) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < trainer->photo_count; i++) {
+        ssdgs_light light;
+        ssdgs__correct(trainer->photos + i, trainer->corrections[i].value, cameras + i, &light);
+    }
+    job.trainer = trainer;
+    job.cameras = cameras;
+    job.outside = outside;
+    ssdgs__parallel(context, (trainer->model->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK, ssdgs__outlines_task, &job);
+    ssdgs__release(context, cameras);
+    return SSDGS_OK;
+}
+
 static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
@@ -6244,6 +6322,11 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     if (!candidates) return SSDGS_ERR_MEMORY;
     order = (uint64_t *)(void *)(candidates + 2 * n);
     drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
+    result = ssdgs__outlines(trainer, drop);
+    if (result) {
+        ssdgs__release(context, candidates);
+        return result;
+    }
     p = model->gaussians;
     for (i = 0; i < n; i++) {
         ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i], gradient, shadow;
@@ -6252,7 +6335,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
         }
-        drop[i] = p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size) ||
+        drop[i] = drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size) ||
                   (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
@@ -6357,6 +6440,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(densify_shadow, 0, most);
     SSDGS__RANGE(prune_opacity, (ssdgs_real)1e-30, (ssdgs_real)0.999);
     SSDGS__RANGE(prune_weight, 0, most);
+    SSDGS__RANGE(prune_outside, 0, 1);
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
@@ -6473,10 +6557,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
         size_t at;
         for (at = 0; at < pixels && !trainer->transparent[i]; at++)
-            trainer->transparent[i] = photos[i].format == SSDGS_PIXELS_RGBA8
-                ? ((const uint8_t *)photos[i].pixels)[4 * at + 3] < 255
-                                                                             : ((const uint16_t *)photos[i].pixels)[4 * at +
-                                                                                                                    3] < 65535;
+            trainer->transparent[i] = ssdgs__photo_alpha(photos + i, at) < 65535;
     }
     for (i = 0; i < photo_count; i++) {
         double centre[3];
@@ -7983,14 +8064,17 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     sum[6][v] = slot ? zero : w;
                     sum[7][v] = zero;
                     if (wide) VSTORE(weight[used] + v * SSDGS__VW, w);
-                    VUNROLL for (layer = 0; !wide && layer < layers; layer++) {
-                        VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
-                        sum[11 + 4 * layer][v] = zero;
+                    else {
+                        VUNROLL for (layer = 0; layer < layers; layer++) {
+                            VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
+                            sum[11 + 4 * layer][v] = zero;
+                        }
                     }
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
-                VUNROLL for (layer = 0; !wide && layer < layers; layer++)
+                if (wide) continue;
+                VUNROLL for (layer = 0; layer < layers; layer++)
                     F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer],
                             sum[11 + 4 * layer]);
             }

@@ -193,6 +193,7 @@ static void make_photos(void) {
     options.iterations = 40;
     options.initial_points = POINTS;
     options.max_gaussians = 300;
+    options.prune_outside = 1; /* looked for; none is in more than all photographs */
     options.densify_from = options.densify_every = DENSE;
     options.opacity_reset_every = 13;
     options.densify_gradient = (ssdgs_real)1e-4;

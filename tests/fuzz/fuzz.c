@@ -306,6 +306,7 @@ static ssdgs_train_options draw_options(input *in) {
     o.refine_camera = flags >> 1 & 1;
     o.refine_light = flags >> 2 & 1;
     if (flags & 8) o.normal_weight = (ssdgs_real)(flags & 16 ? 1e30 : 0);
+    if (flags & 32) o.prune_outside = (ssdgs_real)(flags & 64 ? 1 : 0);
     o.initial_points = draw_below(in, 40);
     o.max_gaussians = 1 + draw_below(in, 64);
     o.densify_every = 1 + draw_below(in, 4);
