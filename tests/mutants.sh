@@ -23,7 +23,7 @@ apply() {
             if (hash = index(name, "#")) { wanted = substr(name, hash + 1) + 0; name = substr(name, 1, hash - 1) }
         }
         $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
-        inside {
+        inside && arrow {
             for (at = 1; found = index(substr($0, at), old); at += found - 1 + length(put)) {
                 put = ++places == (wanted ? wanted : 1) ? new : old
                 $0 = substr($0, 1, at + found - 2) put substr($0, at + found - 1 + length(old))
