@@ -6285,7 +6285,7 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
     ssdgs__outlines_job job;
     int i;
     memset(outside, 0, (size_t)trainer->model->count);
-    if (!(trainer->options.prune_outside > 0)) return SSDGS_OK;
+    if (!(trainer->options.prune_outside > 0) || !memchr(trainer->transparent, 1, (size_t)trainer->photo_count)) return SSDGS_OK;
     cameras = (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
     if (!cameras) return SSDGS_ERR_MEMORY;
     for (i = 0; i < trainer->photo_count; i++) {
