@@ -607,7 +607,8 @@ typedef struct ssdgs_train_options {
     int schedule;              /* ssdgs_schedule; merged */
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
-    int initial_points;        /* random Gaussians when the model is empty; 10000 */
+    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops;
+                                  10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 500, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
@@ -627,7 +628,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
                                   its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
-    ssdgs_rate camera_rate, light_rate;
+    ssdgs_rate camera_rate, light_rate; /* for 300 shows of each photograph; with fewer, times the root of 300 / shows */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
@@ -6457,14 +6458,16 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
 }
 
 /* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
-   away from the centre; in the order of ssdgs__split. */
+   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const int n = o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians;
     double volume = 1;
     ssdgs_result result;
+    unsigned char *outside;
     uint64_t *order;
+    size_t kept = 0;
     int i, c;
     if (n < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points", n);
     result = ssdgs__trainer_grow(trainer, (size_t)n);
@@ -6493,12 +6496,18 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             for (c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
         }
     }
-    order = (uint64_t *)ssdgs__allocate(trainer->context, (size_t)n * (sizeof *order + sizeof(ssdgs_real)));
+    order = (uint64_t *)ssdgs__allocate(trainer->context, (size_t)n * (sizeof *order + sizeof(ssdgs_real) + 1));
     if (!order) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < n; i++) order[i] = (uint64_t)i;
-    ssdgs__reorder(trainer, order, (size_t)n, (ssdgs_real *)(order + n));
+    outside = (unsigned char *)((ssdgs_real *)(order + n) + n);
+    model->count = n;
+    result = ssdgs__outlines(trainer, outside);
+    if (!memchr(outside, 0, (size_t)n)) memset(outside, 0, (size_t)n); /* never none */
+    for (i = 0; i < n; i++)
+        if (!outside[i]) order[kept++] = (uint64_t)i;
+    if (!result) ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + n));
+    else model->count = 0;
     ssdgs__release(trainer->context, order);
-    return SSDGS_OK;
+    return result;
 }
 
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
@@ -6675,10 +6684,11 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
     if (!result) {
-        if (moves[0])
-            ssdgs__correction_step(correction, gradient, 0, ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
-        if (moves[1])
-            ssdgs__correction_step(correction, gradient, 1, ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
+        const double shows = (double)o->iterations / trainer->photo_count, wider = shows < 300 ? sqrt(300 / shows) : 1;
+        if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
+                                             wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
+        if (moves[1]) ssdgs__correction_step(correction, gradient, 1,
+                                             wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
     }
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;

@@ -695,7 +695,7 @@ static void test_refinement(void) {
     ssdgs_real background[3] = {0, 0, 0};
     ssdgs_photo disturbed[PHOTOS];
     ssdgs_metrics metrics;
-    double off[2][2] = {{0, 0}, {0, 0}}; /* before, after: cameras, lights */
+    double off[2][2] = {{0, 0}, {0, 0}}, first; /* before, after: cameras, lights */
     int i, c, p;
     settings.terms = SSDGS_DIFFUSE_TERM;
     settings.light_scale = (ssdgs_real)0.05;
@@ -725,7 +725,11 @@ static void test_refinement(void) {
     options.camera_rate.start = options.camera_rate.end = (ssdgs_real)2e-3;
     options.light_rate.start = options.light_rate.end = (ssdgs_real)2e-2;
     options.densify_until = 0;
-    CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer) && !ssdgs_trainer_run(trainer, NULL, NULL));
+    CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
+    for (i = 0; i < 31; i++) CHECK(!ssdgs_trainer_step(trainer, NULL)); /* the last moves a camera, at 5,000 of 60,000 */
+    for (p = 0, first = 0; p < PHOTOS; p++) first += fabs(trainer->corrections[p].value[0]);
+    CHECK(fabs(first / (2e-3 * 0.25 * sqrt(300.0 * PHOTOS / 360)) - 1) < 1e-3); /* Adam's first step is the rate, whatever it is of */
+    CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
     for (p = 0; p < PHOTOS; p++) {
         ssdgs_photo now;
         CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
@@ -952,9 +956,39 @@ static void test_prune_weight(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Gaussians outside of the outlines go, as a count over the photographs in double says; one a little transparent, one opaque. */
+enum { COLUMN = 15 }; /* of the second photograph of outlined(), a little less than transparent; the third is opaque */
+
+/* Whether a place is transparent in more than a share of the photographs that have it, counted in double; the first camera stands
+   aside. */
+static int outlined(const ssdgs_photo *shots, double aside, const double x[3], double share) {
+    int photo, c, seen = 0, outside = 0;
+    for (photo = 0; photo < PHOTOS; photo++) {
+        const ssdgs_camera *k = &shots[photo].camera;
+        double t[3], u, v;
+        int dx, dy, any = 0;
+        for (c = 0; c < 3; c++) {
+            t[c] = (double)k->view[4 * c + 3];
+            t[c] += (double)k->view[4 * c] * x[0] + (double)k->view[4 * c + 1] * x[1] + (double)k->view[4 * c + 2] * x[2];
+        }
+        if (photo == 0) t[0] += aside;
+        u = floor((double)k->fx * t[0] / t[2] + (double)k->cx);
+        v = floor((double)k->fy * t[1] / t[2] + (double)k->cy);
+        if (t[2] <= 0 || u < 0 || v < 0 || u >= SIDE || v >= SIDE) continue;
+        seen++;
+        for (dy = -1; dy <= 1; dy++)
+            for (dx = -1; dx <= 1; dx++) {
+                const double px = u + dx, py = v + dy, rx = (px + 0.5 - SIDE / 2) / (SIDE * 0.3), ry = (py + 0.5 - SIDE / 2) / (SIDE * 0.3);
+                if ((dx && dy) || px < 0 || py < 0 || px >= SIDE || py >= SIDE) continue;
+                any |= photo == 2 || rx * rx + ry * ry < 1 || (photo == 1 && (int)px == COLUMN);
+            }
+        outside += !any;
+    }
+    return share > 0 && outside > share * seen;
+}
+
+/* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs in double says. */
 static void test_prune_outside(void) {
-    enum { MANY = 400, COLUMN = 15 };
+    enum { MANY = 400 };
     static const double shares[3] = {0, 0.3, 0.6};
     static unsigned char veiled[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
     ssdgs_photo shots[PHOTOS];
@@ -970,6 +1004,8 @@ static void test_prune_outside(void) {
     shots[2].pixels = opaque;
     shots[3].camera.view[11] = -1; /* all but what is far off is behind it */
     options.densify_gradient = 1;
+    options.initial_points = MANY;
+    for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.8);
     CHECK(!ssdgs_context_create(NULL, &context));
     for (pass = 0; pass < 3; pass++) {
         unsigned char stays[MANY];
@@ -981,7 +1017,6 @@ static void test_prune_outside(void) {
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         trainer->corrections[0].value[0] = 0.2; /* as refined */
         for (i = 0; i < MANY; i++) {
-            int seen = 0, outside = 0;
             double x[3];
             for (c = 0; c < 3; c++) {
                 ssdgs_real *at = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity + i;
@@ -989,28 +1024,7 @@ static void test_prune_outside(void) {
                 x[c] = (double)*at;
             }
             model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
-            for (photo = 0; photo < PHOTOS; photo++) {
-                const ssdgs_camera *k = &shots[photo].camera;
-                double t[3], u, v;
-                int dx, dy, any = 0;
-                for (c = 0; c < 3; c++) {
-                    t[c] = (double)k->view[4 * c + 3];
-                    t[c] += (double)k->view[4 * c] * x[0] + (double)k->view[4 * c + 1] * x[1] + (double)k->view[4 * c + 2] * x[2];
-                }
-                if (photo == 0) t[0] += 0.2;
-                u = floor((double)k->fx * t[0] / t[2] + (double)k->cx);
-                v = floor((double)k->fy * t[1] / t[2] + (double)k->cy);
-                if (t[2] <= 0 || u < 0 || v < 0 || u >= SIDE || v >= SIDE) continue;
-                seen++;
-                for (dy = -1; dy <= 1; dy++)
-                    for (dx = -1; dx <= 1; dx++) {
-                        const double px = u + dx, py = v + dy, rx = (px + 0.5 - SIDE / 2) / (SIDE * 0.3), ry = (py + 0.5 - SIDE / 2) / (SIDE * 0.3);
-                        if ((dx && dy) || px < 0 || py < 0 || px >= SIDE || py >= SIDE) continue;
-                        any |= photo == 2 || rx * rx + ry * ry < 1 || (photo == 1 && (int)px == COLUMN);
-                    }
-                outside += !any;
-            }
-            stays[i] = !pass || outside <= shares[pass] * seen;
+            stays[i] = !outlined(shots, 0.2, x, shares[pass]);
             left += stays[i];
         }
         CHECK(pass ? left > MANY / 10 && left < 9 * MANY / 10 : left == MANY);
@@ -1020,6 +1034,32 @@ static void test_prune_outside(void) {
         for (i = 0; i < model->count; i++)
             unlike += !stays[(int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i]];
         CHECK(unlike == 0);
+        ssdgs_trainer_destroy(trainer);
+        for (i = left = 0; i < MANY; i++) { /* the random points that such a start draws */
+            double x[3];
+            for (c = 0; c < 3; c++) x[c] = 1.6 * ssdgs__uniform(options.seed, (uint64_t)(3 * i + c)) - 0.8;
+            left += !outlined(shots, 0, x, shares[pass]);
+        }
+        model->count = 0;
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == left);
+        CHECK(pass ? left > MANY / 20 && left < 19 * MANY / 20 : left == MANY);
+        for (i = unlike = 0; i < model->count; i++) {
+            double x[3];
+            for (c = 0; c < 3; c++) x[c] = (double)model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i];
+            unlike += outlined(shots, 0, x, shares[pass]);
+        }
+        CHECK(unlike == 0);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    { /* where all of it is outside nothing is left out */
+        static unsigned char clear[SIDE * SIDE * 4];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
+        for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
