@@ -607,8 +607,8 @@ typedef struct ssdgs_train_options {
     int schedule;              /* ssdgs_schedule; merged */
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
-    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops;
-                                  10000 */
+    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops, unless
+                                  these are seven in eight: then others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 500, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
@@ -6457,34 +6457,67 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     return SSDGS_OK;
 }
 
+/* A random place in the bounds, and where it lies between them. */
+static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, double u[3], ssdgs_real x[3]) {
+    int c;
+    for (c = 0; c < 3; c++) {
+        u[c] = ssdgs__uniform(o->seed, 3 * draw + (uint64_t)c);
+        x[c] = (ssdgs_real)((double)o->bounds_min[c] + u[c] * ((double)o->bounds_max[c] - (double)o->bounds_min[c]));
+    }
+}
+
 /* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
-   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out. */
+   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where hardly any
+   would be left others are drawn. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
+    enum { ROUNDS = 16, LEAST = 8 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    const int n = o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians;
-    double volume = 1;
+    const size_t n = (size_t)(o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians);
+    double volume = 1, u[3];
+    ssdgs_real x[3];
     ssdgs_result result;
     unsigned char *outside;
-    uint64_t *order;
-    size_t kept = 0;
-    int i, c;
-    if (n < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points", n);
-    result = ssdgs__trainer_grow(trainer, (size_t)n);
+    uint64_t *draws;
+    size_t stride, kept = 0, i;
+    int round, c;
+    if (o->initial_points < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points",
+            o->initial_points);
+    result = ssdgs__trainer_grow(trainer, n);
     if (result) return result;
+    draws = (uint64_t *)ssdgs__allocate(trainer->context, n * (sizeof *draws + sizeof(ssdgs_real) + 1));
+    if (!draws) return SSDGS_ERR_MEMORY;
+    outside = (unsigned char *)((ssdgs_real *)(draws + n) + n);
+    stride = model->capacity;
+    for (round = 0; round < ROUNDS && kept <= n / LEAST && !result; round++) {
+        for (i = kept; i < n; i++) {
+            draws[i] = (uint64_t)round * n + i;
+            ssdgs__draw_place(o, draws[i], u, x);
+            for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_POSITION + c) * stride + i] = x[c];
+        }
+        model->count = (int)n;
+        result = ssdgs__outlines(trainer, outside);
+        for (i = kept; i < n; i++)
+            if (!outside[i]) {
+                ssdgs__copy_gaussian(model->gaussians, stride, kept, i);
+                draws[kept++] = draws[i];
+            }
+    }
+    if (!kept) { /* never none */
+        kept = n;
+        round = 1;
+    }
     for (c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
-    trainer->start_size = 1.1576 * 0.62035 * pow(volume / n, 1.0 / 3);
-    for (i = 0; i < n; i++) {
+    trainer->start_size = 1.1576 * 0.62035 * pow(volume / ((double)n * round), 1.0 / 3);
+    for (i = 0; i < kept; i++) {
         ssdgs_real *g = model->gaussians + i;
-        const size_t stride = model->capacity;
         double away[3], length = 0;
-        ssdgs__gaussian_reset(model->gaussians, stride, (size_t)i);
+        ssdgs__gaussian_reset(model->gaussians, stride, i);
+        ssdgs__draw_place(o, draws[i], u, x);
         for (c = 0; c < 3; c++) {
-            const double u = ssdgs__uniform(o->seed, (uint64_t)(3 * (int64_t)i + c)),
-                size = (double)o->bounds_max[c] - (double)o->bounds_min[c];
-            g[(size_t)(SSDGS_POSITION + c) * stride] = (ssdgs_real)((double)o->bounds_min[c] + u * size);
+            g[(size_t)(SSDGS_POSITION + c) * stride] = x[c];
             g[(size_t)(SSDGS_LOG_SCALE + c) * stride] = (ssdgs_real)log(trainer->start_size);
-            away[c] = (u - 0.5) * size;
+            away[c] = (u[c] - 0.5) * ((double)o->bounds_max[c] - (double)o->bounds_min[c]);
             length += away[c] * away[c];
         }
         length = sqrt(length);
@@ -6496,17 +6529,10 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             for (c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
         }
     }
-    order = (uint64_t *)ssdgs__allocate(trainer->context, (size_t)n * (sizeof *order + sizeof(ssdgs_real) + 1));
-    if (!order) return SSDGS_ERR_MEMORY;
-    outside = (unsigned char *)((ssdgs_real *)(order + n) + n);
-    model->count = n;
-    result = ssdgs__outlines(trainer, outside);
-    if (!memchr(outside, 0, (size_t)n)) memset(outside, 0, (size_t)n); /* never none */
-    for (i = 0; i < n; i++)
-        if (!outside[i]) order[kept++] = (uint64_t)i;
-    if (!result) ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + n));
+    for (i = 0; i < kept; i++) draws[i] = i;
+    if (!result) ssdgs__reorder(trainer, draws, kept, (ssdgs_real *)(draws + n));
     else model->count = 0;
-    ssdgs__release(trainer->context, order);
+    ssdgs__release(trainer->context, draws);
     return result;
 }
 

@@ -989,7 +989,7 @@ static int outlined(const ssdgs_photo *shots, double aside, const double x[3], d
 /* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs in double says. */
 static void test_prune_outside(void) {
     enum { MANY = 400 };
-    static const double shares[3] = {0, 0.3, 0.6};
+    static const double shares[4] = {0, 0.3, 0.6, 0.01}, centre[4] = {0, 0, 0, 0.35}, half[4] = {0.8, 0.8, 0.8, 0.15};
     static unsigned char veiled[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
     ssdgs_photo shots[PHOTOS];
     ssdgs_train_options options = short_run(100);
@@ -1005,13 +1005,13 @@ static void test_prune_outside(void) {
     shots[3].camera.view[11] = -1; /* all but what is far off is behind it */
     options.densify_gradient = 1;
     options.initial_points = MANY;
-    for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.8);
     CHECK(!ssdgs_context_create(NULL, &context));
-    for (pass = 0; pass < 3; pass++) {
+    for (pass = 0; pass < 4; pass++) {
         unsigned char stays[MANY];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        int left = 0, unlike = 0;
+        double starts[MANY][3];
+        int left = 0, unlike = 0, rounds;
         options.prune_outside = (ssdgs_real)shares[pass];
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
@@ -1035,18 +1035,31 @@ static void test_prune_outside(void) {
             unlike += !stays[(int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i]];
         CHECK(unlike == 0);
         ssdgs_trainer_destroy(trainer);
-        for (i = left = 0; i < MANY; i++) { /* the random points that such a start draws */
-            double x[3];
-            for (c = 0; c < 3; c++) x[c] = 1.6 * ssdgs__uniform(options.seed, (uint64_t)(3 * i + c)) - 0.8;
-            left += !outlined(shots, 0, x, shares[pass]);
-        }
+        for (left = rounds = 0; left <= MANY / 8; rounds++) /* the places that such a start draws */
+            for (i = left; i < MANY; i++) {
+                for (c = 0; c < 3; c++)
+                    starts[left][c] = centre[pass] + half[pass] * (2 * ssdgs__uniform(options.seed, (uint64_t)(3 * (rounds * MANY + i) + c)) - 1);
+                left += !outlined(shots, 0, starts[left], shares[pass]);
+            }
+        CHECK(pass < 3 ? rounds == 1 : rounds > 1);
         model->count = 0;
+        for (c = 0; c < 3; c++) {
+            options.bounds_min[c] = (ssdgs_real)(centre[pass] - half[pass]);
+            options.bounds_max[c] = (ssdgs_real)(centre[pass] + half[pass]);
+        }
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == left);
-        CHECK(pass ? left > MANY / 20 && left < 19 * MANY / 20 : left == MANY);
-        for (i = unlike = 0; i < model->count; i++) {
-            double x[3];
-            for (c = 0; c < 3; c++) x[c] = (double)model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i];
-            unlike += outlined(shots, 0, x, shares[pass]);
+        for (i = unlike = 0; i < left; i++) {
+            const ssdgs_real *const p = model->gaussians, expected = (ssdgs_real)(2 * half[pass] * pow(MANY * rounds, -1.0 / 3));
+            int j, found = 0;
+            for (j = 0; j < model->count; j++) {
+                double d2 = 0;
+                for (c = 0; c < 3; c++) {
+                    const double d = (double)p[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)j] - starts[i][c];
+                    d2 += d * d;
+                }
+                found += d2 < 1e-10;
+            }
+            unlike += found != 1 || fabs(exp((double)p[SSDGS_LOG_SCALE * model->capacity + (size_t)i]) / (double)expected - 0.71812) > 1e-4;
         }
         CHECK(unlike == 0);
         ssdgs_trainer_destroy(trainer);
@@ -1054,12 +1067,14 @@ static void test_prune_outside(void) {
     }
     { /* where all of it is outside nothing is left out */
         static unsigned char clear[SIDE * SIDE * 4];
+        const double size = 0.71812 * 0.4 * pow(MANY, -1.0 / 3);
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
         for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
+        CHECK(fabs(exp((double)model->gaussians[SSDGS_LOG_SCALE * model->capacity]) / size - 1) < 1e-4);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
