@@ -101,11 +101,9 @@ show() {
     done
 }
 
-default_configuration() {
-    details default
-    printf '\nPublished configuration (`--preset published`)\n'
-    details published --preset published
-}
+default_configuration() { details default; }
+
+published_configuration() { details published --preset published; }
 
 components() {
     head_line 'terms' paper
@@ -230,6 +228,7 @@ training. The paper's figures are means over its 8 scenes with 60,000 to 100,000
 with other seeds differ by 0.1 to 0.3 dB.
 TEXT
     part default_configuration 'Default configuration'
+    part published_configuration 'Published configuration (--preset published)'
     part components 'Reflectance components (Tables 2 and 4)'
     part schedules 'Training schedules (Tables 2 and 4)'
     part shadow_on_scattering 'Shadow also on scattering (eq. 14, Table 5)'
