@@ -610,7 +610,7 @@ typedef struct ssdgs_train_options {
     int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops, unless
                                   these are seven in eight: then others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
-    int densify_every, densify_from, densify_until; /* 100, 500, 50000* */
+    int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
     int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
     ssdgs_real background[3];  /* stored values */
@@ -5644,7 +5644,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     }
     o.max_gaussians = 100000;
     o.densify_every = 100;
-    o.densify_from = 500;
+    o.densify_from = 200;
     o.densify_until = 50000;
     o.opacity_reset_every = 3000;
     o.densify_gradient = (ssdgs_real)4e-4;
@@ -5674,6 +5674,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     ssdgs_train_options o = ssdgs_train_options_default();
     o.iterations = 60000;
     o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
+    o.densify_from = 500;
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
