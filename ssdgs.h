@@ -607,8 +607,8 @@ typedef struct ssdgs_train_options {
     int schedule;              /* ssdgs_schedule; merged */
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
-    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops, unless
-                                  these are seven in eight: then others are drawn; 10000 */
+    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops; where
+                                  these are seven in eight others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
@@ -6499,10 +6499,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
         model->count = (int)n;
         result = ssdgs__outlines(trainer, outside);
         for (i = kept; i < n; i++)
-            if (!outside[i]) {
-                ssdgs__copy_gaussian(model->gaussians, stride, kept, i);
-                draws[kept++] = draws[i];
-            }
+            if (!outside[i]) draws[kept++] = draws[i];
     }
     if (!kept) { /* never none */
         kept = n;
