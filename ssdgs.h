@@ -608,7 +608,7 @@ typedef struct ssdgs_train_options {
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
     int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops; where
-                                  these are seven in eight others are drawn; 10000 */
+                                  these are three in four others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
@@ -6471,7 +6471,7 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
    away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where hardly any
    would be left others are drawn. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
-    enum { ROUNDS = 16, LEAST = 8 }; /* more than one in so many is left, or so many rounds are drawn */
+    enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)(o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians);
