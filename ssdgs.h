@@ -608,7 +608,7 @@ typedef struct ssdgs_train_options {
     int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
                                   pass for a dark background; 0: on `background` */
     int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops; where
-                                  these are three in four others are drawn; 10000 */
+                                  these are three in four or more others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
     int opacity_reset_every;   /* 3000; 0 = never */
@@ -6468,7 +6468,7 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
 }
 
 /* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
-   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where hardly any
+   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where few
    would be left others are drawn. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
