@@ -1,6 +1,6 @@
 #!/bin/sh
 # sh tests/figures.sh BUILD FUZZ_SECONDS FUZZ_TARGET...: runs the tests at their longest and writes BUILD/figures/FIGURES.md and
-# BUILD/figures.json from what they print ("figure KEY VALUE", "row NN passed|failed NAME"). Hours; a part whose log is there
+# BUILD/figures.json from what they print ("figure KEY VALUE", "row ROW,ROW passed|failed NAME"). Hours; a part whose log is there
 # already is not repeated: delete it to have it again. With - for FUZZ_SECONDS nothing is run: what has no log stays as
 # tests/FIGURES.md has it, with the commit it was measured at. What the machine lacks (clang's libFuzzer, gcov) is left out and named.
 set -u
@@ -33,9 +33,10 @@ part() {
     printf '\n## %s\n\n`%s`\n' "$title" "$(sed -n 's/^command //p' "$log" | sed 1q)"
     # rows of the catalogue, then figures
     awk '
-        /^row [0-9]+ (passed|failed) / {
+        /^row [0-9,]+ (passed|failed) / {
             if (!rows++) printf "\n| row | | |\n| --- | --- | --- |\n"
-            what = $0; sub(/^row [0-9]+ [a-z]+ /, "", what)
+            what = $0; sub(/^row [0-9,]+ [a-z]+ /, "", what)
+            gsub(/,/, ", ", $2)
             printf "| %s | %s | %s |\n", $2, what, $3
         }
         /^figure / { key[++n] = $2; value[n] = $3 }
@@ -61,12 +62,6 @@ absent() { printf '\n## %s\n\nNot measured: %s is missing.\n' "$1" "$2"; }
 
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
 {
-    cat <<TEXT
-# Figures
-
-Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q). Rows are those of the stress
-catalogue; every program's first comment says what it measures and against what.
-TEXT
     part golden 'Golden values and gradients, float' "$build/t_golden"
     part golden_64 'The same sources in double' "$build/t_golden_64"
     part accuracy 'Elementary and shading functions' "$build/t_accuracy" full
@@ -75,6 +70,8 @@ TEXT
     part stress 'Stress: geometry, rasteriser, light, shading' "$build/t_stress"
     part soak 'Stress: training, determinism' "$build/t_soak" full
     part faults 'Faults and hostile files' "$build/t_faults" full
+    part olat 'Images, JSON and datasets' "$build/t_olat"
+    part ply 'Model files' "$build/t_ply"
     part mutants 'Mutants of the backward passes' sh tests/mutants.sh "$build/mutants"
     if [ "$seconds" = - ] || [ -x "$build/fuzzers/all" ]; then
         for target in $targets; do
@@ -85,6 +82,34 @@ TEXT
         part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
     else absent Coverage gcov; fi
     part matrix 'Compilers and machines' sh tests/matrix.sh "$build"
+} >"$out/parts"
+
+# The catalogue's 86 rows: how many held wherever they are tested, how many are tested, which are not.
+set -- $(awk -F ' *[|] *' '
+    NF == 5 && $2 ~ /^[0-9, ]+$/ && $4 ~ /^(passed|failed)$/ {
+        n = split($2, row, ", ")
+        for (i = 1; i <= n; i++) { seen[row[i] + 0] = 1; if ($4 == "failed") bad[row[i] + 0] = 1 }
+    }
+    END {
+        for (i = 1; i <= 86; i++)
+            if (i in seen) { total++; passed += !(i in bad) } else without = without (without ? "," : "") i
+        print passed + 0, total + 0, without ? without : "none"
+    }' "$out/parts")
+{
+    cat <<TEXT
+# Figures
+
+Made by \`make figures\` on ${cpu:-an unknown CPU}, $(${CC:-cc} --version 2>/dev/null | sed 1q). Every program's first
+comment says what it measures and against what.
+
+Rows are those of the stress catalogue, 86; without a test: $3.
+
+| figure | |
+| --- | --- |
+| stress_rows_passed | $1 |
+| stress_rows_total | $2 |
+TEXT
+    cat "$out/parts"
 } >"$out/FIGURES.md"
 
 # The same figures; of a key that stands in several tables, the sum.

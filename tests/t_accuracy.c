@@ -868,16 +868,14 @@ int main(int argc, char **argv) {
     test_encode();
 #endif
     (void)argc, (void)argv;
-    test_dipole_total();
-    test_dipole_units();
-    test_dipole_points();
+    TEST_ROW("43", "dipole: total reflectance, units", (test_dipole_total(), test_dipole_units()));
+    TEST_ROW("42", "dipole: media, distances and eta at their ends", (test_dipole_points(), test_eta()));
     test_half_space();
-    test_eta();
     test_asg_points();
     test_asg_integral();
-    test_asg_poles();
-    test_fresnel();
-    test_asg_extremes();
+    TEST_ROW("38", "ASG at its poles", test_asg_poles());
+    TEST_ROW("40", "Fresnel from 0.04 to 1", test_fresnel());
+    TEST_ROW("39", "ASG of extreme sharpness", test_asg_extremes());
     TEST_END();
 }
 #endif

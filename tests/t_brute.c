@@ -1322,20 +1322,18 @@ static void test_normals(void) {
 int main(int argc, char **argv) {
     const int full = argc > 1 && !strcmp(argv[1], "full");
     make_contexts();
-    test_camera(full ? 10000 : 1000);
+    TEST_ROW("30", "every pixel against every Gaussian", test_camera(full ? 10000 : 1000));
     test_light(full ? 40 : 4);
     test_shadow_error(200);
-    test_unity();
-    test_permutation();
-    test_coincident();
-    test_layers();
-    test_gap();
+    TEST_ROW("24", "weights add up to one", test_unity());
+    TEST_ROW("23", "order of the Gaussians", test_permutation());
+    TEST_ROW("25", "coincident Gaussians", test_coincident());
+    TEST_ROW("45", "slabs, gaps, added occluders", (test_layers(), test_gap(), test_occluder()));
     test_no_map();
-    test_occluder();
-    test_crop();
-    test_similarity();
+    TEST_ROW("3", "images of one pixel, row, column; crops", test_crop());
+    TEST_ROW("21,22", "scaled, moved, turned scenes", test_similarity());
     test_projection();
-    test_conic(full ? 1 : 10);
+    TEST_ROW("8,9", "conics of needles and giants", test_conic(full ? 1 : 10));
     test_normals();
     TEST_END();
 }

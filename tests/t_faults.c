@@ -1173,16 +1173,14 @@ int main(int argc, char **argv) {
         files_with(".tmp.", 1);
     }
 #endif
-    test_memory();
-    test_checkpoints();
-    test_damaged_models();
-    test_hostile_headers();
-    test_proportion();
+    TEST_ROW("83", "allocations that fail", test_memory());
+    TEST_ROW("85", "damaged, foreign, newer checkpoints", test_checkpoints());
+    TEST_ROW("80", "damaged models, hostile headers", (test_damaged_models(), test_hostile_headers(), test_proportion()));
 #ifndef _WIN32
     test_datasets();
-    test_disk();
-    test_odd_files();
-    test_kills();
+    TEST_ROW("84", "disks that fail at every byte", test_disk());
+    TEST_ROW("79,86", "no files, and files that change while read", test_odd_files());
+    TEST_ROW("65", "killed at any moment", test_kills());
     files_with("", 1);
     rmdir(FOLDER);
     printf("figure io_fault_points %ld\n", io_points);

@@ -544,5 +544,6 @@ int main(void) {
         run(&s);
     }
     ssdgs_context_destroy(context);
+    test_row(0, "53", "gradients of every group under every option");
     TEST_END();
 }

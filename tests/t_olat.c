@@ -282,11 +282,11 @@ static const unsigned char dynamic_png[] = {
     144, 227, 129, 15, 25, 167, 127, 145, 32, 66, 133, 78, 150, 100, 227, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130
 };
 
-static void test_dynamic(void) {
+static void check_dynamic(const unsigned char *bytes, size_t size) {
     int width, height, x, y, wrong = 0;
     ssdgs_pixels format;
     void *pixels;
-    if (!CHECK(!olat_decode_png(dynamic_png, sizeof dynamic_png, &width, &height, &format, &pixels, error))) return;
+    if (!CHECK(!olat_decode_png(bytes, size, &width, &height, &format, &pixels, error))) return;
     for (y = 0; y < height; y++) {
         for (x = 0; x < width; x++) {
             const unsigned char *p = (const unsigned char *)pixels + 4 * (y * width + x);
@@ -297,8 +297,25 @@ static void test_dynamic(void) {
     CHECK(width == 20 && height == 12 && !wrong);
 }
 
+static void test_dynamic(void) { check_dynamic(dynamic_png, sizeof dynamic_png); }
+
+/* A chunk for every byte of the data and empty ones between, a text that would unpack to gigabytes, bytes after the end. */
+static void test_splits(void) {
+    static const unsigned char bomb[11] = {'a', 0, 0, 0x78, 0xDA, 0xEC, 0xC1, 1, 1, 0, 0};
+    const size_t idat = 33, length = olat__be32(dynamic_png + idat);
+    size_t i;
+    memcpy(file, dynamic_png, file_size = idat);
+    put_chunk("zTXt", bomb, sizeof bomb);
+    for (i = 0; i < length; i++) put_chunk("IDAT", dynamic_png + idat + 8 + i, 1), put_chunk("IDAT", NULL, 0);
+    put_chunk("iCCP", bomb, sizeof bomb);
+    CHECK(refused_with("ends early"));
+    put_chunk("IEND", NULL, 0);
+    check_dynamic(file, file_size);
+    put_chunk("IDAT", dynamic_png + idat + 8, 1);
+    check_dynamic(file, file_size);
+}
+
 static void test_damage(void) {
-    static const unsigned char changes[4] = {1, 0x20, 0x80, 0xFF};
     picture p = {5, 4, 3, 4, 1, 1};
     size_t i, idat = 33, length = olat__be32(dynamic_png + idat);
     int which, k, wrong;
@@ -307,10 +324,10 @@ static void test_damage(void) {
         else memcpy(file, dynamic_png, file_size = sizeof dynamic_png);
         for (i = 0; i < file_size; i++) CHECK(refused(file, i) == 1);
         for (i = 0, wrong = 0; i < file_size; i++) {
-            for (k = 0; k < 4; k++) {
-                file[i] ^= changes[k];
+            for (k = 1; k < 256; k++) {
+                file[i] ^= (unsigned char)k;
                 wrong |= refused(file, file_size) == 0;
-                file[i] ^= changes[k];
+                file[i] ^= (unsigned char)k;
             }
             CHECK(!wrong);
         }
@@ -873,17 +890,16 @@ int main(void) {
     mkdir("build", 0777);
     mkdir(FOLDER, 0777);
     mkdir(FOLDER "/dir.png", 0777);
-    test_kinds();
-    test_dynamic();
-    test_damage();
-    test_streams();
-    test_chunks();
+    TEST_ROW("70", "PNG of every kind", (test_kinds(), test_dynamic()));
+    TEST_ROW("74", "every byte of a PNG changed, every truncation", test_damage());
+    TEST_ROW("75", "streams that deflate forbids", test_streams());
+    TEST_ROW("72,73", "PNG's chunks, sizes and ends", (test_chunks(), test_splits()));
     test_writer();
-    test_json();
-    test_numbers();
-    test_datasets();
+    TEST_ROW("76", "JSON good and bad", test_json());
+    TEST_ROW("77", "numbers, correctly rounded", test_numbers());
+    TEST_ROW("78,79", "datasets and paths, good and bad", test_datasets());
     test_saving();
-    test_memory();
+    TEST_ROW("83", "allocations that fail", test_memory());
     test_views();
     test_cow();
     TEST_END();

@@ -5,21 +5,13 @@
 #endif
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
-#include <stdio.h>
+#include "test.h"
 #ifndef _WIN32
 #include <dirent.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #endif
-
-static int passed, failed;
-
-static void check(int good, int line, const char *what) {
-    if (good) passed++;
-    else if (failed++ < 20) printf("t_ply.c:%d: failed: %s\n", line, what);
-}
-#define CHECK(condition) check((condition) != 0, __LINE__, #condition)
 
 /* ---- memory that counts and fails on demand ---- */
 
@@ -695,16 +687,13 @@ int main(void) {
 #endif
     if (ssdgs_context_create(&desc, &context) != SSDGS_OK) return 1;
     test_round_trip();
-    test_variants();
-    test_foreign();
-    test_mending();
+    TEST_ROW("81", "every variant of PLY", test_variants());
+    TEST_ROW("82", "other tools' files", (test_foreign(), test_mending()));
     test_numbers();
-    test_hostile();
-    test_damage();
-    test_memory();
-    test_disk();
+    TEST_ROW("80", "hostile headers, damaged bodies", (test_hostile(), test_damage()));
+    TEST_ROW("83", "allocations that fail", test_memory());
+    TEST_ROW("84", "disks that fail", test_disk());
     ssdgs_context_destroy(context);
     CHECK(memory.live == 0);
-    printf("%d passed, %d failed\n", passed, failed);
-    return failed != 0;
+    TEST_END();
 }

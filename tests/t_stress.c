@@ -1309,7 +1309,7 @@ enum { ROWS = sizeof rows / sizeof *rows };
 int main(int count, char **argument) {
     const int only = count > 1 ? atoi(argument[1]) : 0; /* a row's number; none: all */
     ssdgs_context_desc desc;
-    int isa, eight, r, ran = 0, passed = 0, total = 0;
+    int isa, eight, r, ran = 0;
     memset(&desc, 0, sizeof desc);
     desc.allocator.allocate = metered;
     desc.allocator.release = released;
@@ -1336,12 +1336,11 @@ int main(int count, char **argument) {
             CHECK(held == 0);
         }
     for (r = 0; r < ROWS; r++) {
+        char number[16];
         if (only && rows[r].number != only) continue;
-        total++;
-        printf("row %02d %s %s\n", rows[r].number, rows[r].bad ? "failed" : "passed", rows[r].name);
-        passed += !rows[r].bad;
+        snprintf(number, sizeof number, "%d", rows[r].number);
+        test_row(test_failed - rows[r].bad, number, rows[r].name);
     }
-    printf("figure stress_rows_passed %d\nfigure stress_rows_total %d\n", passed, total);
     if (bytes_behind > 0) printf("figure stress_bytes_per_gaussian_behind_camera %.0f\n", bytes_behind);
     if (cube_spread > 0) printf("figure stress_light_cube_mean_spread %.4f\n", cube_spread);
     TEST_END();

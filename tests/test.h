@@ -1,5 +1,5 @@
 /* The tests' tools: checks that count, and the reader of .gold files. Each program closes with "N passed, N failed"; lines
-   "figure KEY VALUE" before that are for `make figures`. */
+   "figure KEY VALUE" and "row ROW,ROW passed|failed NAME", of the stress catalogue, before that are for `make figures`. */
 #ifndef SSDGS_TEST_H
 #define SSDGS_TEST_H
 #include <math.h>
@@ -70,6 +70,20 @@ static inline int test_l2(double error, double norm, double relative)
         if (!test_check(test_count > 0 && test_l2(test_sum, test_norm, relative), __FILE__, __LINE__, name))           \
             printf("    relative error %.3g over %lu values, norm %.3g\n", sqrt(test_sum / (test_norm + 1e-300)),      \
                    (unsigned long)test_count, sqrt(test_norm));                                                        \
+    } while (0)
+
+/* How rows of the stress catalogue fared: their test's checks, those after test_failed was at before. */
+static inline void test_row(int before, const char *rows, const char *name)
+{
+    printf("row %s %s %s\n", rows, test_failed == before ? "passed" : "failed", name);
+}
+
+/* Runs their test. */
+#define TEST_ROW(rows, name, test)                                                                                     \
+    do {                                                                                                               \
+        const int test_before = test_failed;                                                                           \
+        test;                                                                                                          \
+        test_row(test_before, rows, name);                                                                             \
     } while (0)
 
 #define TEST_END()                                                                                                     \
