@@ -64,7 +64,8 @@ DO THIS
     }
 --- end ---
 
-  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole.
+  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole, but
+  terms that the schedule had not reached (stats->terms; all are there after a twelfth of a run) are untrained: render without.
 
 WHAT IT COMPUTES
   Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one colour C each:
@@ -124,7 +125,7 @@ CONVENTIONS
 
 OPTIONS, macros defined before the header; those with * the same way in every file that includes it
   SSDGS_IMPLEMENTATION   not set      in one file: the code
-  SSDGS_STATIC *         not set      every function is static: a private copy, in a file that has the implementation
+  SSDGS_STATIC           not set      every function is static: a private copy, in a file that has the implementation
   SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
   SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
   SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo
@@ -597,9 +598,10 @@ typedef enum ssdgs_schedule { /* the paper's orders H to K */
     SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
 } ssdgs_schedule;
 
-typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rate, first and last */
+typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rate, first and last; between, by equal factors, to or
+                                                                    from 0 by equal steps */
 
-/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations`. */
+/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations` below that. */
 typedef struct ssdgs_train_options {
     int version;               /* stamped by ssdgs_train_options_default / _published */
     int iterations;            /* 20000 */
@@ -628,7 +630,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
                                   its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
-    ssdgs_rate camera_rate, light_rate; /* for 300 shows of each photograph; with fewer, times the root of 300 / shows */
+    ssdgs_rate camera_rate, light_rate; /* of the bounds' longest side, radians; for 300 shows of each photograph; with fewer, times
+                                           the root of 300 / shows */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
@@ -638,6 +641,7 @@ typedef struct ssdgs_train_stats {
     int iteration;        /* done so far */
     int gaussians;
     int shaded;           /* in this step */
+    int terms;            /* of this step, SSDGS_*_TERM: the schedule's so far; what is still to come is untrained */
     int skipped_steps;    /* refused for non-finite gradients, so far */
     double loss, psnr;    /* of this step's image */
 } ssdgs_train_stats;
@@ -646,25 +650,27 @@ typedef struct ssdgs_train_stats {
 typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
 /* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians starts from
-   random points and is given light_scale, centre and length_unit; one that has Gaussians keeps all it has.
+   random points and is given light_scale, centre, length_unit and new networks; one that has Gaussians keeps all it has, but
+   the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. One trainer at a time grows a model.
    options NULL = default. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
 /* One iteration. A step with non-finite gradients changes nothing, is counted and returns SSDGS_ERR_NONFINITE. One that runs
-   out of memory changes nothing and can be tried again; where only its density control does, it is done without. */
+   out of memory changes nothing and can be tried again; where only its density control does, it is done without, as
+   stats->iteration says beside SSDGS_ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
 /* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are skipped, ten in a
    row end the run. */
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
 /* The training camera and light of photo index as refined so far. */
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light);
-/* About how many bytes a run will hold at max_gaussians, the photographs not counted. */
+/* About how many bytes a run will hold at max_gaussians, the photographs not counted; 0 for what would be refused. */
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height);
 
 #ifndef SSDGS_NO_STDIO
-/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings.
-   ERR_NONFINITE as on saving a model. */
+/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings: others are
+   refused, but for the photos' pixels, which are not looked at. ERR_NONFINITE as on saving a model. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 #endif
@@ -908,6 +914,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #ifndef WIN32_LEAN_AND_MEAN
 #define WIN32_LEAN_AND_MEAN
 #endif
+#ifndef NOMINMAX
+#define NOMINMAX
+#endif
 #include <windows.h>
 #elif !defined(SSDGS_NO_THREADS)
 #include <pthread.h>
@@ -937,6 +946,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
+#define SSDGS__MOST_LIGHT ((ssdgs_real)1e30) /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
 #define SSDGS__FALLS 3       /* levels of transmittance whose distances a light's map holds, before what is left behind all */
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
@@ -1177,6 +1187,8 @@ struct ssdgs_context {
     struct ssdgs__frame_memory *frame; /* reused by every render on this context */
     int isa, threads, bf16;
     uint64_t revisions; /* handed out to models */
+    const char *subject; /* what is being checked, for messages: a file's name, or the one of several things with its number */
+    int subject_number; /* -1: it has none */
     char message[SSDGS__MESSAGE];
 };
 
@@ -1194,10 +1206,17 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
         ssdgs__append(text, at, "-");
         value = -value;
     }
-    if (!(value < 9e15)) {
-        memcpy(&whole, &value, sizeof whole);
-        rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF), whole = UINT64_C(0x7FF0000000000000);
-        ssdgs__append(text, at, rest > whole ? "NaN" : rest == whole ? "infinite" : "huge");
+    memcpy(&whole, &value, sizeof whole);
+    rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF), whole = UINT64_C(0x7FF0000000000000);
+    if (rest >= whole) {
+        ssdgs__append(text, at, rest > whole ? "NaN" : "infinite");
+        return;
+    }
+    if (rest && (value < 1e-6 || value >= 1e15)) {
+        const double exponent = floor(log10(value));
+        ssdgs__append_number(text, at, value / pow(10, exponent));
+        ssdgs__append(text, at, "e");
+        ssdgs__append_number(text, at, exponent);
         return;
     }
     whole = (uint64_t)value;
@@ -1223,12 +1242,19 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
     ssdgs__append(text, at, digits + n);
 }
 
-/* Records what went wrong (%s, %d int, %z size_t, %g double), tells the log, returns the code. */
+/* Records what went wrong (%s, %d int, %z size_t, %g double), tells the log, returns the code; without a context, that alone. */
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
     va_list arguments;
+    if (!context) return code;
     va_start(arguments, format);
     context->message[0] = 0;
+    if (context->subject) {
+        ssdgs__append(context->message, &at, context->subject);
+        if (context->subject_number >= 0) ssdgs__append(context->message, &at, " ");
+        if (context->subject_number >= 0) ssdgs__append_number(context->message, &at, context->subject_number);
+        ssdgs__append(context->message, &at, ": ");
+    }
     for (; *format; format++) {
         char one[2];
         one[0] = *format;
@@ -1767,7 +1793,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(pixel_variance, (ssdgs_real)0.01, 10);
     SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
     SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
-    SSDGS__RANGE(light_scale, 0, (ssdgs_real)1e30);
+    SSDGS__RANGE(light_scale, 0, SSDGS__MOST_LIGHT);
     SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
@@ -2166,9 +2192,12 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
 
 static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
     int i, j;
-    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d lights", light_count);
+    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
     for (i = 0; i < light_count; i++) {
         double norm2 = 0;
+        if (lights[i].kind != SSDGS_LIGHT_POINT && lights[i].kind != SSDGS_LIGHT_DIRECTIONAL)
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
         for (j = 0; j < 3; j++) {
             if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                     "light %d: its position is not finite", i);
@@ -4406,7 +4435,6 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
 
 typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
 
-
 typedef struct ssdgs__loss_job {
     const ssdgs__kernels *k;
     const ssdgs_real *image, *target; /* (3, h, w) */
@@ -4700,7 +4728,8 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
     size_t pixels, i, c;
     if (!context || !metrics) return SSDGS_ERR_ARGUMENT;
     memset(metrics, 0, sizeof *metrics);
-    if (!image || !reference || width < 1 || height < 1 || width > 1 << 15 || height > 1 << 15)
+    if (!image || !reference) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: an image is NULL");
+    if (width < 1 || height < 1 || width > 1 << 15 || height > 1 << 15)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
     pixels = (size_t)width * (size_t)height;
     result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
@@ -5155,6 +5184,7 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
     ssdgs__ply_cursor cursor;
+    ssdgs_result result;
     uint32_t words[SSDGS__PLY_WORDS];
     static const struct { size_t at; double before; } added[4] = { /* settings of later files, and what held before them */
         {offsetof(ssdgs_settings, transport), 0}, {offsetof(ssdgs_settings, view_octaves), 4},
@@ -5164,7 +5194,7 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     memset(words, 0, sizeof words);
     for (i = 0; i < 5; i++) {
         const int word = i < 4 ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
-        const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
+        result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
         if (i < 4) words[word] = ssdgs__ply_bits(added[i].before);
         next = word + 1;
@@ -5185,7 +5215,11 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     if (settings->version < 1 || settings->version > SSDGS_VERSION)
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name, settings->version);
     settings->version = SSDGS_VERSION;
-    return ssdgs__settings_check(ply->context, settings) ? SSDGS_ERR_FORMAT : SSDGS_OK;
+    ply->context->subject = ply->name;
+    ply->context->subject_number = -1;
+    result = ssdgs__settings_check(ply->context, settings);
+    ply->context->subject = NULL;
+    return result ? SSDGS_ERR_FORMAT : SSDGS_OK;
 }
 
 /* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
@@ -5621,6 +5655,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     double extent;            /* 1.1 x the cameras' radius */
+    double unit;              /* the bounds' longest side */
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
@@ -5713,7 +5748,7 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
     const double x = t < from ? 0 : t > from + over ? 1 : (t - from) / over;
     return rate.start > 0 && rate.end > 0 ? exp(log((double)rate.start) * (1 - x) + log((double)rate.end) * x)
-        : (double)rate.start;
+        : (double)rate.start * (1 - x) + (double)rate.end * x;
 }
 
 static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double t) {
@@ -6069,14 +6104,14 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
 }
 
 /* Adam on a photograph's camera (part 0) or light (part 1). */
-static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate) {
+static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate, double unit) {
     const int steps = ++c->steps[part];
     int i;
     for (i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double g = gradient[i];
         c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
         c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
-        c->value[i] -= rate * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
+        c->value[i] -= (i / 3 == 1 ? rate : rate * unit) * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
                        (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
     }
 }
@@ -6361,10 +6396,11 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         ssdgs__ranked *least = candidates + n;
         const size_t over = n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
         const size_t more = wanted > room ? wanted - room : 0;
-        size_t spare = over + (more < n / 20 ? more : n / 20), m = 0;
+        size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
         for (i = 0; i < n; i++)
-            if (!drop[i]) {
-                least[m].value = -trainer->contribution[i];
+            if (!drop[i]) { /* those of photographs that were not drawn: last */
+                const ssdgs_real seen = trainer->screen_count[i];
+                least[m].value = seen > 0 ? -trainer->contribution[i] / seen : (ssdgs_real)-1e30;
                 least[m++].index = (uint32_t)i;
             }
         qsort(least, m, sizeof *least, ssdgs__ranked_compare);
@@ -6450,8 +6486,9 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
                                names[i], (double)rates[i].start, (double)rates[i].end);
     for (i = 0; i < 3; i++) {
         if (!(o->bounds_min[i] >= -most && o->bounds_max[i] <= most && o->bounds_min[i] < o->bounds_max[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds_min[%d] = %g is not below bounds_max[%d] = %g", i,
-                               (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds_min[%d] = %g, bounds_max[%d] = %g: they "
+                               "must be finite and the first below the second", i, (double)o->bounds_min[i], i,
+                               (double)o->bounds_max[i]);
         if (!ssdgs__finite(o->background[i])) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                 "train options: background[%d] is not finite", i);
     }
@@ -6558,23 +6595,40 @@ static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
     }
 }
 
+/* Whether a photograph, of several the one with an index, else -1, can be rendered and compared on a background. */
+static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo *photo, int index,
+                                       const ssdgs_real background[3]) {
+    ssdgs_result result;
+    int i;
+    context->subject = "photograph";
+    context->subject_number = index;
+    result = ssdgs__camera_check(context, &photo->camera);
+    if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
+    if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
+    if (!result && photo->format != SSDGS_PIXELS_RGBA8 && photo->format != SSDGS_PIXELS_RGBA16)
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
+    for (i = 0; i < 3 && !result; i++)
+        if (!ssdgs__finite(background[i])) result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
+    context->subject = NULL;
+    return result;
+}
+
 static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0, longest = 0;
+    double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
     int i, j;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
-    if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%d photographs", photo_count);
+    if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+            photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL", photo_count);
     for (i = 0; i < photo_count; i++) {
-        result = ssdgs__camera_check(context, &photos[i].camera);
-        if (!result) result = ssdgs__lights_check(context, &photos[i].light, 1);
+        result = ssdgs__photo_check(context, photos + i, i, o->background);
         if (result) return result;
-        if (!photos[i].pixels) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "photograph %d has no pixels", i);
     }
     trainer->photos = (ssdgs_photo *)ssdgs__allocate(context, (size_t)photo_count * sizeof *photos);
     trainer->corrections = (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
@@ -6605,26 +6659,31 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     }
     for (j = 0; j < 3; j++) {
         const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
-        longest = side > longest ? side : longest;
+        trainer->unit = side > trainer->unit ? side : trainer->unit;
     }
-    trainer->extent = 1.1 * (radius > longest ? radius : longest); /* one camera has no radius */
+    trainer->extent = 1.1 * (radius > trainer->unit ? radius : trainer->unit); /* one camera has no radius */
     result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
     if (fresh && !result) { /* the model stays as it was when that fails */
-        if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.length_unit =
-            (ssdgs_real)(0.5 * longest);
-        for (i = 0; i < photo_count; i++) { /* I / d^2 at the object averages 1 */
+        const ssdgs_settings *s = &model->settings;
+        const int scaled = s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0; /* the paper has no such unit */
+        /* I / d^2 at the object averages 1; a light inside of it, as far away as its surface, must not darken all others */
+        const double nearest2 = 0.25 * trainer->unit * trainer->unit;
+        double scale;
+        if (scaled) model->settings.length_unit = (ssdgs_real)(0.5 * trainer->unit);
+        for (i = 0; i < photo_count; i++) {
             double d2 = 0, intensity = 0;
             for (j = 0; j < 3; j++) {
                 const double centre = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
                 const double d = (double)photos[i].light.position[j] - centre;
                 d2 += d * d;
                 intensity += (double)photos[i].light.intensity[j] / 3;
-                if (model->settings.depth_cue || model->settings.residual_shadow) model->settings.centre[j] = (ssdgs_real)centre;
+                if (scaled) model->settings.centre[j] = (ssdgs_real)centre;
             }
-            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > 1e-12 ? d2
-                                       : 1e-12) / photo_count;
+            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > nearest2 ? d2 : nearest2) /
+                          photo_count;
         }
-        model->settings.light_scale = (ssdgs_real)(irradiance > 0 ? 1 / irradiance : 1);
+        scale = irradiance > 0 ? 1 / irradiance : 1;
+        model->settings.light_scale = (ssdgs_real)(scale < SSDGS__MOST_LIGHT ? scale : SSDGS__MOST_LIGHT);
         ssdgs__globals_reset(model, o->seed);
     }
     return result;
@@ -6710,18 +6769,18 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (!result) {
         const double shows = (double)o->iterations / trainer->photo_count, wider = shows < 300 ? sqrt(300 / shows) : 1;
         if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
-                                             wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1));
+                                             wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
+                                             trainer->unit);
         if (moves[1]) ssdgs__correction_step(correction, gradient, 1,
-                                             wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1));
+                                             wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
+                                             trainer->unit);
     }
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
-        ssdgs_result grown = SSDGS_OK;
         ssdgs__gather_statistics(trainer, &frame);
-        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) grown = ssdgs__densify(trainer);
-        if (grown) return grown;
+        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) result = ssdgs__densify(trainer);
         if (o->opacity_reset_every && trainer->iteration % o->opacity_reset_every == 0 &&
             ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until)
             ssdgs__reset_opacity(trainer);
@@ -6730,6 +6789,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         stats->iteration = trainer->iteration;
         stats->gaussians = trainer->model->count;
         stats->shaded = frame.shaded_count;
+        stats->terms = terms;
         stats->skipped_steps = trainer->skipped;
         stats->loss = values.loss;
         stats->psnr = ssdgs__psnr(values.mse);
@@ -6763,7 +6823,8 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
     ssdgs_frame frame;
     double across, map;
-    if (!settings || !options || width < 1 || height < 1) return 0;
+    if (!settings || !options || width < 1 || height < 1 || ssdgs__settings_check(NULL, settings) ||
+        ssdgs__options_check(NULL, options)) return 0;
     memset(&frame, 0, sizeof frame);
     frame.settings = *settings;
     frame.terms = settings->terms;
@@ -6802,9 +6863,10 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     if (!model || !photo || !background || !metrics) return SSDGS_ERR_ARGUMENT;
     memset(metrics, 0, sizeof *metrics);
     context = model->context;
-    result = ssdgs__camera_check(context, &photo->camera);
+    result = ssdgs__photo_check(context, photo, -1, background);
     if (result) return result;
     pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    if (pixels > SIZE_MAX / 9 / sizeof *rendered) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %z pixels", pixels);
     rendered = (ssdgs_real *)ssdgs__allocate(context, pixels * 9 * sizeof *rendered);
     if (!rendered) return SSDGS_ERR_MEMORY;
     target = rendered + 3 * pixels;
@@ -6836,8 +6898,11 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     ssdgs_result result;
     int i, j;
     if (!model || !photo || !background || iterations < 0) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__photo_check(model->context, photo, -1, background);
+    if (result) return result;
     memset(&correction, 0, sizeof correction);
     for (i = 0; i < iterations; i++) {
+        const double unit = 2 * (double)model->settings.length_unit; /* as long as a trainer's */
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
         result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, frozen,
@@ -6848,8 +6913,8 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
         for (j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                     "refinement: a gradient is not finite");
-        ssdgs__correction_step(&correction, gradient, 0, rate);
-        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate);
+        ssdgs__correction_step(&correction, gradient, 0, rate, unit);
+        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate, unit);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
     photo->camera = camera;
@@ -6873,6 +6938,7 @@ typedef struct ssdgs__checkpoint_head {
     uint64_t inputs;     /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
+    double start_size;
     ssdgs_settings settings;
 } ssdgs__checkpoint_head;
 
@@ -6905,6 +6971,8 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     return result;
 }
 
+#define SSDGS__SETTINGS_INTS (offsetof(ssdgs_settings, light_map_size) + sizeof(int) - offsetof(ssdgs_settings, terms))
+
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
     const ssdgs_settings *s = &trainer->model->settings;
     int i;
@@ -6914,15 +6982,17 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
-    /* ints, then reals: no padding but at the end */
+    /* an even number of ints, then reals: no padding but at the end */
     head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
                                offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
-    head->inputs = ssdgs__fold(head->inputs, &s->terms, (size_t)((const char *)&s->light_bias - (const char *)&s->terms));
+    head->inputs = ssdgs__fold(head->inputs, &s->terms, SSDGS__SETTINGS_INTS);
+    head->inputs = ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
     for (i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
-        const ssdgs_real optics[4] = {photo->camera.fx, photo->camera.fy, photo->camera.cx, photo->camera.cy};
-        const int kind[3] = {photo->camera.width, photo->camera.height, (int)photo->light.kind};
-        head->inputs = ssdgs__fold(head->inputs, photo->camera.view, sizeof photo->camera.view);
+        const ssdgs_camera *camera = &photo->camera;
+        const ssdgs_real optics[5] = {camera->fx, camera->fy, camera->cx, camera->cy, camera->near_plane};
+        const int kind[4] = {camera->width, camera->height, (int)photo->light.kind, (int)photo->format};
+        head->inputs = ssdgs__fold(head->inputs, camera->view, sizeof camera->view);
         head->inputs = ssdgs__fold(head->inputs, optics, sizeof optics);
         head->inputs = ssdgs__fold(head->inputs, kind, sizeof kind);
         head->inputs = ssdgs__fold(head->inputs, photo->light.position, sizeof photo->light.position);
@@ -6934,6 +7004,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->iteration = trainer->iteration;
     head->skipped = trainer->skipped;
     for (i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
+    head->start_size = trainer->start_size;
     head->settings = *s;
 }
 
@@ -7017,13 +7088,12 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     else if (head.byte_order != own.byte_order || head.real_size != own.real_size ||
              head.version != own.version) reason = "it was written by another version or machine";
     else if (head.global_count != own.global_count || head.photo_count != own.photo_count ||
-             head.inputs != own.inputs) reason = "it belongs to other options, settings or photographs";
-    else if (memcmp(&head.settings.terms, &own.settings.terms,
-                    offsetof(ssdgs_settings, light_bias) - offsetof(ssdgs_settings, terms)))
-        reason = "it belongs to other settings";
+             head.inputs != own.inputs || memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS))
+        reason = "it belongs to other options, settings or photographs";
     else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
              (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
-             head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 || head.skipped > head.iteration)
+             head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 || head.skipped > head.iteration ||
+             !(head.start_size >= 0 && head.start_size < 1e30))
         reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
@@ -7049,6 +7119,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
         trainer->skipped = head.skipped;
+        trainer->start_size = head.start_size;
         for (i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         io.bytes = bytes + sizeof head;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);

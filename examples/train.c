@@ -337,13 +337,13 @@ static int train(job *j)
     }
     result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
+    if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
+        ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
+        return fail(ssdgs_error_message(j->context));
     fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s; about %.0f MiB at most beside the photographs\n", j->dataset,
             j->train_set.count, width, height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)),
             (double)ssdgs_train_memory(&j->settings, &j->options, width, height) / 1048576);
-    if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
-        ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer) ||
-        (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)))
-        return fail(ssdgs_error_message(j->context));
+    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
 
     j->progress.iterations = j->options.iterations;
     j->progress.terminal = on_terminal();

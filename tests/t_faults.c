@@ -139,7 +139,7 @@ static void meter_release(void *user, void *block) { (void)user; meter_free(bloc
 
 /* ---- a small world: photographs, a context, a model, a trainer ---- */
 
-enum { PHOTOS = 3, SIDE = 24, POINTS = 60, DENSE = 3 }; /* the first density control comes with step DENSE */
+enum { PHOTOS = 3, SIDE = 24, POINTS = 60, DENSE = 3, RESETS = 13 }; /* the first density control comes with step DENSE */
 #define FOLDER "build/t_faults_files"
 
 static const char file_path[] = FOLDER "/file", start_path[] = FOLDER "/start", run_path[] = FOLDER "/run";
@@ -195,7 +195,7 @@ static void make_photos(void) {
     options.max_gaussians = 300;
     options.prune_outside = 1; /* looked for; none is in more than all photographs */
     options.densify_from = options.densify_every = DENSE;
-    options.opacity_reset_every = 13;
+    options.opacity_reset_every = RESETS;
     options.densify_gradient = (ssdgs_real)1e-4;
     options.refine_camera = options.refine_light = 1;
 }
@@ -285,7 +285,10 @@ static void with_steps(int count) {
     while (count-- > 0) CHECK(!step());
 }
 
-static void before_control(void) { with_steps(DENSE - 1); }
+static void before_control(void) {
+    options.opacity_reset_every = DENSE; /* in the same step, whether or not there is memory for more Gaussians */
+    with_steps(DENSE - 1);
+}
 static void after_control(void) { with_steps(DENSE + 1); }
 
 static void end_world(void) {
@@ -296,6 +299,7 @@ static void end_world(void) {
     trainer = NULL;
     model = made = NULL;
     context = NULL;
+    options.opacity_reset_every = RESETS;
 }
 
 /* ---- what the world holds, as hashes ---- */
@@ -437,7 +441,8 @@ static void test_memory(void) {
     int i, for_ever, uncontrolled = 0;
     uint64_t plain_step;
     options.densify_every = 1000; /* the step with density control, without */
-    with_steps(DENSE);
+    before_control();
+    CHECK(!step());
     plain_step = held();
     end_world();
     options.densify_every = DENSE;

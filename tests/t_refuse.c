@@ -111,8 +111,62 @@ static void test_bounds(void) {
 
 #define MISSING(call) CHECK((call) == SSDGS_ERR_ARGUMENT)
 
+#define SAYS(call, words)                                                                              \
+    do {                                                                                               \
+        CHECK((call) != SSDGS_OK);                                                                     \
+        if (!CHECK(strstr(ssdgs_error_message(context), words))) puts(ssdgs_error_message(context));   \
+    } while (0)
+
+/* What was refused is named: which photograph, which light, which value. */
+static void test_messages(void) {
+    ssdgs_photo shots[3];
+    ssdgs_train_options options = train_options;
+    ssdgs_settings wrong = settings;
+    ssdgs_light light = photo.light;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_metrics metrics;
+    const ssdgs_image image = picture();
+    int i;
+    for (i = 0; i < 3; i++) shots[i] = photo;
+    shots[2].camera.view[3] = (ssdgs_real)NAN;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 2: camera: view[3] is not finite");
+    shots[2] = photo;
+    shots[1].light.intensity[1] = -1;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: light 0: intensity[1] = -1");
+    shots[1] = photo;
+    shots[1].pixels = NULL;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: it has no pixels");
+    SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics), "photograph: it has no pixels");
+    shots[1] = photo;
+    shots[1].format = (ssdgs_pixels)2;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: format = 2");
+    SAYS(ssdgs_refine_photo(model, shots + 1, train_options.background, 1), "photograph: format = 2");
+    SAYS(ssdgs_trainer_create(model, NULL, 3, NULL, &trainer), "3 photographs, but the array is NULL");
+    SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
+    light.kind = (ssdgs_light_kind)7;
+    SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
+    SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "an image is NULL");
+    options.prune_opacity = 0;
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "prune_opacity = 0 is not within 1e-30 .. 0.999");
+    options = train_options;
+    options.dssim = (ssdgs_real)-1.5e20;
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "dssim = -1.5e20 is");
+    options = train_options;
+    options.bounds_max[0] = (ssdgs_real)INFINITY;
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "bounds_max[0] = infinite: they must be finite");
+    CHECK(!trainer);
+    wrong.scattering_layers = 500; /* more than any array of them has */
+    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 4) > 0 && !ssdgs_train_memory(&wrong, &train_options, 4, 4));
+    wrong = settings;
+    wrong.version = 0;
+    options = train_options;
+    options.version = -3;
+    CHECK(!ssdgs_train_memory(&wrong, &train_options, 4, 4) && !ssdgs_train_memory(&settings, &options, 4, 4));
+}
+
 static void test_missing(void) {
     static unsigned char byte = 0;
+    static const ssdgs_real nowhere[3] = {0, (ssdgs_real)INFINITY, 0};
     const ssdgs_image image = picture();
     const ssdgs_real *background = train_options.background;
     ssdgs_camera camera = photo.camera;
@@ -158,11 +212,17 @@ static void test_missing(void) {
     MISSING(ssdgs_trainer_create(model, &photo, 0, NULL, &trainer));
     bad.pixels = NULL;
     MISSING(ssdgs_trainer_create(model, &bad, 1, NULL, &trainer));
+    MISSING(ssdgs_evaluate(model, &bad, background, NULL, &metrics));
+    MISSING(ssdgs_refine_photo(model, &bad, background, 1));
     bad = photo;
     bad.camera.width = 0;
     MISSING(ssdgs_trainer_create(model, &bad, 1, NULL, &trainer));
     MISSING(ssdgs_evaluate(model, &bad, background, NULL, &metrics));
+    MISSING(ssdgs_refine_photo(model, &bad, background, 1));
+    CHECK(ssdgs_evaluate(model, &photo, nowhere, NULL, &metrics) == SSDGS_ERR_NONFINITE);
+    CHECK(ssdgs_refine_photo(model, &photo, nowhere, 1) == SSDGS_ERR_NONFINITE);
     CHECK(!trainer);
+    test_messages();
     MISSING(ssdgs_evaluate(NULL, &photo, background, NULL, &metrics));
     MISSING(ssdgs_evaluate(model, NULL, background, NULL, &metrics));
     MISSING(ssdgs_evaluate(model, &photo, NULL, NULL, &metrics));

@@ -210,7 +210,7 @@ static void test_resume(void) {
         model->globals[model->global_count - 1] = (ssdgs_real)NAN; /* what would be refused is not written */
         CHECK(ssdgs_trainer_save(trainer, "build/t_train.ckpt") == SSDGS_ERR_NONFINITE);
         CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
-        for (i = 0; i < 4; i++) { /* wrong inside, with the right checksum */
+        for (i = 0; i < 5; i++) { /* wrong inside, with the right checksum */
             ssdgs__checkpoint_head head;
             unsigned char *copy = (unsigned char *)malloc(size);
             const uint32_t photo = PHOTOS;
@@ -220,6 +220,7 @@ static void test_resume(void) {
             if (i == 0) head.settings.scattering_width = 1024;
             if (i == 1) head.steps[3] = -2;
             if (i == 2) head.count = 0x0FFFFFFF;
+            if (i == 4) head.start_size = -1;
             memcpy(copy, &head, sizeof head);
             if (i == 3) memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo, sizeof photo);
             sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
@@ -234,6 +235,26 @@ static void test_resume(void) {
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         CHECK(ssdgs_trainer_load(trainer, "build/none.ckpt") == SSDGS_ERR_IO);
         ssdgs_trainer_destroy(trainer);
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer)); /* on Gaussians: none were drawn */
+        CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") && trainer->start_size > 0);
+        ssdgs_trainer_destroy(trainer);
+        for (i = 0; i < 5; i++) { /* another bias, filter, eta, near plane, format */
+            ssdgs_settings changed = settings;
+            ssdgs_model *own = NULL;
+            ssdgs_photo shots[PHOTOS];
+            static unsigned char wide[SIDE * SIDE * 8];
+            memcpy(shots, photos, sizeof shots);
+            if (i == 0) changed.light_bias = (ssdgs_real)0.05;
+            if (i == 1) changed.pixel_variance = (ssdgs_real)0.2;
+            if (i == 2) changed.eta = (ssdgs_real)1.4;
+            if (i == 3) shots[2].camera.near_plane = (ssdgs_real)0.02;
+            if (i == 4) shots[2].format = SSDGS_PIXELS_RGBA16, shots[2].pixels = wide;
+            CHECK(!ssdgs_model_create(context, &changed, 0, &own));
+            CHECK(!ssdgs_trainer_create(own, shots, PHOTOS, &options, &trainer));
+            CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
+            ssdgs_trainer_destroy(trainer);
+            ssdgs_model_destroy(own);
+        }
         other.seed = 2;
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &other, &trainer));
         CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
@@ -898,10 +919,94 @@ static void test_density(void) {
     ssdgs_context_destroy(context);
     memset(&correction, 0, sizeof correction);
     for (i = 0; i < 9; i++) gradient[i] = 0.5 * (i + 1);
-    for (i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3);
+    for (i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3, 3);
     before = correction.value[6];
-    ssdgs__correction_step(&correction, gradient, 1, 1e-3);
-    CHECK(before == 0 && fabs(correction.value[6] + 1e-3) < 1e-6 && fabs(correction.value[0] + 0.05) < 1e-4);
+    ssdgs__correction_step(&correction, gradient, 1, 1e-3, 3);
+    CHECK(before == 0 && fabs(correction.value[6] + 3e-3) < 1e-6);
+    CHECK(fabs(correction.value[0] + 0.15) < 3e-4 && fabs(correction.value[3] + 0.05) < 1e-4); /* lengths, radians */
+}
+
+/* Over the cap those go that show least where they are seen; those of photographs that were not drawn stay; none makes room while
+   opacities recover. */
+static void test_cap(void) {
+    enum { MANY = 40, UNSEEN = 10 }; /* the last */
+    ssdgs_train_options options = short_run(100);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    int pass, i, found;
+    options.prune_weight = options.prune_outside = 0;
+    options.densify_gradient = 1;
+    for (pass = 0; pass < 3; pass++) {
+        options.max_gaussians = pass ? MANY : MANY / 2;
+        CHECK(!ssdgs_context_create(NULL, &context));
+        CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
+        for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+        for (i = 0; i < MANY; i++) {
+            model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
+            trainer->screen_count[i] = i >= MANY - UNSEEN ? 0 : (ssdgs_real)(1 + i); /* each photograph shows less of the next ones */
+            trainer->contribution[i] = i >= MANY - UNSEEN ? 0 : 50;
+            trainer->screen_gradient[i] = i == 0 && pass ? 2 : 0;
+        }
+        trainer->iteration = pass == 2 ? 40 : 50; /* opacities are reset at 30 */
+        CHECK(!ssdgs__densify(trainer));
+        CHECK(model->count == options.max_gaussians);
+        for (i = found = 0; i < model->count; i++) {
+            const int name = (int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i];
+            found += pass ? name == MANY - UNSEEN - 1 : name < MANY / 2 - UNSEEN || name >= MANY - UNSEEN;
+        }
+        CHECK(found == (pass ? pass == 2 : MANY / 2)); /* the one that shows least makes room, or does not */
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
+/* What a fresh model is given: a light inside of the object or hardly any does not put its scale out of range; lengths follow the
+   bounds unless the paper's form, without a unit, is asked for; refinement's steps follow them too. */
+static void test_units(void) {
+    static const ssdgs_rate to_zero = {(ssdgs_real)0.01, 0}, by_factors = {(ssdgs_real)0.01, (ssdgs_real)1e-4};
+    const ssdgs_real black[3] = {0, 0, 0};
+    ssdgs_train_options options = short_run(10);
+    ssdgs_context *context = NULL;
+    ssdgs_photo lit[PHOTOS];
+    int i, c, kind;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    for (c = 0; c < 3; c++) options.bounds_min[c] = c ? -1 : -2, options.bounds_max[c] = c ? 1 : 2;
+    for (kind = 0; kind < 3; kind++) {
+        ssdgs_settings settings = kind == 1 ? ssdgs_settings_published() : ssdgs_settings_default();
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        double want;
+        if (kind == 2) settings.depth_cue = settings.residual_shadow = settings.transport = 0; /* the light bias has a length */
+        for (i = 0; i < PHOTOS; i++) {
+            lit[i] = photos[i];
+            for (c = 0; c < 3; c++)
+                lit[i].light.position[c] = (ssdgs_real)(c == 1 && i ? 4 : 0), lit[i].light.intensity[c] = (ssdgs_real)(kind ? 1e-32 : 100);
+        }
+        CHECK(!ssdgs_model_create(context, &settings, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, lit, PHOTOS, &options, &trainer));
+        want = kind ? 1e30 : PHOTOS / (100 * (0.25 + (PHOTOS - 1) / 16.0)); /* at the centre: as from 2 away */
+        CHECK(fabs((double)model->settings.light_scale / want - 1) < 1e-6);
+        CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 && fabs(trainer->unit - 4) < 1e-12);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    for (kind = 0; kind < 2; kind++) {
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs_model *model = NULL;
+        ssdgs_photo photo = photos[0];
+        settings.length_unit = (ssdgs_real)(kind ? 0.25 : 0.5);
+        CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+        for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] = (ssdgs_real)log(0.2 + 0.1 * c);
+        CHECK(!ssdgs_refine_photo(model, &photo, black, 1));
+        CHECK(fabs(fabs((double)(photo.light.position[0] - photos[0].light.position[0])) - (kind ? 5e-4 : 1e-3)) < 1e-6);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+    CHECK(fabs(ssdgs__decay(to_zero, 0, 60e3, 15e3) - 0.0075) < 1e-8 && fabs(ssdgs__decay(to_zero, 0, 60e3, 60e3)) < 1e-12);
+    CHECK(fabs(ssdgs__decay(by_factors, 0, 60e3, 30e3) - 1e-3) < 1e-8);
 }
 
 /* A Gaussian of no size is as wide as each pass's blur makes it. */
@@ -1195,6 +1300,8 @@ int main(void) {
     test_bf16();
     test_isolation();
     test_density();
+    test_cap();
+    test_units();
     test_blur();
     test_prune_weight();
     test_prune_outside();
