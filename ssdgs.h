@@ -946,7 +946,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
-#define SSDGS__MOST_LIGHT ((ssdgs_real)1e30) /* of light_scale */
+#define SSDGS__MOST_LIGHT 1e30 /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
 #define SSDGS__FALLS 3       /* levels of transmittance whose distances a light's map holds, before what is left behind all */
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
@@ -1793,7 +1793,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(pixel_variance, (ssdgs_real)0.01, 10);
     SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
     SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
-    SSDGS__RANGE(light_scale, 0, SSDGS__MOST_LIGHT);
+    SSDGS__RANGE(light_scale, 0, (ssdgs_real)SSDGS__MOST_LIGHT);
     SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
@@ -7178,7 +7178,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
 #define SSDGS__NAME(name) ssdgs__##name##_sse2
-#define SSDGS__TR 6
+#define SSDGS__TR 5 /* of 6 gcc keeps one sum in memory */
 #define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("sse2")
 #define R float
@@ -7208,7 +7208,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
 #define SSDGS__NAME(name) ssdgs__##name##_avx2
-#define SSDGS__TR 6
+#define SSDGS__TR 5 /* of 6 gcc keeps one sum in memory */
 #define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("avx2,fma")
 #define R float
