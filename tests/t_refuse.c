@@ -126,6 +126,7 @@ static void test_messages(void) {
     ssdgs_trainer *trainer = NULL;
     ssdgs_metrics metrics;
     const ssdgs_image image = picture();
+    const int numbers[2] = {2, 7}; /* of no format, no kind */
     int i;
     for (i = 0; i < 3; i++) shots[i] = photo;
     shots[2].camera.view[3] = (ssdgs_real)NAN;
@@ -138,12 +139,12 @@ static void test_messages(void) {
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: it has no pixels");
     SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics), "photograph: it has no pixels");
     shots[1] = photo;
-    shots[1].format = (ssdgs_pixels)2;
+    memcpy(&shots[1].format, &numbers[0], sizeof numbers[0]); /* C++ has no such conversion */
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: format = 2");
     SAYS(ssdgs_refine_photo(model, shots + 1, train_options.background, 1), "photograph: format = 2");
     SAYS(ssdgs_trainer_create(model, NULL, 3, NULL, &trainer), "3 photographs, but the array is NULL");
     SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
-    light.kind = (ssdgs_light_kind)7;
+    memcpy(&light.kind, &numbers[1], sizeof numbers[1]);
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
     SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "an image is NULL");
     options.prune_opacity = 0;
