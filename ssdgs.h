@@ -65,7 +65,8 @@ DO THIS
 --- end ---
 
   progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole, but
-  terms that the schedule had not reached (stats->terms; all are there after a twelfth of a run) are untrained: render without.
+  terms that the schedule had not reached (stats->terms; in the default's all join after a twelfth of a run) are untrained: render
+  without them.
 
 WHAT IT COMPUTES
   Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one colour C each:
