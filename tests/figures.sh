@@ -67,7 +67,7 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
     part accuracy 'Elementary functions' "$build/t_accuracy" full
     part shading 'atan2, encoding, dipole, ASG, Fresnel' "$build/t_accuracy" shading
     part brute 'Both passes against brute force' "$build/t_brute" full
-    part gradient_64 'The whole backward pass against central differences, in double' "$build/t_gradient_64"
+    part gradient 'The whole backward pass against central differences, in double' "$build/t_gradient"
     part stress 'Stress: geometry, rasteriser, light, shading' "$build/t_stress"
     part soak 'Stress: training, determinism' "$build/t_soak" full
     part faults 'Faults and hostile files' "$build/t_faults" full
