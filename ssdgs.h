@@ -208,7 +208,8 @@ FILES
   A model is one binary little-endian PLY of 32-bit values: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
   splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
   raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders,
-  skips what it does not know, and mends or drops broken Gaussians (ssdgs_load_stats). Limits: 8 GiB, 2^28 Gaussians.
+  skips what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats).
+  Limits: 8 GiB, 2^28 Gaussians.
   A plain 3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it
   cannot be trained. One with kd_ but no ssdgs_settings gets the published settings, and networks at their start unless
   it has them. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
@@ -437,7 +438,8 @@ typedef struct ssdgs_settings {
     int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
     int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide */
     ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
-                                 layer of Gaussians that would shadow each other at random */
+                                 layer of Gaussians that would shadow each other at random. 3 standard deviations of a
+                                 surface's Gaussians, where a model made in code is coarser than trained ones */
     ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: the pixel filter's, added to a splat's in the camera pass */
     ssdgs_real eta;           /* index of refraction, 1 .. 2.5 */
     ssdgs_real centre[3];     /* origin of the networks' positions */
@@ -468,6 +470,9 @@ typedef struct ssdgs_model_view {
 SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out);
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model);
 SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
+/* Puts the Gaussians in the order that training leaves, neighbours together, as speed and max_error want them: for models made in
+   code or put together. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
+SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
 
 /* What reading a file had to mend. */
@@ -477,6 +482,7 @@ typedef struct ssdgs_load_stats {
     int clamped_scales;      /* beyond +-20 */
     int dropped;             /* Gaussians with other non-finite values */
     int plain;               /* 1: no SSD-GS properties, loaded as baked colours */
+    int sorted;              /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
 } ssdgs_load_stats;
 
 #ifndef SSDGS_NO_STDIO
@@ -1913,6 +1919,95 @@ SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
 }
 
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return &model->settings; }
+
+static int ssdgs__key_compare(const void *a, const void *b) {
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each half likewise, down to
+   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact. Neighbours in space then share
+   a block, whose neurons live and die together, the cache, and a node of what transport gathers from. */
+static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
+    size_t node, half, i, c;
+    while (count > 8) {
+        const ssdgs_real *along = position;
+        double longest = -1;
+        for (c = 0; c < 3; c++) {
+            const ssdgs_real *x = position + c * stride;
+            double low = 1e30, high = -1e30;
+            for (i = 0; i < count; i++) {
+                const double at = (double)x[(uint32_t)keys[i]];
+                low = at < low ? at : low;
+                high = at > high ? at : high;
+            }
+            if (high - low > longest) longest = high - low, along = x;
+        }
+        for (i = 0; i < count; i++) {
+            const float x = (float)along[(uint32_t)keys[i]];
+            uint32_t bits;
+            memcpy(&bits, &x, sizeof bits);
+            bits = bits >> 31 ? ~bits : bits | 0x80000000u; /* in the order of the numbers */
+            keys[i] = (uint64_t)bits << 32 | (uint32_t)keys[i];
+        }
+        qsort(keys, count, sizeof *keys, ssdgs__key_compare);
+        for (node = 8; 8 * node < count;) node *= 8;
+        half = (count / 2 + node - 1) / node * node;
+        ssdgs__split(position, stride, keys, half);
+        keys += half;
+        count -= half;
+    }
+}
+
+/* Puts a Gaussian's values, or what is kept of them, in the places of its key. scratch: count values. */
+static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count, ssdgs_real *scratch) {
+    size_t c, i;
+    for (c = 0; c < SSDGS_CHANNELS; c++) {
+        ssdgs_real *plane = planes + c * stride;
+        for (i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
+        memcpy(plane, scratch, count * sizeof *plane);
+    }
+}
+
+SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
+    size_t count, bytes, i;
+    uint64_t *keys;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    count = (size_t)model->count;
+    if (!ssdgs__product_fits(count + 1, sizeof *keys + sizeof(ssdgs_real), &bytes)) return SSDGS_ERR_MEMORY;
+    keys = (uint64_t *)ssdgs__allocate(model->context, bytes);
+    if (!keys) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < count; i++) keys[i] = i;
+    ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
+    ssdgs__arrange(model->gaussians, model->capacity, keys, count, (ssdgs_real *)(keys + count));
+    ssdgs__release(model->context, keys);
+    ssdgs__model_changed(model);
+    return SSDGS_OK;
+}
+
+/* Whether Gaussians that follow each other are about as far apart as any two: further than half of what they have to the centre. */
+static int ssdgs__in_no_order(const ssdgs_model *model) {
+    enum { FEW = 1024 }; /* order matters little */
+    const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
+    const size_t n = (size_t)model->count;
+    double centre[3] = {0, 0, 0}, steps = 0, spread = 0;
+    size_t i, c;
+    if (n < FEW) return 0;
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < n; i++) centre[c] += (double)x[c * model->capacity + i] / (double)n;
+    for (i = 1; i < n; i++) {
+        double step2 = 0, off2 = 0;
+        for (c = 0; c < 3; c++) {
+            const ssdgs_real *at = x + c * model->capacity + i;
+            const double step = (double)at[0] - (double)at[-1], off = (double)at[0] - centre[c];
+            step2 += step * step;
+            off2 += off * off;
+        }
+        steps += sqrt(step2);
+        spread += sqrt(off2);
+    }
+    return steps > 0.5 * spread;
+}
 
 /* ==== >>frame  memory of a frame, its views ==== */
 
@@ -5338,6 +5433,10 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
         result = ssdgs__ply_read(ply, out, &own);
         ssdgs__release(context, ply);
     }
+    if (!result && !(*out)->settings.baked && ssdgs__in_no_order(*out)) {
+        result = ssdgs_model_sort(*out);
+        own.sorted = 1;
+    }
     if (result) {
         ssdgs_model_destroy(*out);
         *out = NULL;
@@ -6178,58 +6277,14 @@ static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest firs
     return x->index < y->index ? -1 : x->index > y->index;
 }
 
-static int ssdgs__key_compare(const void *a, const void *b) {
-    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return x < y ? -1 : x > y;
-}
-
-/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each half likewise, down to
-   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact. */
-static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
-    size_t node, half, i, c;
-    while (count > 8) {
-        const ssdgs_real *along = position;
-        double longest = -1;
-        for (c = 0; c < 3; c++) {
-            const ssdgs_real *x = position + c * stride;
-            double low = 1e30, high = -1e30;
-            for (i = 0; i < count; i++) {
-                const double at = (double)x[(uint32_t)keys[i]];
-                low = at < low ? at : low;
-                high = at > high ? at : high;
-            }
-            if (high - low > longest) longest = high - low, along = x;
-        }
-        for (i = 0; i < count; i++) {
-            const float x = (float)along[(uint32_t)keys[i]];
-            uint32_t bits;
-            memcpy(&bits, &x, sizeof bits);
-            bits = bits >> 31 ? ~bits : bits | 0x80000000u; /* in the order of the numbers */
-            keys[i] = (uint64_t)bits << 32 | (uint32_t)keys[i];
-        }
-        qsort(keys, count, sizeof *keys, ssdgs__key_compare);
-        for (node = 8; 8 * node < count;) node *= 8;
-        half = (count / 2 + node - 1) / node * node;
-        ssdgs__split(position, stride, keys, half);
-        keys += half;
-        count -= half;
-    }
-}
-
-/* Puts the Gaussians listed in the order of such halves and drops the others. Neighbours in space then share a block, whose
-   neurons live and die together, the cache, and a node of what transport gathers from. scratch: count values. */
+/* Puts the Gaussians listed in the order of ssdgs__split and drops the others. scratch: count values. */
 static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count, ssdgs_real *scratch) {
-    ssdgs_real *const planes[3] = {trainer->model->gaussians, trainer->mean, trainer->square};
-    size_t i, c;
-    int part;
-    ssdgs__split(planes[0] + SSDGS_POSITION * trainer->stride, trainer->stride, keys, count);
-    for (part = 0; part < 3; part++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) {
-            ssdgs_real *plane = planes[part] + c * trainer->stride;
-            for (i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
-            memcpy(plane, scratch, count * sizeof *plane);
-        }
-    trainer->model->count = (int)count;
+    ssdgs_model *model = trainer->model;
+    ssdgs__split(model->gaussians + SSDGS_POSITION * trainer->stride, trainer->stride, keys, count);
+    ssdgs__arrange(model->gaussians, trainer->stride, keys, count, scratch);
+    ssdgs__arrange(trainer->mean, trainer->stride, keys, count, scratch);
+    ssdgs__arrange(trainer->square, trainer->stride, keys, count, scratch);
+    model->count = (int)count;
 }
 
 /* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it is small, two

@@ -747,7 +747,7 @@ static void measure_skipping(bench *b) {
 }
 
 /* The session's model becomes one of `count` Gaussians on the same surfaces: copies, the smaller the more they are, each moved
-   within its original. */
+   within its original, in the order of a trained model. */
 static void replicate(session *s, int count) {
     ssdgs_model *from = s->model, *to;
     const double times = (double)count / from->count, shrink = 0.5 * log(times);
@@ -766,6 +766,7 @@ static void replicate(session *s, int count) {
         }
         for (c = 0; c < SSDGS_CHANNELS; c++) to->gaussians[(size_t)c * to->capacity + i] = g[c];
     }
+    check(s->context, ssdgs_model_sort(to));
     ssdgs_model_destroy(from);
     s->model = to;
 }

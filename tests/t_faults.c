@@ -360,6 +360,7 @@ static ssdgs_result do_create(void) {
 }
 static ssdgs_result do_load(void) { return ssdgs_model_load(context, start_path, &made, NULL); }
 static ssdgs_result do_save(void) { return ssdgs_model_save(model, file_path); }
+static ssdgs_result do_sort(void) { return ssdgs_model_sort(model); }
 static ssdgs_result do_frame(void) { return frame(1); }
 static ssdgs_result do_compare(void) { return ssdgs_compare(context, pair[0], pair[1], SIDE, SIDE, &metrics); }
 static ssdgs_result do_evaluate(void) { return ssdgs_evaluate(model, photos, options.background, planes[0], &metrics); }
@@ -405,6 +406,7 @@ typedef struct operation {
 static const operation operations[] = {
     {"model_create", with_context, do_create, 0}, {"model_load", with_context, do_load, 0},
     {"model_load_memory", with_context, do_load_memory, 0}, {"model_save", with_model, do_save, 0},
+    {"model_sort", with_model, do_sort, 0},
     {"render", with_model, do_frame, 1}, {"render more", with_frame, do_frame, 1}, {"compare", with_frame, do_compare, 0},
     {"evaluate", with_frame, do_evaluate, 1}, {"refine_photo", with_frame, do_refine, 1},
     {"trainer_create", with_empty_model, make_trainer, 0}, {"trainer_create, a model there", with_model, make_trainer, 0},

@@ -675,6 +675,67 @@ static void test_disk(void) {
     remove(path);
 }
 
+/* Mean distance from a Gaussian to the next. */
+static double mean_step(ssdgs_model *model) {
+    const ssdgs_model_view view = ssdgs_model_get(model);
+    double sum = 0;
+    int i, c;
+    for (i = 1; i < view.count; i++) {
+        double step2 = 0;
+        for (c = 0; c < 3; c++) {
+            const ssdgs_real *x = view.gaussians + (size_t)c * view.stride + (size_t)i;
+            step2 += ((double)x[0] - (double)x[-1]) * ((double)x[0] - (double)x[-1]);
+        }
+        sum += sqrt(step2);
+    }
+    return sum / (view.count - 1);
+}
+
+/* How many Gaussians of b are Gaussian i of a, in every channel. */
+static int found(ssdgs_model *a, int i, ssdgs_model *b) {
+    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    int j, channel, count = 0;
+    for (j = 0; j < v.count; j++) {
+        for (channel = 0; channel < SSDGS_CHANNELS; channel++)
+            if (u.gaussians[(size_t)channel * u.stride + (size_t)i] != v.gaussians[(size_t)channel * v.stride + (size_t)j]) break;
+        count += channel == SSDGS_CHANNELS;
+    }
+    return count;
+}
+
+/* Gaussians in no order come sorted, all of them; those in order, few ones and baked ones come as they are. */
+static void test_order(void) {
+    enum { MANY = 1500, FEW = 1000 };
+    ssdgs_model *model = make_model(MANY), *back = NULL, *again = NULL, *small = make_model(FEW);
+    ssdgs_load_stats stats;
+    bytes file = saved(model);
+    int i, once = 0;
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 && same_globals(model, back));
+    for (i = 0; i < MANY; i++) once += found(model, i, back) == 1;
+    CHECK(once == MANY && ssdgs_model_get(back).count == MANY && mean_step(back) < 0.25 * mean_step(model));
+    free(file.data);
+    file = saved(back);
+    CHECK(load(file.data, file.size, &again, &stats) == SSDGS_OK && !stats.sorted && same(back, again));
+    ssdgs_model_destroy(again);
+    free(file.data);
+    CHECK(ssdgs_model_sort(model) == SSDGS_OK && same(model, back));
+    ssdgs_model_destroy(back);
+    file = saved(small);
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && !stats.sorted && same(small, back));
+    CHECK(ssdgs_model_sort(small) == SSDGS_OK && !same(small, back) && mean_step(small) < 0.25 * mean_step(back));
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(small);
+    free(file.data);
+    ssdgs_model_destroy(model);
+    model = make_model(MANY);
+    model->settings.baked = 1;
+    file = saved(model);
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && !stats.sorted && same(model, back));
+    ssdgs_model_destroy(back);
+    ssdgs_model_destroy(model);
+    free(file.data);
+}
+
 int main(void) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
@@ -690,6 +751,7 @@ int main(void) {
     TEST_ROW("81", "every variant of PLY", test_variants());
     TEST_ROW("82", "other tools' files", (test_foreign(), test_mending()));
     test_numbers();
+    test_order();
     TEST_ROW("80", "hostile headers, damaged bodies", (test_hostile(), test_damage()));
     TEST_ROW("83", "allocations that fail", test_memory());
     TEST_ROW("84", "disks that fail", test_disk());

@@ -43,21 +43,6 @@ static void on_sphere(ssdgs_model *model, int count) {
     }
 }
 
-/* Puts a model's positions in the order that training leaves. */
-static void order(ssdgs_model *model, size_t count) {
-    uint64_t *keys = (uint64_t *)malloc(count * sizeof *keys);
-    ssdgs_real *x = (ssdgs_real *)malloc(count * sizeof *x);
-    size_t i, c;
-    for (i = 0; i < count; i++) keys[i] = i;
-    ssdgs__split(model->gaussians, model->capacity, keys, count);
-    for (c = 0; c < 3; c++) {
-        for (i = 0; i < count; i++) x[i] = model->gaussians[c * model->capacity + (uint32_t)keys[i]];
-        memcpy(model->gaussians + c * model->capacity, x, count * sizeof *x);
-    }
-    free(keys);
-    free(x);
-}
-
 /* The sums at 64 places from the frame's flux, by the library. */
 static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_real *sums) {
     ssdgs__transport_job job;
@@ -81,7 +66,7 @@ static void test_pairs(int sorted) {
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
     on_sphere(model, COUNT);
-    if (sorted) order(model, COUNT);
+    if (sorted) CHECK(!ssdgs_model_sort(model));
     begin(&frame, model, lights, 2);
     for (i = 0; i < 2 * COUNT; i++) frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
     for (s = 0; s < SSDGS__BLOCK; s++) {
@@ -125,7 +110,7 @@ static void test_plane(void) {
         model->gaussians[i] = (ssdgs_real)(0.005 * (column - ROW / 2));
         model->gaussians[model->capacity + (size_t)i] = (ssdgs_real)(0.005 * (row - ROW / 2));
     }
-    order(model, COUNT);
+    CHECK(!ssdgs_model_sort(model));
     begin(&frame, model, &light, 1);
     for (i = 0; i < COUNT; i++) frame.flux[i] = (ssdgs_real)(0.005 * 0.005);
     for (s = 0; s < SSDGS__BLOCK; s++) {
@@ -156,7 +141,7 @@ static void test_inputs(void) {
     lights[0].position[2] = lights[1].position[0] = 2;
     on_sphere(model, COUNT);
     for (i = 0; i < COUNT; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
-    order(model, COUNT);
+    CHECK(!ssdgs_model_sort(model));
     begin_as(&frame, model, lights, 2, 1);
     if (!CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_SHADE))) exit(1);
     l = ssdgs__layout(&frame);
