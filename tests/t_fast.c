@@ -135,6 +135,100 @@ static void test_kept(void) {
     ssdgs_context_destroy(context);
 }
 
+/* A random walk: each frame one thing or two change, of camera, lights, options, planes asked for and model, now and then a call
+   fails or another model is evaluated. A context that keeps what it can has the bits of one that forgets each time. */
+static void test_walk(void) {
+    enum { FRAMES = 400, VIEWS = 3, LIGHTS = 3, MODELS = 2, PLANES = 8, VALUES = 17 };
+    static ssdgs_real planes[2][PIXELS * VALUES];
+    static unsigned char photograph[PIXELS * 4];
+    ssdgs_context *context[2] = {NULL, NULL};
+    ssdgs_model *models[2][MODELS];
+    ssdgs_camera cameras[VIEWS];
+    ssdgs_light lights[LIGHTS];
+    ssdgs_render_options options = ssdgs_render_options_default();
+    int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_kept = 0, failures = 0;
+    uint64_t at = 7000000;
+#define PICK(n) ((int)(draw(at++) * (n)))
+    for (k = 0; k < 2; k++) {
+        if (!CHECK(!ssdgs_context_create(NULL, &context[k]))) exit(1);
+        for (i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
+        models[k][1]->settings.asg = SSDGS_ASG_GEOMETRIC;
+    }
+    for (i = 0; i < VIEWS; i++) cameras[i] = camera_at(2 * i);
+    for (i = 0; i < LIGHTS; i++) lights[i] = light_at(1 + i);
+    for (frame = 0; frame < FRAMES; frame++) {
+        const int changes = 1 + PICK(2);
+        ssdgs_render_stats stats[2];
+        ssdgs_photo photo;
+        ssdgs_metrics metrics;
+        ssdgs_light other;
+        for (change = 0; change < changes; change++) {
+            const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS), gaussian = PICK(COUNT), light = PICK(LIGHTS);
+            const ssdgs_real value = (ssdgs_real)draw(at++);
+            switch (kind) {
+                case 0: view = PICK(VIEWS); break;
+                case 1: which = PICK(MODELS); break;
+                case 2: light_count = PICK(LIGHTS + 1); break;
+                case 3: lights[light].position[PICK(3)] += value - (ssdgs_real)0.5; break;
+                case 4: lights[light].intensity[PICK(3)] = value; break;
+                case 5: other = lights[light], lights[light] = lights[0], lights[0] = other; break;
+                case 6: wanted = PICK(1 << (PLANES - 1)); break;
+                case 7: options.max_error = PICK(2) ? 0 : value / 4; break;
+                case 8: options.terms = PICK(SSDGS_ALL_TERMS + 1); break;
+                case 9: options.light_detail = PICK(2) ? 1 : (ssdgs_real)0.3 + value; break;
+                case 10: options.alpha_threshold = (ssdgs_real)0.001 + value / 50; break;
+                case 11: options.stop = PICK(2) ? 0 : value / 50; break;
+                case 12: options.antialias = PICK(2); break;
+                case 13: options.background[PICK(3)] = value; break;
+                case 14: options.bf16 = PICK(2); break;
+                case 15: for (i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light); break;
+                case 16:
+                    for (k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
+                    break;
+                case 17: /* the model's own, in both contexts */
+                    for (k = 0; k < 2; k++) {
+                        const ssdgs_model_view v = ssdgs_model_get(models[k][which]);
+                        v.gaussians[(size_t)channel * v.stride + (size_t)gaussian] += 2 * value - 1;
+                        v.scattering[channel] += value - (ssdgs_real)0.5;
+                    }
+                    break;
+                default: /* the first context's alone */
+                    memset(&photo, 0, sizeof photo);
+                    photo.camera = cameras[view];
+                    photo.light = lights[light];
+                    photo.pixels = photograph;
+                    CHECK(!ssdgs_evaluate(models[0][PICK(MODELS)], &photo, options.background, NULL, &metrics));
+                    photo.camera.fx = 0;
+                    failures += ssdgs_render(models[0][which], &photo.camera, lights, light_count, NULL) != SSDGS_OK;
+            }
+        }
+        memset(planes, 0, sizeof planes);
+        for (k = 0; k < 2; k++) {
+            ssdgs_image out;
+            ssdgs_real **const plane[PLANES] = {&out.color, &out.alpha, &out.depth, &out.normal,
+                                                &out.diffuse, &out.specular, &out.scattering, &out.shadow};
+            static const int first[PLANES] = {0, 3, 4, 5, 8, 11, 14, 14};
+            memset(&out, 0, sizeof out);
+            for (i = 0; i < PLANES; i++)
+                if (!i || (wanted >> (i - 1) & 1 && !(i == PLANES - 1 && out.scattering))) *plane[i] = planes[k] + PIXELS * first[i];
+            if (k && context[k]->frame) memset(&context[k]->frame->kept, 0, sizeof context[k]->frame->kept);
+            CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out, stats + k));
+        }
+        cameras_kept += stats[0].camera_kept;
+        lights_kept += stats[0].lights_kept;
+        CHECK(!stats[1].camera_kept && !stats[1].lights_kept);
+        CHECK(stats[0].shaded == stats[1].shaded && stats[0].glimpsed == stats[1].glimpsed &&
+              stats[0].instances == stats[1].instances && stats[0].light_views == stats[1].light_views);
+        if (!CHECK(!memcmp(planes[0], planes[1], sizeof planes[0]))) printf("    frame %d\n", frame);
+    }
+#undef PICK
+    CHECK(failures > 5 && cameras_kept > FRAMES / 4 && lights_kept > FRAMES / 16);
+    for (k = 0; k < 2; k++) {
+        for (i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
+        ssdgs_context_destroy(context[k]);
+    }
+}
+
 /* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was left. */
 static void test_max_error(void) {
     static const double bounds[3] = {1.0 / 64, 1.0 / 16, 1.0 / 4};
@@ -339,6 +433,7 @@ static void test_frozen(void) {
 
 int main(void) {
     test_kept();
+    test_walk();
     test_max_error();
     test_spent_budget();
     test_presets();
