@@ -1669,8 +1669,8 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
 }
 
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) { return context ? context->message : "no context"; }
-SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) { return (ssdgs_isa)context->isa; }
-SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return context->threads; }
+SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) { return context ? (ssdgs_isa)context->isa : SSDGS_ISA_AUTO; }
+SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return context ? context->threads : 0; }
 
 /* ==== >>model  Gaussians, ASG bases, networks, settings ==== */
 
@@ -1914,11 +1914,14 @@ static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
 }
 
 SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
+    ssdgs_model_view none;
+    memset(&none, 0, sizeof none);
+    if (!model) return none;
     ssdgs__model_changed(model);
     return ssdgs__model_view(model);
 }
 
-SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return &model->settings; }
+SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return model ? &model->settings : NULL; }
 
 static int ssdgs__key_compare(const void *a, const void *b) {
     const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
@@ -4324,6 +4327,7 @@ static ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
 /* ==== >>render  the stages in order ==== */
 
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
+    if (!frame) return SSDGS_ERR_ARGUMENT;
     switch (stage) {
         case SSDGS_STAGE_PROJECT: return ssdgs__project(frame);
         case SSDGS_STAGE_SORT: return ssdgs__sort(frame);

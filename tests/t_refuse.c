@@ -182,6 +182,9 @@ static void test_missing(void) {
     ssdgs_model_destroy(NULL);
     ssdgs_trainer_destroy(NULL);
     CHECK(*ssdgs_error_message(NULL) && *ssdgs_result_string(SSDGS_RESULT_COUNT) && *ssdgs_isa_string(SSDGS_ISA_COUNT));
+    CHECK(ssdgs_context_isa(NULL) == SSDGS_ISA_AUTO && !ssdgs_context_threads(NULL) && !ssdgs_model_settings(NULL));
+    CHECK(!ssdgs_model_get(NULL).count && !ssdgs_model_get(NULL).gaussians);
+    MISSING(ssdgs_stage_cpu(NULL, SSDGS_STAGE_PROJECT));
     MISSING(ssdgs_model_create(NULL, NULL, 0, &made));
     MISSING(ssdgs_model_create(context, NULL, 0, NULL));
     MISSING(ssdgs_model_load_memory(NULL, &byte, 1, &made, NULL));
