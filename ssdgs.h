@@ -90,7 +90,7 @@ WHAT IT COMPUTES
   narrow highlight passes over one Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a
   pixel carries over to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place
   shows it.
-  ssdgs_settings_published(): the paper to the letter. Colours are the stored values; every Gaussian has a specular term;
+  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole). Colours are the stored values; every Gaussian has a specular term;
   one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow
   network's output is S, no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor
   for the light.
@@ -140,7 +140,7 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
 MEMORY
   All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both or none),
   called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed inside, so it need not do
-  either.
+  either. What the C library takes for itself (qsort, stdio, threads) does not.
   A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has
   been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on
   screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer, the model its
@@ -183,7 +183,8 @@ GPU HOOK
   lights' falls, SHADE layers, and COMPOSITE adds the diffuse and specular terms (ssdgs_asg) from what they blend to. In
   training SHADE and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between.
   ssdgs_stage_cpu(frame, stage) runs the CPU's version. An image's components are the CPU's work, of layer_pixels and
-  pixel_shadow or, where layer_count is 0, of BIN's tile lists, which they need in host memory. A result other than
+  pixel_shadow or, where layer_count is 0, of view 0's record, depth, order, tile_start, tile_list and tile_seen, which must
+  be in host memory then. A result other than
   SSDGS_OK ends the frame.
 
 DETERMINISM
@@ -471,7 +472,7 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model);
 SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
 /* Puts the Gaussians in the order that training leaves, neighbours together, as speed and max_error want them: for models made in
-   code or put together. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
+   code or put together. Their indices change. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
 
@@ -486,8 +487,8 @@ typedef struct ssdgs_load_stats {
 } ssdgs_load_stats;
 
 #ifndef SSDGS_NO_STDIO
-/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact.
-   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not finite. */
+/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact. Loading sorts
+   Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
 #endif
@@ -516,7 +517,8 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
                                             ssdgs_real fov_x, int width, int height);
 
 /* Where results go. The caller owns every plane; NULL = not computed. Colours are linear (settings.transfer none: stored
-   values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha) background = color. */
+   values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha) background = color. With max_error
+   > 0 what is left unshaded has its neighbour's depth, normal and shadow too. */
 typedef struct ssdgs_image {
     int stride;             /* pixels from row to row; 0 = camera width */
     ssdgs_real *color;      /* (h,w,3) */
@@ -635,13 +637,16 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
-                                  its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none */
+                                  its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none.
+                                  Photographs that are transparent everywhere do not count as such */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
     ssdgs_rate camera_rate, light_rate; /* of the bounds' longest side, radians; for 300 shows of each photograph; with fewer, times
                                            the root of 300 / shows */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
+/* The paper's order of the terms, what rests when, density control and length. Other than in the paper, points start in the
+   bounds, backgrounds are random (random_background) and refinement takes longer steps where photographs are shown seldom. */
 SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 
 typedef struct ssdgs_train_stats {
@@ -1988,28 +1993,26 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     return SSDGS_OK;
 }
 
-/* Whether Gaussians that follow each other are about as far apart as any two: further than half of what they have to the centre. */
+/* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in no order, seldom in
+   ssdgs__split's, however far apart some are. */
 static int ssdgs__in_no_order(const ssdgs_model *model) {
-    enum { FEW = 1024 }; /* order matters little */
+    enum { FEW = 1024, NEAR = 128 }; /* order of few matters little */
     const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
     const size_t n = (size_t)model->count;
-    double centre[3] = {0, 0, 0}, steps = 0, spread = 0;
-    size_t i, c;
+    size_t i, c, further = 0;
     if (n < FEW) return 0;
-    for (c = 0; c < 3; c++)
-        for (i = 0; i < n; i++) centre[c] += (double)x[c * model->capacity + i] / (double)n;
-    for (i = 1; i < n; i++) {
-        double step2 = 0, off2 = 0;
+    for (i = NEAR; i < n; i++) {
+        const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (NEAR - 2));
+        double step2 = 0, back2 = 0;
         for (c = 0; c < 3; c++) {
             const ssdgs_real *at = x + c * model->capacity + i;
-            const double step = (double)at[0] - (double)at[-1], off = (double)at[0] - centre[c];
+            const double step = (double)at[0] - (double)*(at - 1), leap = (double)at[0] - (double)*(at - back);
             step2 += step * step;
-            off2 += off * off;
+            back2 += leap * leap;
         }
-        steps += sqrt(step2);
-        spread += sqrt(off2);
+        further += step2 > back2;
     }
-    return steps > 0.5 * spread;
+    return further > (n - NEAR) / 3;
 }
 
 /* ==== >>frame  memory of a frame, its views ==== */
@@ -2392,7 +2395,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
     ssdgs_light *kept_lights;
-    const void *views;
     ssdgs_result result;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
     size_t pixels;
@@ -2438,10 +2440,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
-    views = m->views.memory;
-    SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    if (frame->views != views)
+    if (m->views.bytes < (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
         m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = m->kept.transport_ready = 0;
+    SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
     if (!m->kept.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
         frame->views[0].light = -1;
@@ -5736,6 +5737,16 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotat
     "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma",
         "scattering network", "shadow network"};
 
+/* What is no failure, for the log alone. */
+static void ssdgs__note(const ssdgs_context *context, const char *text) {
+    if (context->logger.write) context->logger.write(context->logger.user, SSDGS_OK, text);
+}
+
+/* Whether positions are in a length unit, which the paper's form does not have. */
+static int ssdgs__has_unit(const ssdgs_settings *s) {
+    return s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0;
+}
+
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
 typedef struct ssdgs__correction {
     double value[9], mean[9], square[9];
@@ -5748,7 +5759,7 @@ struct ssdgs_trainer {
     ssdgs_train_options options;
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
-    unsigned char *transparent; /* per photograph: any pixel lets the background through */
+    unsigned char *transparent; /* per photograph: 1 some pixels let the background through, 2 all do, wholly; else 0 */
     int photo_count;
     uint32_t *order;          /* the photographs in this pass's order */
     size_t stride;            /* of the planes below: the model's capacity */
@@ -6367,7 +6378,8 @@ static void ssdgs__outlines_task(void *data, int chunk) {
         const ssdgs_real x[3] = {position[i], position[trainer->stride + i], position[2 * trainer->stride + i]};
         int seen = 0, outside = 0;
         for (photo = 0; photo < trainer->photo_count; photo++) {
-            const int side = ssdgs__outline_side(trainer->photos + photo, job->cameras + photo, trainer->transparent[photo], x);
+            const int outlines = trainer->transparent[photo] == 1; /* one that shows nothing at all has none: a failed mask */
+            const int side = ssdgs__outline_side(trainer->photos + photo, job->cameras + photo, outlines, x);
             seen += side > 0;
             outside += side == 2;
         }
@@ -6599,6 +6611,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             if (!outside[i]) draws[kept++] = draws[i];
     }
     if (!kept) { /* never none */
+        ssdgs__note(trainer->context, "no random point is inside of the outlines: do bounds_min and bounds_max hold the object?");
         kept = n;
         round = 1;
     }
@@ -6680,7 +6693,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int i, j;
+    int i, j, outlines = 0;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
@@ -6702,10 +6715,19 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->photo_count = photo_count;
     for (i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
+        int blank = 1;
         size_t at;
-        for (at = 0; at < pixels && !trainer->transparent[i]; at++)
-            trainer->transparent[i] = ssdgs__photo_alpha(photos + i, at) < 65535;
+        for (at = 0; at < pixels && (blank || !trainer->transparent[i]); at++) {
+            const int alpha = ssdgs__photo_alpha(photos + i, at);
+            blank &= !alpha;
+            trainer->transparent[i] |= alpha < 65535;
+        }
+        if (blank) trainer->transparent[i] = 2;
+        outlines |= trainer->transparent[i] == 1;
     }
+    if (!outlines)
+        ssdgs__note(context, "no photograph is transparent in part: the object's outlines are not known, and Gaussians of the "
+                    "background's colour may stay in front of it");
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -6725,7 +6747,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
     if (fresh && !result) { /* the model stays as it was when that fails */
         const ssdgs_settings *s = &model->settings;
-        const int scaled = s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0; /* the paper has no such unit */
+        const int scaled = ssdgs__has_unit(s);
         /* I / d^2 at the object averages 1; a light inside of it, as far away as its surface, must not darken all others */
         const double nearest2 = 0.25 * trainer->unit * trainer->unit;
         double scale;
@@ -6947,6 +6969,24 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     return result;
 }
 
+/* As long as the longest side of a trainer's bounds; where settings have no such unit, of the Gaussians' box. */
+static double ssdgs__model_unit(const ssdgs_model *model) {
+    double unit = 0;
+    int i, c;
+    if (ssdgs__has_unit(&model->settings)) return 2 * (double)model->settings.length_unit;
+    for (c = 0; c < 3; c++) {
+        const ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
+        double low = 1e30, high = -1e30;
+        for (i = 0; i < model->count; i++) {
+            if (!ssdgs__finite(x[i])) continue;
+            low = (double)x[i] < low ? (double)x[i] : low;
+            high = (double)x[i] > high ? (double)x[i] : high;
+        }
+        unit = high - low > unit ? high - low : unit;
+    }
+    return unit;
+}
+
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3],
                                           int iterations) {
     static const int frozen[2] = {1, 1};
@@ -6956,13 +6996,14 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     ssdgs_light light;
     ssdgs_frame frame;
     ssdgs_result result;
+    double unit;
     int i, j;
     if (!model || !photo || !background || iterations < 0) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
     memset(&correction, 0, sizeof correction);
+    unit = ssdgs__model_unit(model);
     for (i = 0; i < iterations; i++) {
-        const double unit = 2 * (double)model->settings.length_unit; /* as long as a trainer's */
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
         result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, frozen,
@@ -7172,9 +7213,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     }
     result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
-        if (head.fused != own.fused && context->logger.write)
-            context->logger.write(context->logger.user, SSDGS_OK,
-                                  "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
+        if (head.fused != own.fused)
+            ssdgs__note(context, "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;

@@ -877,7 +877,7 @@ static void measure_training(bench *b) {
     add_row(t, "whole run", 6e4, hours[0] * 60, hours[1] * 60, hours[1]);
     p = PHASES - 1;
     add_facts(b, "train256_ms_per_iteration train256_ms_per_iteration_mean train_60k_hours_projected threads2_speedup_train",
-              all[p].ms /* of the last phase, two thirds of a run */, hours[1] * 60, hours[1],
+              all[p].ms /* of the last phase, most of a run */, hours[1] * 60, hours[1],
               last ? jobs[p].ms / jobs[PHASES + p].ms : none);
     for (n = 0; n <= last; n++) {
         ssdgs_trainer_destroy(jobs[n * PHASES].trainer);

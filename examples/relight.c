@@ -222,7 +222,6 @@ static void find_axes(const olat_dataset *data, double axes[3][3])
    degrees, the camera goes to the back in steps of 2, the light goes round again, the camera returns. */
 static int make_trajectory(job *j)
 {
-    const ssdgs_settings *settings = ssdgs_model_settings(j->model);
     olat_dataset *data = &j->data;
     olat_frame *frames;
     ssdgs_camera first;
@@ -230,6 +229,7 @@ static int make_trajectory(job *j)
     double axes[3][3], intensity[3] = {0, 0, 0};
     orbit camera_orbit, light_orbit;
     ssdgs_real eye[3], centre[3], up[3];
+    ssdgs_model_view model = ssdgs_model_get(j->model);
     int i, k, count = 2 * (150 + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
     first = data->frames[0].camera;
@@ -238,7 +238,9 @@ static int make_trajectory(job *j)
     memset(&camera_orbit, 0, sizeof camera_orbit);
     memset(&light_orbit, 0, sizeof light_orbit);
     for (k = 0; k < 3; k++) {
-        centre[k] = settings->centre[k];
+        double sum = 0;
+        for (i = 0; i < model.count; i++) sum += (double)model.gaussians[(size_t)(SSDGS_POSITION + k) * model.stride + (size_t)i];
+        centre[k] = (ssdgs_real)(model.count ? sum / model.count : 0);
         up[k] = (ssdgs_real)axes[2][k];
         camera_orbit.centre[k] = (double)centre[k];
         light_orbit.centre[k] = light.kind == SSDGS_LIGHT_POINT ? (double)centre[k] : 0;
@@ -380,13 +382,26 @@ static void paste(job *j, const olat_frame *frame, int row, int column)
             }
 }
 
-/* Frames of a path may have no file: they are numbered. */
+static int compare_names(const void *a, const void *b)
+{
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* Frames of a path may have no file, those of several folders the same names: they are numbered. */
 static int name_frames(olat_dataset *data)
 {
-    int i;
+    const char **names = (const char **)malloc((size_t)data->count * sizeof *names + 1);
+    int i, named = 0, repeated = 0;
+    if (!names) return !fail("out of memory");
+    for (i = 0; i < data->count; i++)
+        if (data->frames[i].file) names[named++] = base_name(&data->frames[i]);
+    qsort(names, (size_t)named, sizeof *names, compare_names);
+    for (i = 1; i < named; i++) repeated |= !strcmp(names[i - 1], names[i]);
+    free(names);
     for (i = 0; i < data->count; i++) {
         olat_frame *frame = &data->frames[i];
-        if (frame->file) continue;
+        if (frame->file && !repeated) continue;
+        free(frame->file);
         frame->file = (char *)malloc(16);
         if (!frame->file) return !fail("out of memory");
         sprintf(frame->file, "%04d", i);

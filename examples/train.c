@@ -2,6 +2,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include <errno.h>
 #include <signal.h>
 #include <time.h>
 #ifdef _WIN32
@@ -70,7 +71,7 @@ static int set_field(ssdgs_settings *settings, ssdgs_train_options *options, con
             ssdgs_real real = (ssdgs_real)value;
             int whole = value > -2e9 && value < 2e9 ? (int)value : 0;
             if (end == p + 1 || (*end && *end != ',')) return 0;
-            if (!f->reals && (value < whole || value > whole)) return 0;
+            if (!f->reals && !(value >= whole && value <= whole)) return 0;
             if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
             else memcpy(to, &whole, sizeof whole);
             p = end;
@@ -197,6 +198,13 @@ typedef struct job {
     ssdgs_trainer *trainer;
 } job;
 
+/* The library's notes; failures are told where they end the program. */
+static void hear(void *user, ssdgs_result code, const char *message)
+{
+    (void)user;
+    if (code == SSDGS_OK) fprintf(stderr, "train: note: %s\n", message);
+}
+
 static int parse(job *j, int argc, char **argv)
 {
     const char **given = j->given, *terms;
@@ -238,12 +246,14 @@ static int parse(job *j, int argc, char **argv)
         !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) || !number(given, SEED, 0, &seed) ||
         !number(given, THREADS, 0, &j->desc.threads))
         return 2;
+    if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
     j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
     for (i = 0; i < sets; i++)
-        if (!set_field(&j->settings, &j->options, argv[i])) return usage("cannot set", argv[i]);
+        if (!set_field(&j->settings, &j->options, argv[i])) return usage("cannot set (rates take START,END, corners X,Y,Z)", argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
+    j->desc.logger.write = hear;
     return 0;
 }
 
@@ -326,6 +336,9 @@ static int train(job *j)
     i = ftell(file) == 0;
     fclose(file);
     if (i) remove(j->checkpoint);
+    file = fopen(output, "r+b");
+    if (!file && errno != ENOENT) return sprintf(error, "%.480s: cannot be written", output), fail(error);
+    if (file) fclose(file);
 
     if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
     if (has_test && olat_load(j->dataset, "transforms_test.json", 0, &j->test_set, error)) return fail(error);
@@ -356,7 +369,13 @@ static int train(job *j)
             return 130;
         }
     }
-    if (result || ssdgs_model_save(j->model, output)) return fail(ssdgs_error_message(j->context));
+    signal(SIGINT, SIG_DFL);
+    if (result) return fail(ssdgs_error_message(j->context));
+    if (ssdgs_model_save(j->model, output)) {
+        fail(ssdgs_error_message(j->context));
+        if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
+        return sprintf(error, "the trained model is in %.480s; --resume saves it", j->checkpoint), fail(error);
+    }
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
     print_peak_memory();
     printf("\n");

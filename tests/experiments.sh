@@ -1,13 +1,13 @@
 #!/bin/sh
 # The paper's experiments with this library, and others: sh tests/experiments.sh BUILD DATA ITERATIONS SCENE:BACKGROUND...
 # Writes BUILD/experiments/EXPERIMENTS.md, with the findings of tests/EXPERIMENTS.md after the tables. PARTS="FUNCTION..." makes those
-# sections alone and keeps the others. A run that is there already is not repeated: delete its log to have it again. Runs go side by
-# side, one thread and one core each: LIST=1 makes this script name its runs on descriptor 3, and RUN=1 do one of them:
+# sections alone and keeps the others. A run of the same commit, data and options is not repeated. Runs go side by side, one thread
+# and one core each: LIST=1 makes this script name its runs on descriptor 3, and RUN=1 do one of them:
 # BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
 set -eu
 build=$1 data=$2 iterations=$3
 shift 3
-scenes="$*" out=$build/experiments
+scenes="$*" out=$build/experiments commit=$(git rev-parse --short HEAD 2>/dev/null || echo unknown)
 mkdir -p "$out"
 
 # run SCENE:BACKGROUND NAME OPTION...: trains and tests; leaves the path of its log in $log.
@@ -15,11 +15,13 @@ run() {
     scene=${1%%:*} background=${1##*:} name=$2
     [ -z "${LIST-}" ] || { echo "$*" >&3; log=/dev/null; return; }
     shift 2
-    log=$out/$scene.$iterations.$name.log
-    if ! grep -q '^training:' "$log" 2>/dev/null; then
+    log=$out/$scene.$name.log
+    key="$commit $iterations $background $data $*"
+    if ! grep -qxF "run $key" "$log" 2>/dev/null; then
         echo "$scene: $name $*" >&2
         "$build/train" "$data/$scene" -o "$out/$scene.$name.ply" --background "$background" --iterations "$iterations" --threads 1 \
             "$@" >"$log.part" 2>"$log.err" || { cat "$log.err" >&2; exit 1; }
+        echo "run $key" >>"$log.part"
         mv "$log.part" "$log"
     fi
 }
@@ -203,8 +205,7 @@ changes() {
 part() {
     case " ${PARTS-$1} " in
         *" $1 "*)
-            printf '\n## %s\n\nCommit %s, %s iterations, %s.\n' "$2" "$(git rev-parse --short HEAD 2>/dev/null || echo unknown)" \
-                "$iterations" "${cpu:-unknown CPU}"
+            printf '\n## %s\n\nCommit %s, %s iterations, %s.\n' "$2" "$commit" "$iterations" "${cpu:-unknown CPU}"
             "$1" ;;
         *) echo; TITLE="## $2" awk '/^## / { inside = $0 == ENVIRON["TITLE"] } inside' tests/EXPERIMENTS.md | sed '$ { /^$/d; }' ;;
     esac

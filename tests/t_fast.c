@@ -135,13 +135,54 @@ static void test_kept(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Blocks of powers of two bytes, the last one given back first, as engines' allocators are: what grows may stay where it was. */
+typedef union block { union block *next; size_t size; unsigned char room[64]; } block;
+static block *pool[64];
+
+static int size_class(size_t bytes) {
+    int k = 7;
+    while ((size_t)1 << k < bytes + sizeof(block)) k++;
+    return k;
+}
+
+static void *pool_allocate(void *user, size_t bytes) {
+    const int k = size_class(bytes);
+    block *b = pool[k];
+    (void)user;
+    if (b) pool[k] = b->next;
+    else b = (block *)malloc((size_t)1 << k);
+    if (!b) return NULL;
+    b->size = bytes;
+    return b + 1;
+}
+
+static void pool_release(void *user, void *memory) {
+    block *b = (block *)memory - 1;
+    const int k = size_class(b->size);
+    (void)user;
+    b->next = pool[k];
+    pool[k] = b;
+}
+
+static void pool_empty(void) {
+    int k;
+    for (k = 0; k < 64; k++)
+        while (pool[k]) {
+            block *next = pool[k]->next;
+            free(pool[k]);
+            pool[k] = next;
+        }
+}
+
 /* A random walk: each frame one thing or two change, of camera, lights, options, planes asked for and model, now and then a call
-   fails or another model is evaluated. A context that keeps what it can has the bits of one that forgets each time. */
+   fails or another model is evaluated. A context that keeps what it can, its memory from a pool, has the bits of one that forgets
+   each time. */
 static void test_walk(void) {
     enum { FRAMES = 400, VIEWS = 3, LIGHTS = 3, MODELS = 2, PLANES = 8, VALUES = 17 };
     static ssdgs_real planes[2][PIXELS * VALUES];
     static unsigned char photograph[PIXELS * 4];
     ssdgs_context *context[2] = {NULL, NULL};
+    ssdgs_context_desc desc;
     ssdgs_model *models[2][MODELS];
     ssdgs_camera cameras[VIEWS];
     ssdgs_light lights[LIGHTS];
@@ -149,8 +190,11 @@ static void test_walk(void) {
     int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_kept = 0, failures = 0;
     uint64_t at = 7000000;
 #define PICK(n) ((int)(draw(at++) * (n)))
+    memset(&desc, 0, sizeof desc);
+    desc.allocator.allocate = pool_allocate;
+    desc.allocator.release = pool_release;
     for (k = 0; k < 2; k++) {
-        if (!CHECK(!ssdgs_context_create(NULL, &context[k]))) exit(1);
+        if (!CHECK(!ssdgs_context_create(k ? NULL : &desc, &context[k]))) exit(1);
         for (i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
         models[k][1]->settings.asg = SSDGS_ASG_GEOMETRIC;
     }
@@ -227,6 +271,7 @@ static void test_walk(void) {
         for (i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
         ssdgs_context_destroy(context[k]);
     }
+    pool_empty();
 }
 
 /* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was left. */

@@ -726,6 +726,18 @@ static void test_order(void) {
     ssdgs_model_destroy(back);
     ssdgs_model_destroy(small);
     free(file.data);
+    model->gaussians[MANY / 2] = (ssdgs_real)1e7; /* one far out does not hide the others' order */
+    file = saved(model);
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && !stats.sorted && same(model, back));
+    ssdgs_model_destroy(back);
+    free(file.data);
+    ssdgs_model_destroy(model);
+    model = make_model(MANY);
+    for (i = 0; i < MANY; i++) model->gaussians[i] += (ssdgs_real)(100 * (4 * i / MANY)); /* four objects far apart, each in no order */
+    file = saved(model);
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 && mean_step(back) < 0.5 * mean_step(model));
+    ssdgs_model_destroy(back);
+    free(file.data);
     ssdgs_model_destroy(model);
     model = make_model(MANY);
     model->settings.baked = 1;

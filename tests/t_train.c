@@ -993,13 +993,14 @@ static void test_units(void) {
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
-    for (kind = 0; kind < 2; kind++) {
-        ssdgs_settings settings = ssdgs_settings_default();
+    for (kind = 0; kind < 3; kind++) {
+        ssdgs_settings settings = kind == 2 ? ssdgs_settings_published() : ssdgs_settings_default();
         ssdgs_model *model = NULL;
         ssdgs_photo photo = photos[0];
-        settings.length_unit = (ssdgs_real)(kind ? 0.25 : 0.5);
-        CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+        if (kind < 2) settings.length_unit = (ssdgs_real)(kind ? 0.25 : 0.5);
+        CHECK(!ssdgs_model_create(context, &settings, 2, &model));
         for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] = (ssdgs_real)log(0.2 + 0.1 * c);
+        model->gaussians[(size_t)(SSDGS_POSITION + 1) * model->capacity + 1] = (ssdgs_real)0.5; /* the published form's box */
         CHECK(!ssdgs_refine_photo(model, &photo, black, 1));
         CHECK(fabs(fabs((double)(photo.light.position[0] - photos[0].light.position[0])) - (kind ? 5e-4 : 1e-3)) < 1e-6);
         ssdgs_model_destroy(model);
@@ -1061,6 +1062,15 @@ static void test_prune_weight(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Notes in the log: of bounds that hold nothing, of outlines that are not known. */
+static int heard[2];
+
+static void hear(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    heard[0] += code == SSDGS_OK && strstr(message, "bounds_min") != NULL;
+    heard[1] += code == SSDGS_OK && strstr(message, "outlines are not known") != NULL;
+}
+
 enum { COLUMN = 15 }; /* of the second photograph of outlined(), a little less than transparent; the third is opaque */
 
 /* Whether a place is transparent in more than a share of the photographs that have it, counted in double; the first camera stands
@@ -1094,12 +1104,16 @@ static int outlined(const ssdgs_photo *shots, double aside, const double x[3], d
 /* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs in double says. */
 static void test_prune_outside(void) {
     enum { MANY = 400 };
+    static unsigned char blank[SIDE * SIDE * 4];
     static const double shares[4] = {0, 0.3, 0.6, 0.01}, centre[4] = {0, 0, 0, 0.35}, half[4] = {0.8, 0.8, 0.8, 0.15};
     static unsigned char veiled[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
     ssdgs_photo shots[PHOTOS];
     ssdgs_train_options options = short_run(100);
     ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
     int pass, i, c, photo;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
     memcpy(shots, photos, sizeof shots);
     memcpy(veiled, pixels[1], sizeof veiled);
     memcpy(opaque, pixels[2], sizeof opaque);
@@ -1110,7 +1124,7 @@ static void test_prune_outside(void) {
     shots[3].camera.view[11] = -1; /* all but what is far off is behind it */
     options.densify_gradient = 1;
     options.initial_points = MANY;
-    CHECK(!ssdgs_context_create(NULL, &context));
+    CHECK(!ssdgs_context_create(&desc, &context));
     for (pass = 0; pass < 4; pass++) {
         unsigned char stays[MANY];
         ssdgs_model *model = NULL;
@@ -1118,6 +1132,7 @@ static void test_prune_outside(void) {
         double starts[MANY][3];
         int left = 0, unlike = 0, rounds;
         options.prune_outside = (ssdgs_real)shares[pass];
+        shots[2].pixels = pass == 1 ? blank : opaque; /* one that shows nothing has no outlines either */
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         trainer->corrections[0].value[0] = 0.2; /* as refined */
@@ -1175,11 +1190,17 @@ static void test_prune_outside(void) {
         const double size = 0.71812 * 0.4 * pow(MANY, -1.0 / 3);
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
+        CHECK(!heard[0] && !heard[1]);
+        clear[3] = 255; /* a corner */
         for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
         for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
         CHECK(fabs(exp((double)model->gaussians[SSDGS_LOG_SCALE * model->capacity]) / size - 1) < 1e-4);
+        CHECK(heard[0] == 1 && !heard[1]);
+        ssdgs_trainer_destroy(trainer);
+        clear[3] = 0;
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && heard[0] == 1 && heard[1] == 1);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
