@@ -639,6 +639,9 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
                                   its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none.
                                   Photographs that are transparent everywhere do not count as such */
+    ssdgs_real opacity_fade;   /* where no photograph has outlines: so many times the mean opacity, less and less up to iteration
+                                  30,000*, is added to the loss, as Gaussians of the background's colour have no other reason to
+                                  go; 0.3; 0 = nothing */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
     ssdgs_rate camera_rate, light_rate; /* of the bounds' longest side, radians; for 300 shows of each photograph; with fewer, times
                                            the root of 300 / shows */
@@ -5770,6 +5773,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     double extent;            /* 1.1 x the cameras' radius */
+    int outlines;             /* any photograph shows where the object ends */
     double unit;              /* the bounds' longest side */
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -5803,6 +5807,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
+    o.opacity_fade = (ssdgs_real)0.3;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
@@ -5828,7 +5833,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
-    o.prune_weight = o.prune_outside = 0;
+    o.prune_weight = o.prune_outside = o.opacity_fade = 0;
     return o;
 }
 
@@ -6394,7 +6399,7 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
     ssdgs__outlines_job job;
     int i;
     memset(outside, 0, (size_t)trainer->model->count);
-    if (!(trainer->options.prune_outside > 0) || !memchr(trainer->transparent, 1, (size_t)trainer->photo_count)) return SSDGS_OK;
+    if (!(trainer->options.prune_outside > 0) || !trainer->outlines) return SSDGS_OK;
     cameras = (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
     if (!cameras) return SSDGS_ERR_MEMORY;
     for (i = 0; i < trainer->photo_count; i++) {
@@ -6551,6 +6556,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_opacity, (ssdgs_real)1e-30, (ssdgs_real)0.999);
     SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
+    SSDGS__RANGE(opacity_fade, 0, 1);
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
@@ -6693,7 +6699,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int i, j, outlines = 0;
+    int i, j;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
@@ -6723,11 +6729,11 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
             trainer->transparent[i] |= alpha < 65535;
         }
         if (blank) trainer->transparent[i] = 2;
-        outlines |= trainer->transparent[i] == 1;
+        trainer->outlines |= trainer->transparent[i] == 1;
     }
-    if (!outlines)
+    if (!trainer->outlines)
         ssdgs__note(context, "no photograph is transparent in part: the object's outlines are not known, and Gaussians of the "
-                    "background's colour may stay in front of it");
+                    "background's colour may stay around it");
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -6811,6 +6817,18 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     return (int)trainer->order[at];
 }
 
+/* Adds the gradient of opacity_fade x the mean opacity at time t, where outlines are not known. */
+static void ssdgs__fade(const ssdgs_trainer *trainer, double t, ssdgs_real *gradient) {
+    const size_t n = (size_t)trainer->model->count;
+    const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
+    const double fade = trainer->outlines || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / (double)n;
+    size_t i;
+    for (i = 0; i < n && fade > 0; i++) {
+        const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
+        gradient[i] += (ssdgs_real)(fade * a * (1 - a));
+    }
+}
+
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     const ssdgs_train_options *o;
     ssdgs__loss_values values;
@@ -6846,6 +6864,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of photograph %d's %s "
                                  "is not finite", trainer->iteration, photo, j > 5 ? "light" : "camera");
+    ssdgs__fade(trainer, t, frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
     if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
     if (!result) {

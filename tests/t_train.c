@@ -1207,6 +1207,49 @@ static void test_prune_outside(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Where outlines are not known the loss has opacity_fade x the mean opacity, half of it half way to 30,000 of 60,000. */
+static void test_fade(void) {
+    enum { MANY = 5 };
+    const double fade = 0.3, step = 1e-3;
+    static unsigned char opaque[SIDE * SIDE * 4];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    int known, i;
+    options.opacity_fade = (ssdgs_real)fade;
+    memset(opaque, 255, sizeof opaque);
+    CHECK(!ssdgs_context_create(NULL, &context));
+    for (known = 0; known < 2; known++) {
+        ssdgs_photo shots[PHOTOS];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        memcpy(shots, photos, sizeof shots);
+        for (i = known; i < PHOTOS; i++) shots[i].pixels = opaque; /* one with outlines is enough */
+        CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
+        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        for (i = 0; i < MANY; i++) {
+            ssdgs_real gradient[MANY] = {1, 1, 1, 1, 1}, *opacity = model->gaussians + SSDGS_OPACITY * model->capacity;
+            double mean[2] = {0, 0}, want;
+            int j, side;
+            for (j = 0; j < MANY; j++) opacity[j] = (ssdgs_real)(j - 1.7);
+            for (side = 0; side < 2; side++)
+                for (j = 0; j < MANY; j++)
+                    mean[side] += 1 / (1 + exp(-(double)opacity[j] + (j == i ? (side ? -step : step) : 0))) / MANY;
+            want = known ? 0 : 0.5 * fade * (mean[1] - mean[0]) / (2 * step);
+            ssdgs__fade(trainer, 15e3, gradient);
+            CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5 && (known || want > 1e-3));
+            ssdgs__fade(trainer, 30e3, gradient);
+            CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5);
+        }
+        model->gaussians[SSDGS_POSITION * model->capacity] = 1000; /* no photograph has it */
+        model->gaussians[SSDGS_OPACITY * model->capacity] = 2;
+        CHECK(!ssdgs_trainer_step(trainer, NULL));
+        CHECK(known ? model->gaussians[SSDGS_OPACITY * model->capacity] >= 2 : model->gaussians[SSDGS_OPACITY * model->capacity] < 2);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+}
+
 /* What lies half in shadow is halved along its longest axis, so that centre, variance and, where they overlap, the light that
    gets through stay. */
 static void test_half_shadow(void) {
@@ -1326,6 +1369,7 @@ int main(void) {
     test_blur();
     test_prune_weight();
     test_prune_outside();
+    test_fade();
     test_half_shadow();
     test_learning();
     test_refinement();
