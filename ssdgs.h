@@ -622,7 +622,8 @@ typedef struct ssdgs_train_options {
                                   these are three in four or more others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
-    int opacity_reset_every;   /* 3000; 0 = never */
+    int opacity_reset_every;   /* 3000, not scaled, the last one at least half of it before densify_until*: with fewer than 5,400
+                                  iterations there is none; 0 = never */
     int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
     ssdgs_real background[3];  /* stored values */
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
