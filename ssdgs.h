@@ -90,10 +90,10 @@ WHAT IT COMPUTES
   narrow highlight passes over one Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a
   pixel carries over to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place
   shows it.
-  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole). Colours are the stored values; every Gaussian has a specular term;
-  one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow
-  network's output is S, no bias; both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor
-  for the light.
+  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole). Colours are the
+  stored values; every Gaussian has a specular term; one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four
+  octaves, no depth cue, no transport; the shadow network's output is S, no bias; both passes add 0.3 px^2, where the
+  default adds 0.1 for the camera and keeps to a floor for the light.
   Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where light
   is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
   surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Diffuse alone
@@ -140,7 +140,7 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
 MEMORY
   All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both or none),
   called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed inside, so it need not do
-  either. What the C library takes for itself (qsort, stdio, threads) does not.
+  either. What the C library needs itself (qsort, stdio, threads) is not in it.
   A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has
   been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on
   screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer, the model its
@@ -183,9 +183,8 @@ GPU HOOK
   lights' falls, SHADE layers, and COMPOSITE adds the diffuse and specular terms (ssdgs_asg) from what they blend to. In
   training SHADE and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between.
   ssdgs_stage_cpu(frame, stage) runs the CPU's version. An image's components are the CPU's work, of layer_pixels and
-  pixel_shadow or, where layer_count is 0, of view 0's record, depth, order, tile_start, tile_list and tile_seen, which must
-  be in host memory then. A result other than
-  SSDGS_OK ends the frame.
+  pixel_shadow or, where layer_count is 0, of view 0's record, depth, order, tile_start, tile_list and tile_seen, which
+  must be in host memory then. A result other than SSDGS_OK ends the frame.
 
 DETERMINISM
   The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
@@ -488,7 +487,8 @@ typedef struct ssdgs_load_stats {
 
 #ifndef SSDGS_NO_STDIO
 /* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact. Loading sorts
-   Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not finite. */
+   Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY;
+   on saving ERR_NONFINITE, where networks or ASG are not finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
 #endif
@@ -2000,13 +2000,13 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in no order, seldom in
    ssdgs__split's, however far apart some are. */
 static int ssdgs__in_no_order(const ssdgs_model *model) {
-    enum { FEW = 1024, NEAR = 128 }; /* order of few matters little */
+    enum { FEW = 1024, AROUND = 128 }; /* order of few matters little */
     const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
     const size_t n = (size_t)model->count;
     size_t i, c, further = 0;
     if (n < FEW) return 0;
-    for (i = NEAR; i < n; i++) {
-        const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (NEAR - 2));
+    for (i = AROUND; i < n; i++) {
+        const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (AROUND - 2));
         double step2 = 0, back2 = 0;
         for (c = 0; c < 3; c++) {
             const ssdgs_real *at = x + c * model->capacity + i;
@@ -2016,7 +2016,7 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
         }
         further += step2 > back2;
     }
-    return further > (n - NEAR) / 3;
+    return further > (n - AROUND) / 3;
 }
 
 /* ==== >>frame  memory of a frame, its views ==== */
@@ -6826,7 +6826,7 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, ssdgs_real *grad
     size_t i;
     for (i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
-        gradient[i] += (ssdgs_real)(fade * a * (1 - a));
+        if (a > 0) gradient[i] += (ssdgs_real)(fade * a * (1 - a)); /* one that is no number is not drawn either */
     }
 }
 
