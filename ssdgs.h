@@ -3084,9 +3084,9 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
     const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
     ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
-    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], near[SSDGS__NEAR];
+    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], leaves[SSDGS__NEAR];
     const int levels = ssdgs__levels(n, first);
-    int depth = 0, level_of[8 * SSDGS__LEVELS], near_count = 0, k, s, i;
+    int depth = 0, level_of[8 * SSDGS__LEVELS], leaf_count = 0, k, s, i;
     ssdgs__gather g;
     g.frame = frame;
     g.flux = frame->flux + n * (size_t)light;
@@ -3110,7 +3110,7 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
                 stack[depth] = part;
                 level_of[depth++] = level - 1;
             }
-        } else if (near_count < SSDGS__NEAR) near[near_count++] = at;
+        } else if (leaf_count < SSDGS__NEAR) leaves[leaf_count++] = at;
         else ssdgs__gather_leaf(&g, at);
     }
     ssdgs__gather_flush(&g);
@@ -3118,10 +3118,10 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         g.groups = groups & 1 << s / 16;
         if (!g.groups) continue;
         reach = ssdgs__reach(x + s, 16, middle);
-        for (i = 0; i < near_count; i++) {
-            const ssdgs__node *node = nodes + near[i];
+        for (i = 0; i < leaf_count; i++) {
+            const ssdgs__node *node = nodes + leaves[i];
             if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
-            else ssdgs__gather_leaf(&g, near[i]);
+            else ssdgs__gather_leaf(&g, leaves[i]);
         }
         ssdgs__gather_flush(&g);
     }

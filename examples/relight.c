@@ -12,7 +12,7 @@
 #endif
 
 #define PI 3.14159265358979323846
-enum { SPLIT, OUT, BACKGROUND, SHEET, THREADS, ISA, TRAJECTORY, COMPONENTS, OPTION_COUNT };
+enum { SPLIT, OUT_FOLDER, BACKGROUND, SHEET, THREADS, ISA, TRAJECTORY, COMPONENTS, OPTION_COUNT };
 static const char *const option_names[OPTION_COUNT] = {
     "--split", "--out", "--background", "--sheet", "--threads", "--isa", "--trajectory", "--components"
 };
@@ -70,7 +70,7 @@ static int parse(job *j, int argc, char **argv)
         if (option < TRAJECTORY && i + 1 == argc) return usage("a value is missing after", argv[i]);
         j->given[option] = option < TRAJECTORY ? argv[++i] : "";
     }
-    j->out = j->given[OUT];
+    j->out = j->given[OUT_FOLDER];
     if (!j->dataset || !j->out) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";

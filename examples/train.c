@@ -16,7 +16,7 @@
 #endif
 
 enum {
-    OUTPUT, ITERATIONS, BACKGROUND, PRESET, TRANSFER, SCHEDULE, TERMS, SEED, THREADS, MAX_GAUSSIANS, POINTS, CHECKPOINT_EVERY,
+    OUTPUT, ITERATIONS, BACKGROUND, PRESET, TRANSFER, SCHEDULE, TERMS, SEED, THREADS, MAX_GAUSSIANS, START_POINTS, CHECKPOINT_EVERY,
     ISA, TRAIN_JSON, SET, RESUME, REFINE, OPTION_COUNT /* the flags, RESUME and on, take no value */
 };
 static const char *const option_names[OPTION_COUNT] = {
@@ -241,7 +241,7 @@ static int parse(job *j, int argc, char **argv)
     }
     while (given[ISA] && isa < SSDGS_ISA_COUNT && strcmp(given[ISA], ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", given[ISA]);
-    if (!number(given, ITERATIONS, 1, &j->options.iterations) || !number(given, POINTS, 1, &j->options.initial_points) ||
+    if (!number(given, ITERATIONS, 1, &j->options.iterations) || !number(given, START_POINTS, 1, &j->options.initial_points) ||
         !number(given, MAX_GAUSSIANS, 1, &j->options.max_gaussians) ||
         !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) || !number(given, SEED, 0, &seed) ||
         !number(given, THREADS, 0, &j->desc.threads))

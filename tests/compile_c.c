@@ -9,7 +9,7 @@ static const any_function functions[] = {
     ADDRESS(ssdgs_result_string), ADDRESS(ssdgs_isa_string), ADDRESS(ssdgs_context_isa),
     ADDRESS(ssdgs_context_threads), ADDRESS(ssdgs_settings_default), ADDRESS(ssdgs_settings_published),
     ADDRESS(ssdgs_model_create), ADDRESS(ssdgs_model_destroy), ADDRESS(ssdgs_model_get),
-    ADDRESS(ssdgs_model_settings), ADDRESS(ssdgs_model_save), ADDRESS(ssdgs_model_load),
+    ADDRESS(ssdgs_model_settings), ADDRESS(ssdgs_model_sort), ADDRESS(ssdgs_model_save), ADDRESS(ssdgs_model_load),
     ADDRESS(ssdgs_model_load_memory), ADDRESS(ssdgs_camera_look_at), ADDRESS(ssdgs_render_options_default),
     ADDRESS(ssdgs_render), ADDRESS(ssdgs_render_ex), ADDRESS(ssdgs_srgb_encode), ADDRESS(ssdgs_srgb_decode),
     ADDRESS(ssdgs_to_bytes), ADDRESS(ssdgs_train_options_default), ADDRESS(ssdgs_train_options_published), ADDRESS(ssdgs_trainer_create),

@@ -178,7 +178,7 @@ static void pool_empty(void) {
    fails or another model is evaluated. A context that keeps what it can, its memory from a pool, has the bits of one that forgets
    each time. */
 static void test_walk(void) {
-    enum { FRAMES = 400, VIEWS = 3, LIGHTS = 3, MODELS = 2, PLANES = 8, VALUES = 17 };
+    enum { FRAMES = 400, VIEWS = 3, LIGHTS = 3, MODELS = 2, PLANE_COUNT = 8, VALUES = 17 };
     static ssdgs_real planes[2][PIXELS * VALUES];
     static unsigned char photograph[PIXELS * 4];
     ssdgs_context *context[2] = {NULL, NULL};
@@ -216,7 +216,7 @@ static void test_walk(void) {
                 case 3: lights[light].position[PICK(3)] += value - (ssdgs_real)0.5; break;
                 case 4: lights[light].intensity[PICK(3)] = value; break;
                 case 5: other = lights[light], lights[light] = lights[0], lights[0] = other; break;
-                case 6: wanted = PICK(1 << (PLANES - 1)); break;
+                case 6: wanted = PICK(1 << (PLANE_COUNT - 1)); break;
                 case 7: options.max_error = PICK(2) ? 0 : value / 4; break;
                 case 8: options.terms = PICK(SSDGS_ALL_TERMS + 1); break;
                 case 9: options.light_detail = PICK(2) ? 1 : (ssdgs_real)0.3 + value; break;
@@ -249,12 +249,12 @@ static void test_walk(void) {
         memset(planes, 0, sizeof planes);
         for (k = 0; k < 2; k++) {
             ssdgs_image out;
-            ssdgs_real **const plane[PLANES] = {&out.color, &out.alpha, &out.depth, &out.normal,
+            ssdgs_real **const plane[PLANE_COUNT] = {&out.color, &out.alpha, &out.depth, &out.normal,
                                                 &out.diffuse, &out.specular, &out.scattering, &out.shadow};
-            static const int first[PLANES] = {0, 3, 4, 5, 8, 11, 14, 14};
+            static const int first[PLANE_COUNT] = {0, 3, 4, 5, 8, 11, 14, 14};
             memset(&out, 0, sizeof out);
-            for (i = 0; i < PLANES; i++)
-                if (!i || (wanted >> (i - 1) & 1 && !(i == PLANES - 1 && out.scattering))) *plane[i] = planes[k] + PIXELS * first[i];
+            for (i = 0; i < PLANE_COUNT; i++)
+                if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering))) *plane[i] = planes[k] + PIXELS * first[i];
             if (k && context[k]->frame) memset(&context[k]->frame->kept, 0, sizeof context[k]->frame->kept);
             CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out, stats + k));
         }
