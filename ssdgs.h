@@ -7960,7 +7960,7 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
    max_error, so what no pixel needs adds up to no more than that in any. */
 SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed, const int thrifty) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
-    const V budget = VSET(tile->max_error), small = VSET(tile->max_error * SSDGS__SHARE);
+    const V budget = VSET(tile->max_error), slight = VSET(tile->max_error * SSDGS__SHARE);
     R transmittance[16][16], passed_over[16][16];
     F(batch) batch;
     uint32_t from = 0;
@@ -7997,7 +7997,7 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                     any |= VBITS(blended);
                     if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget needs everything */
                         const V w = VMUL(alpha, t[v]);
-                        const VM light = VGE(small, w);
+                        const VM light = VGE(slight, w);
                         over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
                         must |= VBITS(blended) & ~VBITS(VAND(light, VGE(budget, over[v])));
                     }

@@ -374,7 +374,7 @@ static int train(job *j)
     if (ssdgs_model_save(j->model, output)) {
         fail(ssdgs_error_message(j->context));
         if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
-        return sprintf(error, "the trained model is in %.480s; --resume saves it", j->checkpoint), fail(error);
+        return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint), fail(error);
     }
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
     print_peak_memory();
