@@ -1251,7 +1251,7 @@ static void olat__read_path(olat__json *j, const olat__node *node, const char *f
     }
 }
 
-/* Of an image not read, as wide as twice its middle. */
+/* A side of an image not read: twice its middle, 0 = not given. */
 static int olat__side(double middle) { return middle >= 0.5 && middle <= 16384 ? (int)(2 * middle + 0.5) : 256; }
 
 static void olat__read_frames(olat__json *j, const char *folder, int flags, olat_dataset *out) {
@@ -1275,8 +1275,8 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, olat
         olat__read_lens(j, node, &lens);
         olat__read_light(j, node, &frame->light);
         olat__read_path(j, node, folder, flags, &frame->file);
-        camera->width = lens.w ? lens.w : lens.has_centre ? olat__side(lens.cx) : 256;
-        camera->height = lens.h ? lens.h : lens.has_centre ? olat__side(lens.cy) : 256;
+        camera->width = lens.w ? lens.w : olat__side(lens.cx);
+        camera->height = lens.h ? lens.h : olat__side(lens.cy);
         if (!(flags & OLAT_NO_IMAGES) && !j->failed) {
             j->failed = olat_read_png(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, j->error);
             frame->has_image = 1;

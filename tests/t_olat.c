@@ -749,6 +749,12 @@ static void test_datasets(void) {
     CHECK(loads(TOP "{" LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
         set.frames[0].camera.width == 256 && set.frames[0].camera.height == 256);
     olat_free(&set);
+    CHECK(loads(TOP "{" LIGHT POSE ",\"camera_intrinsics\":[40,29.5,50,50]}]}", OLAT_NO_IMAGES) &&
+        set.frames[0].camera.width == 80 && set.frames[0].camera.height == 59); /* twice the middle */
+    olat_free(&set);
+    CHECK(loads(TOP "{" LIGHT POSE ",\"w\":70,\"h\":50,\"camera_intrinsics\":[40,29.5,50,50]}]}", OLAT_NO_IMAGES) &&
+        set.frames[0].camera.width == 70 && set.frames[0].camera.height == 50);
+    olat_free(&set);
     CHECK(loads(TOP "{\"file_path\":\"../t_olat_files/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
     olat_free(&set);
     CHECK(live == 0);

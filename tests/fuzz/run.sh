@@ -15,7 +15,7 @@ for target; do
         n=$((n + $(sed -n 's/^stat::number_of_executed_units: *//p' "$at.log" | grep . || echo 0)))
         left=0
         [ $found -ne 0 ] || continue
-        if ls "$at".timeout-* >/dev/null 2>&1 && "$at" -timeout=5 "$at".timeout-* >/dev/null 2>&1; then
+        if grep -q 'ERROR: libFuzzer: timeout' "$at.log" && "$at" -timeout=5 "$at".timeout-* >/dev/null 2>&1; then
             echo "$target: stood still at an input that takes no time: goes on"
             rm "$at".timeout-*
             left=$((end - $(date +%s)))
