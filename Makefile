@@ -86,7 +86,7 @@ test-fastmath: ## tests with -ffast-math, but for t_accuracy: its references are
 test-c99: ## tests with -std=c99
 	$(MAKE) test BUILD=$(BUILD)/c99 CC="$(CC) -std=c99"
 
-test-matrix: ## tests with every compiler and machine at hand (an hour); others are named
+test-matrix: ## tests with every compiler and machine at hand (hours); others are named
 	sh tests/matrix.sh $(BUILD)
 
 fuzz: $(BUILD)/fuzzers/all ## fuzzes each target for FUZZ_SECONDS (1800); needs clang's libFuzzer; findings go to build/fuzzers

@@ -82,7 +82,9 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
     if [ "$seconds" = - ] || command -v gcov >/dev/null; then
         part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
     else absent Coverage gcov; fi
-    part matrix 'Compilers and machines' sh tests/matrix.sh "$build"
+    part levels 'Compilers: gcc and clang at every level' sh tests/matrix.sh "$build" levels
+    part standards 'Compilers: C99 to C17, C++11 to C++20' sh tests/matrix.sh "$build" standards
+    part machines 'Compilers and machines: tcc, musl, Windows, emulators, WebAssembly' sh tests/matrix.sh "$build" machines
 } >"$out/parts"
 
 # The catalogue's 86 rows: how many held wherever they are tested, how many are tested, which are not.

@@ -1,7 +1,8 @@
 #!/bin/sh
-# sh tests/matrix.sh BUILD [NAME...]: the tests with every compiler, option and machine at hand, or those named. Cross compilers,
-# emulators: Debian's packages. A line each, "NAME: N passed, N failed" or "NAME: absent"; then, for code with FMA and without,
-# the hashes of a rendering, a light pass and a trained model, and what gave them; figures at the end.
+# sh tests/matrix.sh BUILD [NAME...]: the tests with every compiler, option and machine at hand, or the rows or groups (levels,
+# standards, machines) named. Cross compilers, emulators: Debian's packages. A line each, "NAME: N passed, N failed" or
+# "NAME: absent"; then, for code with FMA and without, the hashes of a rendering, a light pass and a trained model, and what gave
+# them; figures at the end.
 build=$1
 shift
 wanted=" $* "
@@ -13,7 +14,7 @@ tried=0 good=0
 
 # row NAME RUNNER TESTS CC CFLAGS: RUNNER starts a program, '' = the machine itself
 row() {
-    [ "$wanted" = '  ' ] || case $wanted in *" $1 "*) ;; *) return ;; esac
+    [ "$wanted" = '  ' ] || case $wanted in *" $1 "* | *" $group "*) ;; *) return ;; esac
     for tool in ${4%% *} ${2%% *}; do
         command -v "$tool" >/dev/null || { echo "$1: absent ($tool)"; return; }
     done
@@ -31,6 +32,7 @@ row() {
         sed -n -e 's/^hash s[a-z0-9]* /without /p' -e 's/^hash [an][a-z0-9]* /with /p' | sort -u | sed "s/\$/ $1/" >>"$build/matrix/hashes"
 }
 
+group=levels
 for level in -O0 -O2 -O3 -Os '-O2 -ffast-math' '-O2 -march=native'; do
     name=$(echo "$level" | tr -d ' ')
     case $level in
@@ -41,6 +43,7 @@ for level in -O0 -O2 -O3 -Os '-O2 -ffast-math' '-O2 -march=native'; do
     row "gcc$name" '' "$some" gcc "$level"
     row "clang$name" '' "$some" clang "$level" clang++
 done
+group=standards
 for standard in c99 c11 c17; do
     row "gcc-$standard" '' "$few" "gcc -std=$standard -pedantic-errors" -O1
     row "clang-$standard" '' "$few" "clang -std=$standard -pedantic-errors" -O1
@@ -49,6 +52,7 @@ for standard in c++11 c++14 c++17 c++20; do
     row "g$standard" '' "$few" "g++ -std=$standard" -O1 g++
     row "clang$standard" '' "$few" "clang++ -x c++ -std=$standard" -O1 clang++
 done
+group=machines
 row tcc '' "$most" tcc ''
 row musl '' "$few" 'musl-gcc -static' -O2
 row i686 '' "$few" 'i686-linux-gnu-gcc -static' -O2
