@@ -145,7 +145,7 @@ refinement() {
     row 'true poses and lights' '' default
     row 'disturbed' '37.44' disturbed --train-json transforms_train_disturbed.json
     row 'disturbed, refined' '38.35' refined --train-json transforms_train_disturbed.json --refine
-    printf '\n| scene | test, each pose and light fitted to its photograph | cameras (length), (angle), lights (length): disturbed | refined |\n'
+    printf '\n| scene | test, each pose and light fitted to its photograph | cameras (the object in the picture, length, angle), lights (length): disturbed | refined |\n'
     printf '| --- | --- | --- | --- |\n'
     for s in $scenes; do
         scene=${s%%:*}

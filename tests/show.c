@@ -229,9 +229,33 @@ static int strip(show *s, int columns, const char *const *files, int count)
 
 /* ---- poses ---- */
 
+/* How far apart, in px, two cameras see the corners of a cube as wide as half of the bounds, on average: what turns and moves that
+   make up for each other leave. */
+static double shift(const ssdgs_camera *a, const ssdgs_camera *b)
+{
+    const ssdgs_camera *const cameras[2] = {a, b};
+    double sum = 0;
+    int corner, c, k;
+    for (corner = 0; corner < 8; corner++) {
+        double at[2][2];
+        for (c = 0; c < 2; c++) {
+            double x[3];
+            for (k = 0; k < 3; k++) {
+                const ssdgs_real *row = cameras[c]->view + 4 * k;
+                x[k] = (double)row[3] + 0.25 * ((corner & 1 ? 1 : -1) * (double)row[0] + (corner & 2 ? 1 : -1) * (double)row[1] +
+                                                (corner & 4 ? 1 : -1) * (double)row[2]);
+            }
+            at[c][0] = (double)cameras[c]->fx * x[0] / x[2];
+            at[c][1] = (double)cameras[c]->fy * x[1] / x[2];
+        }
+        sum += sqrt((at[0][0] - at[1][0]) * (at[0][0] - at[1][0]) + (at[0][1] - at[1][1]) * (at[0][1] - at[1][1]));
+    }
+    return sum / 8;
+}
+
 static int poses(show *s, const char *truth, const char *fitted)
 {
-    double distance = 0, turn = 0, light = 0;
+    double distance = 0, turn = 0, apart_px = 0, light = 0;
     int i, k, m;
     if (olat_load("", truth, OLAT_NO_IMAGES, &s->set, s->error) || olat_load("", fitted, OLAT_NO_IMAGES, &s->other, s->error))
         return 1;
@@ -248,9 +272,10 @@ static int poses(show *s, const char *truth, const char *fitted)
         }
         distance += sqrt(olat__dot(apart, apart)) / s->set.count;
         turn += acos(trace < 3 ? (trace - 1) / 2 : 1) * (180 / 3.14159265358979323846) / s->set.count;
+        apart_px += shift(&s->set.frames[i].camera, &s->other.frames[i].camera) / s->set.count;
         light += sqrt(olat__dot(lights, lights)) / s->set.count;
     }
-    printf("%.4f, %.2f degrees, %.4f\n", distance, turn, light);
+    printf("%.2f px, %.4f, %.2f degrees, %.4f\n", apart_px, distance, turn, light);
     return 0;
 }
 
