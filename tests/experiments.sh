@@ -1,9 +1,9 @@
 #!/bin/sh
 # The paper's experiments with this library, and others: sh tests/experiments.sh BUILD DATA ITERATIONS SCENE:BACKGROUND...
-# Writes BUILD/experiments/EXPERIMENTS.md, with the findings of tests/EXPERIMENTS.md after the tables. PARTS="FUNCTION..." makes those
-# sections alone and keeps the others. A run of the same commit, data and options is not repeated. Runs go side by side, one thread
-# and one core each: LIST=1 makes this script name its runs on descriptor 3, and RUN=1 do one of them:
-# BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
+# Writes BUILD/experiments/EXPERIMENTS.md: the tables, between the head and the findings of tests/EXPERIMENTS.md.
+# PARTS="FUNCTION..." makes those sections alone and keeps the others. A run of the same commit, data and options is not repeated.
+# Runs go side by side, one thread and one core each: LIST=1 makes this script name its runs on descriptor 3, and RUN=1 do one of
+# them: BUILD DATA ITERATIONS SCENE:BACKGROUND NAME OPTION...
 set -eu
 build=$1 data=$2 iterations=$3
 shift 3
@@ -220,14 +220,7 @@ else
 fi
 cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q)
 {
-    cat <<TEXT
-# Experiments
-
-Made by \`make experiments\`: runs go side by side, one thread and one core each, the schedule scaled to the iterations. Figures are
-PSNR in dB on views and lights not in training, in brackets on (up to 40 of) the training photographs, after them the time of the
-training. The paper's figures are means over its 8 scenes with 60,000 to 100,000 iterations: compare differences, not values. Runs
-with other seeds differ by 0.1 to 0.3 dB.
-TEXT
+    sed '/^## /,$d' tests/EXPERIMENTS.md | sed '$d'
     part default_configuration 'Default configuration'
     part published_configuration 'Published configuration (--preset published)'
     part components 'Reflectance components (Tables 2 and 4)'
