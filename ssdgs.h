@@ -502,14 +502,15 @@ typedef struct ssdgs_camera {
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major world to camera; x right, y down, z forward */
-    ssdgs_real near_plane;     /* world units; 0 = 0.01 */
+    ssdgs_real near_plane;     /* world units; 0 = 0.01. Gaussians with a centre nearer than that are not drawn, nor those more than
+                                  56 degrees to the side or above that reach back, by five standard deviations, beside the camera */
 } ssdgs_camera;
 
 typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
 typedef struct ssdgs_light {
     ssdgs_light_kind kind;
     ssdgs_real position[3];  /* world; directional: unit vector towards the light */
-    ssdgs_real intensity[3]; /* RGB, in the units of the training data; directional: irradiance */
+    ssdgs_real intensity[3]; /* RGB, 0 or more, in the units of the training data; directional: irradiance */
 } ssdgs_light;
 
 /* Camera at eye looking at target; focal length for a horizontal field of view in radians. up may be any vector. */
@@ -555,7 +556,7 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
 typedef struct ssdgs_render_stats {
     int gaussians;      /* in the model */
     int visible;        /* inside the camera's frustum */
-    int shaded;         /* contributing to a pixel */
+    int shaded;         /* contributing to a pixel; 1 at least where any is glimpsed */
     int glimpsed;       /* contributing, but left unshaded within max_error */
     int rejected;       /* never drawn: position or rotation is not finite, scale or opacity is NaN */
     int blackened;      /* drawn black: the colour is not finite */
@@ -726,7 +727,6 @@ typedef struct ssdgs_splat_view {
     int blur;                   /* ssdgs_blur */
     ssdgs_real variance;        /* px^2, of the blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
-    ssdgs_real steepest;        /* centres beyond this slope x / z, y / z are not drawn */
     /* SSDGS_STAGE_PROJECT */
     ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
     ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn */
@@ -974,6 +974,11 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
 #define SSDGS__LOBE 11       /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
+/* A Gaussian beside the camera that reaches back to the plane z = 0 would by its affine projection cover the whole picture: beyond
+   this slope x / z, y / z none is drawn whose standard deviation along z is so much of its depth. The picture's borders have no say
+   in it, so its parts agree. */
+#define SSDGS__STEEP 1.5
+#define SSDGS__BACK 0.2
 
 enum { /* rows of a block's geometry */
     SSDGS__WI = 0, SSDGS__WO = 3, SSDGS__NORMAL = 6, SSDGS__IRRADIANCE = 9, SSDGS__COSINE, SSDGS__GLOSS, SSDGS__ROWS,
@@ -983,7 +988,7 @@ enum { /* rows of a block's geometry */
 /* ---- what the kernels are called with ---- */
 
 typedef struct ssdgs__projection {
-    ssdgs_real view[12], fx, fy, cx, cy, near_plane, steepest, log2_threshold, variance;
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance;
     int width, height, orthographic, by_distance, compensate, blur;
 } ssdgs__projection;
 
@@ -1694,8 +1699,12 @@ struct ssdgs_model {
     ssdgs_real *globals;  /* the groups of ssdgs__global_groups, in order */
 };
 
-enum { SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET,
-    SSDGS__GLOBAL_GROUPS };
+enum { /* parameters that learn together: planes of every Gaussian, then what all share */
+    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR,
+    SSDGS__G_SCATTERING, SSDGS__G_FRAME, SSDGS__G_ASG_WEIGHT, SSDGS__G_MATERIAL, SSDGS__PLANE_GROUPS,
+    SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET, SSDGS__GLOBAL_GROUPS,
+    SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
+};
 
 /* A counter-based generator: the value depends on the key and the counter alone, never on the order of use. */
 static uint64_t ssdgs__hash(uint64_t key, uint64_t counter) {
@@ -2243,7 +2252,6 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         v->variance = (ssdgs_real)(v->blur == SSDGS_BLUR_FLOOR ? 0.2 : 0.3);
         v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
         v->cx = v->cy = (ssdgs_real)map / 2;
-        v->steepest = (ssdgs_real)1e30;
         if (faces == 6) {
             for (i = 0; i < 3; i++) {
                 direction[i] = i == face / 2 ? (face & 1 ? -1 : 1) : 0;
@@ -2251,7 +2259,6 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
             }
             f = 0.5 * map;
             v->near_plane = (ssdgs_real)(1e-4 * radius);
-            v->steepest = (ssdgs_real)1.5; /* a face ends at 1; far beside it the affine projection means nothing */
             v->by_distance = 1;
         } else {
             v->orthographic = distance > 1000 * radius;
@@ -2459,7 +2466,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
         frame->views[0].compensate = frame->options.antialias;
         frame->views[0].variance = frame->settings.pixel_variance;
-        frame->views[0].steepest = (ssdgs_real)1e30;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
     for (i = 0, j = 1; needs_light && i < frame->light_count && !m->kept.lights_ready; i++)
@@ -2523,7 +2529,6 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.cx = v->cx;
     p.cy = v->cy;
     p.near_plane = v->near_plane;
-    p.steepest = v->steepest;
     p.log2_threshold = ssdgs__log2_threshold(frame);
     p.width = v->width;
     p.height = v->height;
@@ -3796,12 +3801,13 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs__kept *kept = &frame->memory->kept;
     ssdgs__shade_job job;
     ssdgs_result result;
-    int i;
+    int glimpses = 0, i;
     frame->shaded_count = 0;
     for (i = 0; i < frame->gaussians.count; i++) {
         if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
+        else glimpses |= frame->seen[i];
     }
-    if (!frame->shaded_count && frame->gaussians.count) { /* glimpses at most: some colour is needed */
+    if (!frame->shaded_count && glimpses) { /* some colour is needed */
         frame->seen[0] = SSDGS_SEEN;
         frame->shaded[frame->shaded_count++] = 0;
     }
@@ -4059,7 +4065,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
     distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-5 * distance + ssdgs__nearest(map); /* no shadow by rounding */
+    distance -= bias + (ssdgs_real)1e-6 * distance + ssdgs__nearest(map); /* no shadow by rounding */
     x = u < wide ? (int)u : map->width - 2;
     y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
@@ -4074,7 +4080,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
                                     const ssdgs_real *layers, ssdgs_real *sight) {
     const ssdgs_real bias = frame->settings.light_bias * frame->settings.length_unit;
-    int i, c, view;
+    int first = 1, i, c, view; /* views are in the order of lights */
+    while (first < frame->view_count && frame->views[first].light < light) first++;
     for (i = 0; i < 256; i++) {
         const int lane = i / 16 * 64 + i % 16;
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
@@ -4086,9 +4093,8 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
         y = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
         for (c = 0; c < 3; c++) at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
-        for (view = 1; view < frame->view_count && passed < 0; view++)
-            if (frame->views[view].light == light && frame->views[view].falls)
-                passed = ssdgs__passed_to(frame->views + view, at, bias);
+        for (view = first; view < frame->view_count && frame->views[view].light == light && passed < 0; view++)
+            if (frame->views[view].falls) passed = ssdgs__passed_to(frame->views + view, at, bias);
         sight[lane] = passed < 0 ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32] : passed;
     }
 }
@@ -4122,10 +4128,11 @@ static void ssdgs__composite_task(void *data, int index) {
             ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
         if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, sight);
         if (frame->pixel_shadow) {
+            const int given = frame->visibility_given != 0;
             ssdgs_real *planes[2];
             planes[0] = frame->pixel_visibility + plane;
             planes[1] = frame->pixel_shadow + plane;
-            ssdgs__tile_store(&tile, sight, 2, planes);
+            ssdgs__tile_store(&tile, sight + 16 * given, 2 - given, planes + given);
         }
     }
     ssdgs__tile_store(&tile, pixels, 4, job->planes);
@@ -5725,17 +5732,8 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
 #ifndef SSDGS_NO_TRAINER
 /* ==== >>trainer  schedule, one photograph forward and backward, Adam ==== */
 
-/* Parameters that learn together; the first ten are planes of every Gaussian. */
-enum {
-    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR,
-        SSDGS__G_SCATTERING,
-    SSDGS__G_FRAME, SSDGS__G_ASG_WEIGHT, SSDGS__G_MATERIAL, SSDGS__PLANE_GROUPS,
-    SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
-};
-
 static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY,
-    SSDGS_DIFFUSE,
-    SSDGS_SPECULAR, SSDGS_SCATTERING, SSDGS_FRAME, SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
+    SSDGS_DIFFUSE, SSDGS_SPECULAR, SSDGS_SCATTERING, SSDGS_FRAME, SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
 static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotation", "log scale", "opacity", "diffuse colour",
     "specular colour",
     "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma",
@@ -6120,7 +6118,7 @@ typedef struct ssdgs__adam_range {
 
 typedef struct ssdgs__adam_job {
     const ssdgs__kernels *k;
-    ssdgs__adam_range range[SSDGS_CHANNELS + SSDGS__GLOBAL_GROUPS];
+    ssdgs__adam_range range[(int)SSDGS_CHANNELS + (int)SSDGS__GLOBAL_GROUPS];
     int ranges;
     size_t chunks;
 } ssdgs__adam_job;
@@ -7713,7 +7711,16 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         /* NaN fails every comparison, so nothing that is not finite is drawn */
         drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)), VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
-        for (f = 0; f < 2; f++) drawn = VAND(drawn, VLT(VABS(VMUL(p.t[f], p.inverse_z)), VSET(k->steepest)));
+        if (!k->orthographic) {
+            V back = VSET(0); /* variance along z, of depths */
+            for (f = 0; f < 3; f++) {
+                V axis = VMUL(VMUL(p.s[f], p.inverse_z),
+                              VDOT3(VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]), p.r[f], p.r[3 + f], p.r[6 + f]));
+                back = VFMA(axis, axis, back);
+            }
+            back = VSEL(VLT(VSET(SSDGS__STEEP), VMUL(VMAX(VABS(p.t[0]), VABS(p.t[1])), p.inverse_z)), back, VSET(0));
+            drawn = VAND(drawn, VLT(back, VSET(SSDGS__BACK * SSDGS__BACK)));
+        }
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
         VSTORE(lane, VSEL(drawn, d, VSET(-1)));

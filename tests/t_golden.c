@@ -201,7 +201,6 @@ static void test_light_pass(const char *name) {
     v->cx = camera.cx;
     v->cy = camera.cy;
     v->near_plane = (ssdgs_real)0.01;
-    v->steepest = (ssdgs_real)1e30;
     n = (size_t)model->count;
     frame.flux = reals(n);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));

@@ -390,7 +390,8 @@ static void row_05(void) { /* drawn where z > near and z is finite, else as if i
     ssdgs_model_destroy(model);
 }
 
-static void row_06(void) { /* the camera, then the light too, inside a large Gaussian */
+static void row_06(void) { /* the camera, then the light too, inside a large Gaussian; many beside it */
+    enum { BESIDE = 500 };
     static const double depths[4] = {1e-30, 0.011, 0.1, 1};
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0.1, 0, 0, 1);
@@ -402,6 +403,19 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
         CHECK(!i || (double)a.alpha[CENTRE] > 0.49); /* the first is culled */
     }
     trains(model, &camera, &light);
+    ssdgs_model_destroy(model);
+    model = cloud(plain(), BESIDE);
+    for (i = -12; i <= 12; i++) { /* 90 degrees to the side and about that, at a distance of 1, a ball of radius 1/2 is not seen */
+        const double angle = (90 + i) * 3.14159265358979324 / 180;
+        const ssdgs_real eye[3] = {(ssdgs_real)centre[0], (ssdgs_real)centre[1], (ssdgs_real)(centre[2] - 1)}, up[3] = {0, 1, 0};
+        const ssdgs_real target[3] = {eye[0] + (ssdgs_real)sin(angle), eye[1], eye[2] + (ssdgs_real)cos(angle)};
+        const ssdgs_camera turned = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.9, W, H);
+        double alpha = 0;
+        int k;
+        show(model, &turned, NULL, 0, NULL, &a);
+        for (k = 0; k < PIXELS; k++) alpha += (double)a.alpha[k];
+        CHECK(alpha < 1e-3 * PIXELS);
+    }
     ssdgs_model_destroy(model);
 }
 
@@ -523,7 +537,7 @@ static void row_13(void) { /* around o = 1/255, in steps of the logit's ulp: not
         look(model, &a);
         for (k = 0; k < PIXELS; k++) lit += a.alpha[k] > 0;
         if (lit && !(first < 0)) first = logit; /* the first one drawn; all after it are */
-        wrong += lit != (first < 0) || a.stats.shaded != 1 || (lit && !(fabs((double)a.alpha[CENTRE] * 255 - 1) < 2e-5));
+        wrong += lit != (first < 0) || a.stats.shaded != lit || (lit && !(fabs((double)a.alpha[CENTRE] * 255 - 1) < 2e-5));
     }
     CHECK(!wrong && fabs(first + log(254)) < 3e-6);
     ssdgs_model_destroy(model);
