@@ -639,8 +639,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
-                                  its centre in the picture are transparent there, 1/128 of the width around; 0.02; 0 = none.
-                                  Photographs that are transparent everywhere do not count as such */
+                                  its centre in the picture are transparent there, 1/128 of the width around, or where none has; 0.02;
+                                  0 = none. Photographs that are transparent everywhere do not count as such */
     ssdgs_real opacity_fade;   /* where no photograph has outlines: so many times the mean opacity, less and less up to iteration
                                   30,000*, is added to the loss, as Gaussians of the background's colour have no other reason to
                                   go; 0.3; 0 = nothing */
@@ -6387,7 +6387,7 @@ static void ssdgs__outlines_task(void *data, int chunk) {
             seen += side > 0;
             outside += side == 2;
         }
-        job->outside[i] = (ssdgs_real)outside > trainer->options.prune_outside * (ssdgs_real)seen;
+        job->outside[i] = !seen || (ssdgs_real)outside > trainer->options.prune_outside * (ssdgs_real)seen;
     }
 }
 
