@@ -641,9 +641,9 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
                                   its centre in the picture are transparent there, 1/128 of the width around, or where none has; 0.02;
                                   0 = none. Photographs that are transparent everywhere do not count as such */
-    ssdgs_real opacity_fade;   /* where no photograph has outlines: so many times the mean opacity, less and less up to iteration
-                                  30,000*, is added to the loss, as Gaussians of the background's colour have no other reason to
-                                  go; 0.3; 0 = nothing */
+    ssdgs_real opacity_fade;   /* px: where no photograph has outlines an opaque Gaussian costs as much as so many px wrong by 1, less
+                                  and less up to iteration 30,000*, as those of the background's colour have no other reason to go;
+                                  0.8; 0 = nothing */
     ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
     ssdgs_rate camera_rate, light_rate; /* of the bounds' longest side, radians; for 300 shows of each photograph; with fewer, times
                                            the root of 300 / shows */
@@ -5806,7 +5806,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
-    o.opacity_fade = (ssdgs_real)0.3;
+    o.opacity_fade = (ssdgs_real)0.8;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
@@ -6555,7 +6555,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_opacity, (ssdgs_real)1e-30, (ssdgs_real)0.999);
     SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
-    SSDGS__RANGE(opacity_fade, 0, 1);
+    SSDGS__RANGE(opacity_fade, 0, most);
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
@@ -6816,11 +6816,11 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     return (int)trainer->order[at];
 }
 
-/* Adds the gradient of opacity_fade x the mean opacity at time t, where outlines are not known. */
-static void ssdgs__fade(const ssdgs_trainer *trainer, double t, ssdgs_real *gradient) {
+/* Adds the gradient of opacity_fade x the sum of opacities / pixels at time t, where outlines are not known. */
+static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, ssdgs_real *gradient) {
     const size_t n = (size_t)trainer->model->count;
     const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
-    const double fade = trainer->outlines || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / (double)n;
+    const double fade = trainer->outlines || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
     size_t i;
     for (i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
@@ -6863,7 +6863,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of photograph %d's %s "
                                  "is not finite", trainer->iteration, photo, j > 5 ? "light" : "camera");
-    ssdgs__fade(trainer, t, frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
+    ssdgs__fade(trainer, t, (double)camera.width * camera.height, frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
     if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
     if (!result) {

@@ -1211,10 +1211,10 @@ static void test_prune_outside(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Where outlines are not known the loss has opacity_fade x the mean opacity, half of it half way to 30,000 of 60,000. */
+/* Where outlines are not known the loss has opacity_fade x the sum of opacities / pixels, half of it half way to 30,000 of 60,000. */
 static void test_fade(void) {
     enum { MANY = 5 };
-    const double fade = 0.3, step = 1e-3;
+    const double fade = 3, step = 1e-3, area = 50;
     static unsigned char opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
@@ -1232,16 +1232,16 @@ static void test_fade(void) {
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         for (i = 0; i < MANY; i++) {
             ssdgs_real gradient[MANY] = {1, 1, 1, 1, 1}, *opacity = model->gaussians + SSDGS_OPACITY * model->capacity;
-            double mean[2] = {0, 0}, want;
+            double sum[2] = {0, 0}, want;
             int j, side;
             for (j = 0; j < MANY; j++) opacity[j] = (ssdgs_real)(j - 1.7);
             for (side = 0; side < 2; side++)
                 for (j = 0; j < MANY; j++)
-                    mean[side] += 1 / (1 + exp(-(double)opacity[j] + (j == i ? (side ? -step : step) : 0))) / MANY;
-            want = known ? 0 : 0.5 * fade * (mean[1] - mean[0]) / (2 * step);
-            ssdgs__fade(trainer, 15e3, gradient);
+                    sum[side] += 1 / (1 + exp(-(double)opacity[j] + (j == i ? (side ? -step : step) : 0)));
+            want = known ? 0 : 0.5 * fade / area * (sum[1] - sum[0]) / (2 * step);
+            ssdgs__fade(trainer, 15e3, area, gradient);
             CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5 && (known || want > 1e-3));
-            ssdgs__fade(trainer, 30e3, gradient);
+            ssdgs__fade(trainer, 30e3, area, gradient);
             CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5);
         }
         model->gaussians[SSDGS_POSITION * model->capacity] = 1000; /* no photograph has it */
