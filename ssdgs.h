@@ -4065,7 +4065,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
     distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-6 * distance + ssdgs__nearest(map); /* no shadow by rounding */
+    distance -= bias + (ssdgs_real)1e-5 * distance + ssdgs__nearest(map); /* no shadow by rounding */
     x = u < wide ? (int)u : map->width - 2;
     y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
