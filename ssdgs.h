@@ -729,7 +729,7 @@ typedef struct ssdgs_splat_view {
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
     /* SSDGS_STAGE_PROJECT */
     ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
-    ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn */
+    ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn, see ssdgs_camera.near_plane */
     /* SSDGS_STAGE_SORT */
     uint32_t *order;            /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
     int visible;

@@ -587,7 +587,8 @@ static void check_light_camera(void) {
     for (g = 0; g < s.count; g++)
         for (f = 0; f < face_count; f++) {
             splat p;
-            if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 && p.x <= faces[f].width && p.y <= faces[f].height) {
+            if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 && p.x <= faces[f].width &&
+                p.y <= faces[f].height) {
                 on++;
                 break;
             }
