@@ -608,8 +608,8 @@ typedef enum ssdgs_schedule { /* the paper's orders H to K */
     SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
 } ssdgs_schedule;
 
-typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate; /* learning rate, first and last; between, by equal factors, to or
-                                                                    from 0 by equal steps */
+/* Learning rate: from start to end by equal factors, to or from 0 by equal steps. */
+typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate;
 
 /* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations` below that. */
 typedef struct ssdgs_train_options {
@@ -639,14 +639,17 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
                                   photographs that see it; 0.05; 0 = none */
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
-                                  its centre in the picture are transparent there, 1/128 of the width around, or where none has; 0.02;
-                                  0 = none. Photographs that are transparent everywhere do not count as such */
-    ssdgs_real opacity_fade;   /* px: where no photograph has outlines an opaque Gaussian costs as much as so many px wrong by 1, less
-                                  and less up to iteration 30,000*, as those of the background's colour have no other reason to go;
-                                  0.8; 0 = nothing */
-    ssdgs_rate position, opacity, scale, rotation, color, asg, frame, material, shadow, scattering;
-    ssdgs_rate camera_rate, light_rate; /* of the bounds' longest side, radians; for 300 shows of each photograph; with fewer, times
-                                           the root of 300 / shows */
+                                  its centre in the picture, and more than one of eight or more, are transparent there, 1/128 of
+                                  the width around, or where none has it; 0.02; 0 = none. Photographs have outlines where more
+                                  than a hundredth of the picture is wholly transparent, but not all of it */
+    ssdgs_real opacity_fade;   /* px: where only a fiftieth of the photographs have outlines, or one of eight or more, an opaque
+                                  Gaussian costs as much as so many px wrong by 1, less and less up to iteration 30,000*, as those
+                                  of the background's colour have no other reason to go; 0.8; 0 = nothing */
+    ssdgs_rate position, opacity, scale, rotation, color; /* over the whole run; position: of 1.1 x the cameras' radius */
+    ssdgs_rate asg, frame;                /* start up to iteration 40,000*, end at 90,000*: the published shape */
+    ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
+    ssdgs_rate camera_rate, light_rate;   /* up to 60,000*; of the bounds' longest side, turns of the picture's width; for 300 shows of
+                                             each photograph; with fewer, times the root of 300 / shows */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
@@ -4065,7 +4068,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
     distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-5 * distance + ssdgs__nearest(map); /* no shadow by rounding */
+    distance -= bias + (ssdgs_real)1e-6 * distance + ssdgs__nearest(map);
     x = u < wide ? (int)u : map->width - 2;
     y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
@@ -4079,7 +4082,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
    no map knows it, that of their Gaussians. */
 static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
                                     const ssdgs_real *layers, ssdgs_real *sight) {
-    const ssdgs_real bias = frame->settings.light_bias * frame->settings.length_unit;
+    const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
+    const ssdgs_real bias = (frame->settings.light_bias + rounding) * frame->settings.length_unit;
     int first = 1, i, c, view; /* views are in the order of lights */
     while (first < frame->view_count && frame->views[first].light < light) first++;
     for (i = 0; i < 256; i++) {
@@ -5761,7 +5765,7 @@ struct ssdgs_trainer {
     ssdgs_train_options options;
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
-    unsigned char *transparent; /* per photograph: 1 some pixels let the background through, 2 all do, wholly; else 0 */
+    unsigned char *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
     int photo_count;
     uint32_t *order;          /* the photographs in this pass's order */
     size_t stride;            /* of the planes below: the model's capacity */
@@ -5772,7 +5776,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     double extent;            /* 1.1 x the cameras' radius */
-    int outlines;             /* any photograph shows where the object ends */
+    int outlines;             /* photographs show where the object ends */
     double unit;              /* the bounds' longest side */
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -6222,15 +6226,15 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     return SSDGS_OK;
 }
 
-/* Adam on a photograph's camera (part 0) or light (part 1). */
-static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate, double unit) {
+/* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the picture's width. */
+static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate, double unit, double angle) {
     const int steps = ++c->steps[part];
     int i;
     for (i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double g = gradient[i];
         c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
         c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
-        c->value[i] -= (i / 3 == 1 ? rate : rate * unit) * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
+        c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
                        (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
     }
 }
@@ -6349,6 +6353,11 @@ typedef struct ssdgs__outlines_job {
     unsigned char *outside;      /* per Gaussian */
 } ssdgs__outlines_job;
 
+/* Whether so many photographs are more than a share of all and, as one may be wrong, more than one of eight or more. */
+static int ssdgs__several(int photographs, int all, double share) {
+    return photographs > (all < 8 ? 0 : 1) && photographs > share * all;
+}
+
 /* Whether a camera has a place in the picture: 0 no, 1 yes, 2 yes and its photograph is transparent there and around. */
 static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent, const ssdgs_real x[3]) {
     const int reach = (camera->width + 127) / 128;
@@ -6382,12 +6391,12 @@ static void ssdgs__outlines_task(void *data, int chunk) {
         const ssdgs_real x[3] = {position[i], position[trainer->stride + i], position[2 * trainer->stride + i]};
         int seen = 0, outside = 0;
         for (photo = 0; photo < trainer->photo_count; photo++) {
-            const int outlines = trainer->transparent[photo] == 1; /* one that shows nothing at all has none: a failed mask */
+            const int outlines = trainer->transparent[photo] == 2;
             const int side = ssdgs__outline_side(trainer->photos + photo, job->cameras + photo, outlines, x);
             seen += side > 0;
             outside += side == 2;
         }
-        job->outside[i] = !seen || (ssdgs_real)outside > trainer->options.prune_outside * (ssdgs_real)seen;
+        job->outside[i] = !seen || ssdgs__several(outside, seen, (double)trainer->options.prune_outside);
     }
 }
 
@@ -6698,7 +6707,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int i, j;
+    int outlined = 0, i, j;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
@@ -6720,19 +6729,20 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->photo_count = photo_count;
     for (i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
-        int blank = 1;
-        size_t at;
-        for (at = 0; at < pixels && (blank || !trainer->transparent[i]); at++) {
+        size_t clear = 0, veiled = 0, at;
+        for (at = 0; at < pixels; at++) {
             const int alpha = ssdgs__photo_alpha(photos + i, at);
-            blank &= !alpha;
-            trainer->transparent[i] |= alpha < 65535;
+            clear += !alpha;
+            veiled += alpha < 65535;
         }
-        if (blank) trainer->transparent[i] = 2;
-        trainer->outlines |= trainer->transparent[i] == 1;
+        /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
+        trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
+        outlined += trainer->transparent[i] == 2;
     }
+    trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
     if (!trainer->outlines)
-        ssdgs__note(context, "no photograph is transparent in part: the object's outlines are not known, and Gaussians of the "
-                    "background's colour may stay around it");
+        ssdgs__note(context, "too few photographs are transparent around the object: its outlines are not known, and Gaussians of "
+                    "the background's colour may stay around it");
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -6868,12 +6878,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     trainer->skipped += result != SSDGS_OK;
     if (!result) {
         const double shows = (double)o->iterations / trainer->photo_count, wider = shows < 300 ? sqrt(300 / shows) : 1;
+        const double angle = (double)camera.width / (double)camera.fx;
         if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
                                              wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
-                                             trainer->unit);
+                                             trainer->unit, angle);
         if (moves[1]) ssdgs__correction_step(correction, gradient, 1,
                                              wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
-                                             trainer->unit);
+                                             trainer->unit, angle);
     }
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;
@@ -7014,13 +7025,14 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     ssdgs_light light;
     ssdgs_frame frame;
     ssdgs_result result;
-    double unit;
+    double unit, angle;
     int i, j;
     if (!model || !photo || !background || iterations < 0) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
     memset(&correction, 0, sizeof correction);
     unit = ssdgs__model_unit(model);
+    angle = (double)photo->camera.width / (double)photo->camera.fx;
     for (i = 0; i < iterations; i++) {
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
@@ -7032,8 +7044,8 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
         for (j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                     "refinement: a gradient is not finite");
-        ssdgs__correction_step(&correction, gradient, 0, rate, unit);
-        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate, unit);
+        ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
+        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate, unit, angle);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
     photo->camera = camera;

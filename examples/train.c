@@ -32,7 +32,7 @@ static int usage(const char *problem, const char *what)
             "             [--transfer srgb|none] [--schedule progressive|joint|swapped|merged] [--resume] [--refine]\n"
             "             [--terms diffuse,specular,shadow,scattering] [--max-gaussians N] [--points N] [--seed N]\n"
             "             [--checkpoint-every N] [--train-json FILE] [--threads N] [--isa NAME]\n"
-            "             [--set NAME=VALUE[,VALUE...]]: any number or rate of ssdgs_settings or ssdgs_train_options\n",
+            "             [--set NAME=VALUE[,VALUE...]]: numbers and rates of ssdgs_settings and ssdgs_train_options\n",
             problem, what);
     return 2;
 }

@@ -65,9 +65,11 @@ while IFS= read -r MUTANT; do
         'tests: '*) tests=${MUTANT#tests: }; continue ;;
     esac
     number=$((number + 1))
-    if [ $number -lt "$first" ] || [ $number -gt "$last" ]; then continue; fi
     by=error
-    if apply; then notices $tests; fi
+    if apply; then # every line must fit, whichever are tried
+        if [ $number -lt "$first" ] || [ $number -gt "$last" ]; then continue; fi
+        notices $tests
+    fi
     case $by in
         '') what=SURVIVED ;;
         error) what=ERROR errors=$((errors + 1)) ;;

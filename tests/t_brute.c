@@ -358,8 +358,8 @@ static int look(const double at[3], double *visibility) {
         x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx, y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
         if (!(t[2] > l->near_plane) || x < 0 || y < 0 || x > l->width || y > l->height) continue;
         n = project_all(l, p);
-        distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-5) -
-            (double)s.settings.light_bias * (double)s.settings.length_unit;
+        distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-6) -
+            ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
         x = fmin(fmax(x - 0.5, 0), l->width - 1), y = fmin(fmax(y - 0.5, 0), l->height - 1);
         column = x < l->width - 1 ? (int)x : l->width - 2, row = y < l->height - 1 ? (int)y : l->height - 2;
         x -= column, y -= row;
