@@ -477,7 +477,7 @@ SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
 
 /* What reading a file had to mend. */
 typedef struct ssdgs_load_stats {
-    int zero_rotations;      /* replaced by the identity */
+    int zero_rotations;      /* all below 1e-37, or one beyond 1e37: replaced by the identity */
     int clamped_opacities;   /* infinite or beyond +-20 */
     int clamped_scales;      /* beyond +-20 */
     int dropped;             /* Gaussians with other non-finite values */
@@ -630,7 +630,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
     ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so
                                   that normals are right where only highlights tell; 0.05; 0 = none */
-    ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start; -0.5, 0.5 */
+    ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start: the object's box, not the cameras'; -0.5, 0.5 */
     ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
     ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on average, is halved,
@@ -5361,9 +5361,12 @@ static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats)
         ++*(i == SSDGS_OPACITY ? &stats->clamped_opacities : &stats->clamped_scales);
     }
     for (i = SSDGS_ROTATION; i <= SSDGS_FRAME && i < planes; i += SSDGS_FRAME - SSDGS_ROTATION) {
-        double size = 0;
-        for (k = 0; k < 4; k++) size += ssdgs__ply_value(words[i + k]) * ssdgs__ply_value(words[i + k]);
-        if (size >= 1e-30 && size <= 1e30) continue; /* float can square it */
+        double largest = 0;
+        for (k = 0; k < 4; k++) {
+            const double size = fabs(ssdgs__ply_value(words[i + k]));
+            largest = size > largest ? size : largest;
+        }
+        if (largest >= 1e-37 && largest <= 1e37) continue; /* float can divide by it, as drawing does */
         for (k = 0; k < 4; k++) words[i + k] = k ? 0 : one;
         stats->zero_rotations++;
     }
@@ -6886,6 +6889,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
                                              wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                              trainer->unit, angle);
     }
+    if (!trainer->iteration && !frame.shaded_count)
+        ssdgs__note(trainer->context, "the first photograph drawn has no Gaussian in view: do the camera's axes, position, near_plane "
+                    "and the bounds suit each other?");
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);

@@ -450,6 +450,10 @@ static void test_mending(void) {
         view.gaussians[(size_t)(SSDGS_ROTATION + i) * stride + 1] = 0;
         view.gaussians[(size_t)(SSDGS_FRAME + i) * stride + 2] = 0;
     }
+    for (i = 0; i < 4; i++) { /* drawn as any other */
+        view.gaussians[(size_t)(SSDGS_ROTATION + i) * stride + 5] = (ssdgs_real)(i == 2 ? 2e-37 : 0);
+        view.gaussians[(size_t)(SSDGS_FRAME + i) * stride + 5] = (ssdgs_real)(i == 3 ? -9e36 : 0);
+    }
     view.gaussians[SSDGS_OPACITY * stride + 3] = from_bits(0x7f800000u);
     view.gaussians[SSDGS_OPACITY * stride + 4] = -21;
     view.gaussians[SSDGS_LOG_SCALE * stride + 4] = from_bits(0xff800000u);
@@ -462,6 +466,7 @@ static void test_mending(void) {
         CHECK(now.count == 6 && stats.dropped == 2 && stats.zero_rotations == 2);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 1);
         CHECK(now.gaussians[SSDGS_ROTATION * now.stride] == 1 && now.gaussians[SSDGS_FRAME * now.stride + 1] == 1);
+        CHECK(now.gaussians[(SSDGS_ROTATION + 2) * now.stride + 4] > 0 && now.gaussians[(SSDGS_FRAME + 3) * now.stride + 4] < 0);
         CHECK(now.gaussians[SSDGS_OPACITY * now.stride + 2] == 20 && now.gaussians[SSDGS_OPACITY * now.stride + 3] == -20);
         CHECK(now.gaussians[SSDGS_LOG_SCALE * now.stride + 3] == -20);
         CHECK(now.gaussians[SSDGS_POSITION * now.stride + 5] == view.gaussians[SSDGS_POSITION * stride + 6]);

@@ -1068,13 +1068,38 @@ static void test_prune_weight(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Notes in the log: of bounds that hold nothing, of outlines that are not known. */
-static int heard[2];
+/* Notes in the log: of bounds that hold nothing, of outlines that are not known, of nothing in view. */
+static int heard[3];
 
 static void hear(void *user, ssdgs_result code, const char *message) {
     (void)user;
     heard[0] += code == SSDGS_OK && strstr(message, "bounds_min") != NULL;
     heard[1] += code == SSDGS_OK && strstr(message, "outlines are not known") != NULL;
+    heard[2] += code == SSDGS_OK && strstr(message, "no Gaussian in view") != NULL;
+}
+
+/* Cameras that see nothing are noted, once. */
+static void test_nothing_in_view(void) {
+    const ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    int blind, i;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    CHECK(!ssdgs_context_create(&desc, &context));
+    for (blind = 0; blind < 2; blind++) {
+        ssdgs_photo shots[PHOTOS];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        memcpy(shots, photos, sizeof shots);
+        for (i = 0; i < PHOTOS && blind; i++) shots[i].camera.near_plane = 10;
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        for (i = 0; i < 2; i++) CHECK(!ssdgs_trainer_step(trainer, NULL) && heard[2] == blind);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
 }
 
 enum { COLUMN = 15 }; /* of the second photograph of outlined(), a little less than transparent; the third and more are opaque */
@@ -1414,6 +1439,7 @@ int main(void) {
     test_blur();
     test_prune_weight();
     test_prune_outside();
+    test_nothing_in_view();
     test_outlines_known();
     test_fade();
     test_half_shadow();
