@@ -6229,6 +6229,9 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     return SSDGS_OK;
 }
 
+/* Radians across the picture's width, its centre on the axis. */
+static double ssdgs__view_angle(const ssdgs_camera *camera) { return 2 * atan(0.5 * camera->width / (double)camera->fx); }
+
 /* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the picture's width. */
 static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate, double unit, double angle) {
     const int steps = ++c->steps[part];
@@ -6881,7 +6884,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     trainer->skipped += result != SSDGS_OK;
     if (!result) {
         const double shows = (double)o->iterations / trainer->photo_count, wider = shows < 300 ? sqrt(300 / shows) : 1;
-        const double angle = (double)camera.width / (double)camera.fx;
+        const double angle = ssdgs__view_angle(&camera);
         if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
                                              wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
                                              trainer->unit, angle);
@@ -7038,7 +7041,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     if (result) return result;
     memset(&correction, 0, sizeof correction);
     unit = ssdgs__model_unit(model);
-    angle = (double)photo->camera.width / (double)photo->camera.fx;
+    angle = ssdgs__view_angle(&photo->camera);
     for (i = 0; i < iterations; i++) {
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);

@@ -751,7 +751,7 @@ static void test_refinement(void) {
     for (p = 0, first = 0; p < PHOTOS; p++) first += fabs(trainer->corrections[p].value[0]);
     CHECK(fabs(first / (2e-3 * 0.25 * sqrt(300.0 * PHOTOS / 360)) - 1) < 1e-3); /* Adam's first step is the rate, whatever it is of */
     for (p = 0, turn = 0; p < PHOTOS; p++) turn += fabs(trainer->corrections[p].value[3]); /* its turns, of the picture's width */
-    CHECK(fabs(turn / first / (SIDE / (double)photos[0].camera.fx) - 1) < 1e-3);
+    CHECK(fabs(turn / first / (2 * atan(0.5 * SIDE / (double)photos[0].camera.fx)) - 1) < 1e-3);
     CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
     for (p = 0; p < PHOTOS; p++) {
         ssdgs_photo now;
