@@ -853,7 +853,7 @@ static void test_eta(void) {
         ssdgs_model_destroy(model);
         random_lobes(&l, p, 0, 1);
         l.eta = etas[i].eta;
-        if (etas[i].good) CHECK(gap((double)lighting(&l, p).virtual_depth / boundary((double)(ssdgs_real)l.eta), 1) < 4 * eps);
+        if (etas[i].good) CHECK(gap((double)lighting(&l, p).virtual_depth / boundary((double)(ssdgs_real)l.eta), 1) < 4 * eps + 16 * DBL_EPSILON); /* at 2.5 doubles cancel to 0.12 */
     }
     ssdgs_context_destroy(context);
 }
