@@ -625,7 +625,7 @@ typedef struct ssdgs_train_options {
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
     int opacity_reset_every;   /* 3000, not scaled, the last one at least half of it before densify_until*: with fewer than 5,400
                                   iterations there is none; 0 = never */
-    int refine_camera, refine_light; /* 1: fit each photograph's pose, light position; 0 */
+    int refine_camera, refine_light; /* 1: fit each photograph's pose, but for what all have in common, light position; 0 */
     ssdgs_real background[3];  /* stored values */
     ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
     ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so
@@ -6245,6 +6245,48 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
     }
 }
 
+/* A point (w = 1) or direction (0) of the world in the camera's frame, and c = a x b. */
+static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], double w, double seen[3]) {
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++) seen[i] += (double)camera->view[4 * i + j] * world[j];
+}
+
+static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
+    int i;
+    for (i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+/* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common, to first order: the scene
+   would follow, and its photographs look the same. */
+static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
+    double centre[3], p[3], x[3], y[3], move[3] = {0, 0, 0}, turn[3] = {0, 0, 0};
+    int i, j, l, pass;
+    for (j = 0; j < 3; j++)
+        centre[j] = 0.5 * ((double)trainer->options.bounds_min[j] + (double)trainer->options.bounds_max[j]);
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0; i < trainer->photo_count; i++) {
+            const ssdgs_camera *camera = &trainer->photos[i].camera;
+            double *value = trainer->corrections[i].value;
+            ssdgs__to_camera(camera, centre, 1, p);
+            if (pass) {
+                ssdgs__to_camera(camera, move, 0, x);
+                for (j = 0; j < 3; j++) value[j] -= x[j];
+                ssdgs__to_camera(camera, turn, 0, x);
+                for (j = 0; j < 3; j++) value[3 + j] -= x[j];
+                ssdgs__cross(x, p, y);
+                for (j = 0; j < 3; j++) value[j] += y[j];
+            } else {
+                ssdgs__cross(value + 3, p, x);
+                for (j = 0; j < 3; j++)
+                    for (l = 0; l < 3; l++) {
+                        move[j] += (double)camera->view[4 * l + j] * (value[l] + x[l]) / trainer->photo_count;
+                        turn[j] += (double)camera->view[4 * l + j] * value[3 + l] / trainer->photo_count;
+                    }
+            }
+        }
+}
+
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
 #define SSDGS__STATISTICS 4
@@ -6888,6 +6930,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
         if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
                                              wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
                                              trainer->unit, angle);
+        if (moves[0] && o->position.start > 0) ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
         if (moves[1]) ssdgs__correction_step(correction, gradient, 1,
                                              wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                              trainer->unit, angle);

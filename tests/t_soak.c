@@ -696,6 +696,7 @@ static void row_63(void) {
         ssdgs_light light;
         training t;
         o.refine_camera = 1;
+        o.position.start = o.position.end = 0; /* or the scene would follow instead */
         t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, 1);
         t.trainer->corrections[0].value[4] = angles[a];
         CHECK(!ssdgs_trainer_refined(t.trainer, 0, &camera, &light));

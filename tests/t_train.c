@@ -770,6 +770,61 @@ static void test_refinement(void) {
     ssdgs_context_destroy(context);
 }
 
+/* What moves and turns all cameras as one goes out of their corrections, what two do against each other stays. */
+static void test_anchor(void) {
+    static const double centre[3] = {0.1, -0.2, 0.3}, motion[6] = {1e-4, -2e-4, 3e-4, 2e-4, 1e-4, -3e-4};
+    ssdgs_train_options options = short_run(360);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs__correction kept[PHOTOS];
+    double worst = 0, largest = 0;
+    int i, j, l, p, both;
+    options.refine_camera = 1;
+    for (j = 0; j < 3; j++) {
+        options.bounds_min[j] = (ssdgs_real)(centre[j] - 0.5);
+        options.bounds_max[j] = (ssdgs_real)(centre[j] + 0.5);
+    }
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    for (both = 0; both < 2; both++) {
+        for (p = 0; p < PHOTOS; p++) { /* view x motion = correction x view */
+            const ssdgs_real *view = photos[p].camera.view;
+            const double way = p == 0 ? 1 : p == 1 ? -1 : 0;
+            double *value = trainer->corrections[p].value, seen[3], e[9], jacobian[9];
+            for (i = 0; i < 3; i++)
+                for (seen[i] = (double)view[4 * i + 3], value[i] = value[3 + i] = 0, j = 0; j < 3; j++) {
+                    seen[i] += (double)view[4 * i + j] * centre[j];
+                    value[i] += (double)view[4 * i + j] * (both + way) * motion[j];
+                    value[3 + i] += (double)view[4 * i + j] * (both + way) * motion[3 + j];
+                }
+            ssdgs__rotate_by(value + 3, e, jacobian);
+            for (i = 0; i < 3; i++)
+                for (value[i] += seen[i], l = 0; l < 3; l++) value[i] -= e[3 * i + l] * seen[l];
+        }
+        if (!both) memcpy(kept, trainer->corrections, sizeof kept);
+        ssdgs__anchor_cameras(trainer);
+        for (p = 0; p < PHOTOS; p++)
+            for (i = 0; i < 6; i++)
+                worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
+    }
+    if (!CHECK(worst < 2e-6)) printf("    off by %g\n", worst);
+    memset(trainer->corrections, 0, PHOTOS * sizeof *trainer->corrections);
+    for (i = 0; i < 34; i++) CHECK(!ssdgs_trainer_step(trainer, NULL)); /* cameras move from 30 on */
+    memcpy(kept, trainer->corrections, sizeof kept);
+    ssdgs__anchor_cameras(trainer);
+    for (p = 0, worst = 0; p < PHOTOS; p++)
+        for (i = 0; i < 6; i++) {
+            worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
+            largest = fmax(largest, fabs(kept[p].value[i]));
+        }
+    if (!CHECK(largest > 1e-4 && worst < 1e-7 * largest)) /* done after every step; a float view turns by 1 + 1e-8 */
+        printf("    %g of %g\n", worst, largest);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 /* The schedules switch terms and freezes at the paper's iterations, scaled to the run. */
 static void test_schedule(void) {
     ssdgs_train_options o = ssdgs_train_options_published();
@@ -1445,6 +1500,7 @@ int main(void) {
     test_half_shadow();
     test_learning();
     test_refinement();
+    test_anchor();
     test_schedule();
     TEST_END();
 }
