@@ -832,10 +832,10 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
 #if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
 #if __clang_major__ >= 12 && !defined(__wasm__)
-#pragma float_control(precise, on, push)
+#pragma float_control(precise, on, push) /* which lets expressions fuse */
 #endif
+#pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-fast-math")
@@ -918,8 +918,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 #if defined(_MSC_VER)
 #include <intrin.h>
-#else
-#include <cpuid.h>
 #endif
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop
@@ -1545,15 +1543,24 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
 /* ==== >>cpu  which tables this machine can run ==== */
 
 #if SSDGS__X86
+/* All 0 for a leaf that the CPU has not. Without <cpuid.h>: clang 14's lets ebx come out where the subleaf goes in. */
 static void ssdgs__cpuid(unsigned leaf, unsigned subleaf, unsigned out[4]) {
 #if defined(_MSC_VER)
     int r[4];
     __cpuidex(r, (int)leaf, (int)subleaf);
     memcpy(out, r, sizeof r);
+#elif defined(__x86_64__)
+    __asm__("xchgq %%rbx, %q1\n\tcpuid\n\txchgq %%rbx, %q1"
+            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3]) : "0"(leaf), "2"(subleaf));
 #else
-    out[0] = out[1] = out[2] = out[3] = 0;
-    __get_cpuid_count(leaf, subleaf, &out[0], &out[1], &out[2], &out[3]);
+    __asm__("xchgl %%ebx, %k1\n\tcpuid\n\txchgl %%ebx, %k1"
+            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3]) : "0"(leaf), "2"(subleaf));
 #endif
+    if (leaf) {
+        unsigned first[4];
+        ssdgs__cpuid(0, 0, first);
+        if (first[0] < leaf) memset(out, 0, 4 * sizeof *out);
+    }
 }
 
 /* 1 = SSE2, 2 = and AVX2 with FMA, 3 = and AVX-512F; the operating system must save the registers too. */
