@@ -6,7 +6,8 @@ and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026), who
 It runs on the CPU and needs C99 or C++11, libc, libm and the system's threads.
 
 DO THIS
-  In one C or C++ file of the program:
+  In one C or C++ file of the program, best one of its own, as the code defines short macros (R, V, F, VADD) and undefines
+  them at its end:
       #define SSDGS_IMPLEMENTATION
       #include "ssdgs.h"
   Everywhere else include it without the define. Link with -lm -lpthread (nothing on Windows). Keep the name ssdgs.h:
@@ -106,8 +107,8 @@ WHAT IT COMPUTES
 CONVENTIONS
   camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a translation. The
             centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy in px. No lens distortion.
-  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0 means 0.01 of
-            it. Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
+  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0 means 0.02
+            of settings.length_unit (published: 0.01). Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
   light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB irradiance. Any
             number of them in a rendering, one in a photograph. Intensities have the unit of the photographs':
             ssdgs_trainer_create() gives an empty model the light_scale that makes E 1 on average at the centre of the
@@ -214,7 +215,7 @@ FILES
   cannot be trained. One with kd_ but no ssdgs_settings gets the published settings, and networks at their start unless
   it has them. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
   cameras or lights are refused. Both kinds of file are written under another name and renamed when
-  complete.
+  complete: a link is replaced, not followed, and the file's mode is a new file's.
 
 DOUBLE
   With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values and
@@ -392,8 +393,9 @@ typedef enum ssdgs_dipole {
    and F0; p is h less its part along n. So t_j chooses between the normals' mean, right for smooth surfaces, and all of them,
    right for rough ones. n.wi / (wo.h)^2 is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001),
    n.wi >= 0, wo.h >= 0.25. S is eq. 8's of the blended answers of the shadow network and of (1 - soft) v + soft v_g: v is the
-   transmittance to the place at the pixel's depth, by the distances at which it falls in the light's map, v_g the Gaussians',
-   over alpha as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes out beside where it went in */
+   transmittance to the place at the pixel's depth, as the light's map tells from where it falls below 0.9, 0.5 and 0.1 (a veil
+   that leaves more casts no shadow), v_g the Gaussians', over alpha as their softness is: 0 for a shadow's edge on what reflects,
+   1 where light comes out beside where it went in */
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
@@ -502,7 +504,7 @@ typedef struct ssdgs_camera {
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major world to camera; x right, y down, z forward */
-    ssdgs_real near_plane;     /* world units; 0 = 0.01. Gaussians with a centre nearer than that are not drawn, nor those more than
+    ssdgs_real near_plane;     /* world units; 0 = 0.02 length units, 0.01 without them. Gaussians with a centre nearer than that are not drawn, nor those more than
                                   56 degrees to the side or above that reach back, by five standard deviations, beside the camera */
 } ssdgs_camera;
 
@@ -671,7 +673,8 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
 /* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians starts from
    random points and is given light_scale, centre, length_unit and new networks; one that has Gaussians keeps all it has, but
-   the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. One trainer at a time grows a model.
+   the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. Once another trainer's density control or checkpoint, or
+   ssdgs_model_sort(), has moved the Gaussians this one's calls fail with ERR_ARGUMENT.
    options NULL = default. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
@@ -748,9 +751,10 @@ typedef struct ssdgs_splat_view {
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
     ssdgs_real *tile_sums;      /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
-    ssdgs_real *falls;          /* (tiles, 4, 4, 4, 4, 4) a light's: tiles' micro-tiles, rows first, their pixels, of each the
+    ssdgs_real *falls;          /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each the
                                    distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5, 0.1, or
-                                   1e30, and what is left behind all; not set in tiles without a Gaussian. NULL: nobody asks */
+                                   1e30; what is left after the first two falls, what there was before the last two, and what is
+                                   left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -963,9 +967,13 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
+#define SSDGS__MAX_SIDE (1 << 15) /* px of an image */
 #define SSDGS__MOST_LIGHT 1e30 /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
-#define SSDGS__FALLS 3       /* levels of transmittance whose distances a light's map holds, before what is left behind all */
+#define SSDGS__FALLS 3       /* levels of transmittance below which a light's map says where it falls */
+enum { /* a map's pixel: distances of the falls, what is left after the first of them, what there was before the others, and behind all */
+    SSDGS__LEFT = SSDGS__FALLS, SSDGS__BEFORE = 2 * SSDGS__FALLS - 1, SSDGS__BEHIND = 3 * SSDGS__FALLS - 2, SSDGS__FALL_VALUES
+};
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
 #define SSDGS__LAYERS 8      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, three of one light */
@@ -1112,14 +1120,18 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 
 /* ---- a light's map of where transmittance falls ---- */
 
-/* At a distance, the transmittances t of the lanes in `bits` have fallen below their next level or several. */
-static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t, ssdgs_real distance,
-                              ssdgs_real *next, unsigned char *level) {
+/* At a distance, the transmittances of the lanes in `bits` have fallen below their next level or several, from t to `left`. */
+static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t, const ssdgs_real *left,
+                              ssdgs_real distance, ssdgs_real *next, unsigned char *level) {
     for (; bits; bits &= bits - 1) {
         const int lane = ssdgs__lowest_bit(bits);
-        ssdgs_real *at = tile->falls + (16 * micro + lane) * (SSDGS__FALLS + 1);
+        ssdgs_real *at = tile->falls + (16 * micro + lane) * SSDGS__FALL_VALUES;
         int l = level[lane];
-        while (l < SSDGS__FALLS && t[lane] < ssdgs__fall[l]) at[l++] = distance;
+        for (; l < SSDGS__FALLS && left[lane] < ssdgs__fall[l]; l++) {
+            at[l] = distance;
+            if (l < SSDGS__FALLS - 1) at[SSDGS__LEFT + l] = left[lane];
+            if (l) at[SSDGS__BEFORE + l - 1] = t[lane];
+        }
         level[lane] = (unsigned char)l;
         next[lane] = l < SSDGS__FALLS ? ssdgs__fall[l] : -1;
     }
@@ -1129,10 +1141,10 @@ static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits,
 static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *levels, const ssdgs_real *transmittance) {
     int i;
     for (i = 0; i < 256; i++) {
-        ssdgs_real *at = tile->falls + i * (SSDGS__FALLS + 1);
+        ssdgs_real *at = tile->falls + i * SSDGS__FALL_VALUES;
         int l;
         for (l = levels[i]; l < SSDGS__FALLS; l++) at[l] = SSDGS__NEVER;
-        at[SSDGS__FALLS] = transmittance[i];
+        at[SSDGS__BEHIND] = transmittance[i];
     }
 }
 
@@ -1264,12 +1276,26 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
     ssdgs__append(text, at, digits + n);
 }
 
-/* Records what went wrong (%s, %d int, %z size_t, %g double), tells the log, returns the code; without a context, that alone. */
+/* Appends %s, %d int, %z size_t, %g double. */
+static void ssdgs__append_format(char *text, size_t *at, const char *format, va_list arguments) {
+    char one[2] = {0, 0};
+    for (; *format; format++) {
+        *one = *format;
+        if (*format != '%') ssdgs__append(text, at, one);
+        else switch (*++format) {
+            case 's': ssdgs__append(text, at, va_arg(arguments, const char *)); break;
+            case 'd': ssdgs__append_number(text, at, (double)va_arg(arguments, int)); break;
+            case 'z': ssdgs__append_number(text, at, (double)va_arg(arguments, size_t)); break;
+            default: ssdgs__append_number(text, at, va_arg(arguments, double)); break;
+        }
+    }
+}
+
+/* Records what went wrong, tells the log, returns the code; without a context, that alone. */
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
     va_list arguments;
     if (!context) return code;
-    va_start(arguments, format);
     context->message[0] = 0;
     if (context->subject) {
         ssdgs__append(context->message, &at, context->subject);
@@ -1277,18 +1303,8 @@ static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const
         if (context->subject_number >= 0) ssdgs__append_number(context->message, &at, context->subject_number);
         ssdgs__append(context->message, &at, ": ");
     }
-    for (; *format; format++) {
-        char one[2];
-        one[0] = *format;
-        one[1] = 0;
-        if (*format != '%') ssdgs__append(context->message, &at, one);
-        else switch (*++format) {
-            case 's': ssdgs__append(context->message, &at, va_arg(arguments, const char *)); break;
-            case 'd': ssdgs__append_number(context->message, &at, (double)va_arg(arguments, int)); break;
-            case 'z': ssdgs__append_number(context->message, &at, (double)va_arg(arguments, size_t)); break;
-            default: ssdgs__append_number(context->message, &at, va_arg(arguments, double)); break;
-        }
-    }
+    va_start(arguments, format);
+    ssdgs__append_format(context->message, &at, format, arguments);
     va_end(arguments);
     if (context->logger.write) context->logger.write(context->logger.user, code, context->message);
     return code;
@@ -1702,6 +1718,7 @@ struct ssdgs_model {
     ssdgs_context *context;
     ssdgs_settings settings;
     uint64_t revision;    /* another one whenever the model may have changed */
+    uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must follow */
     int count;
     size_t capacity;      /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -1715,6 +1732,11 @@ enum { /* parameters that learn together: planes of every Gaussian, then what al
     SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET, SSDGS__GLOBAL_GROUPS,
     SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
 };
+
+/* Whether positions are in a length unit, which the paper's form does not have. */
+static int ssdgs__has_unit(const ssdgs_settings *s) {
+    return s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0;
+}
 
 /* A counter-based generator: the value depends on the key and the counter alone, never on the order of use. */
 static uint64_t ssdgs__hash(uint64_t key, uint64_t counter) {
@@ -2013,6 +2035,7 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     ssdgs__arrange(model->gaussians, model->capacity, keys, count, (ssdgs_real *)(keys + count));
     ssdgs__release(model->context, keys);
     ssdgs__model_changed(model);
+    model->arrangement++;
     return SSDGS_OK;
 }
 
@@ -2290,7 +2313,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
 static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c) {
     double determinant;
     int i, j;
-    if (c->width < 1 || c->height < 1 || c->width > 1 << 15 || c->height > 1 << 15)
+    if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
     if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) ||
         !ssdgs__finite(c->cy) || !(c->near_plane >= 0) || !ssdgs__finite(c->near_plane))
@@ -2473,7 +2496,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].fy = camera->fy;
         frame->views[0].cx = camera->cx;
         frame->views[0].cy = camera->cy;
-        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : (ssdgs_real)0.01;
+        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : ssdgs__has_unit(&frame->settings)
+            ? (ssdgs_real)0.02 * frame->settings.length_unit : (ssdgs_real)0.01;
         frame->views[0].compensate = frame->options.antialias;
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
@@ -2830,7 +2854,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
-    t.falls = v->falls ? v->falls + (size_t)index * 256 * (SSDGS__FALLS + 1) : NULL;
+    t.falls = v->falls ? v->falls + (size_t)index * 256 * SSDGS__FALL_VALUES : NULL;
     return t;
 }
 
@@ -2909,7 +2933,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->falls = NULL;
             if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
-                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real, (size_t)(v->tiles_x * v->tiles_y) * 256 * (SSDGS__FALLS + 1));
+                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real, (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__FALL_VALUES);
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
@@ -3462,7 +3486,7 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
                                            const ssdgs_real *inputs, const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
                                            ssdgs_real *transposed, ssdgs__row_lists *lists, int asked,
                                            ssdgs_real *slot_gradient) {
-    const ssdgs_real *layer_in = outputs;
+    const ssdgs_real *layer_in = layers > 1 ? outputs : inputs;
     int layer, live_out = sizes[layers];
     const uint16_t *outs = lists->all;
     for (layer = 0; layer < layers; layer++) {
@@ -3817,9 +3841,10 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
         else glimpses |= frame->seen[i];
     }
-    if (!frame->shaded_count && glimpses) { /* some colour is needed */
-        frame->seen[0] = SSDGS_SEEN;
-        frame->shaded[frame->shaded_count++] = 0;
+    if (!frame->shaded_count && glimpses) { /* some colour is needed: the first's */
+        for (i = 0; !frame->seen[i]; i++) {}
+        frame->seen[i] = SSDGS_SEEN;
+        frame->shaded[frame->shaded_count++] = (uint32_t)i;
     }
     result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
@@ -4046,18 +4071,22 @@ typedef struct ssdgs__composite_job {
     ssdgs__lighting *lightings; /* NULL: without the layers */
 } ssdgs__composite_job;
 
-/* Transmittance at a distance from the light through one pixel of its map: linear from level to level. */
-static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance) {
+/* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all along the gap behind a veil,
+   until the next fall is nearer than `thick`, and from there goes straight to what there was before that. */
+static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance, ssdgs_real thick) {
     const int tile = (y >> 4) * map->tiles_x + (x >> 4);
     const ssdgs_real *falls = map->falls +
-        ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) * (SSDGS__FALLS + 1);
+        ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) * SSDGS__FALL_VALUES;
+    ssdgs_real left, begin;
     int level = 0, i;
     if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
     for (i = 0; i < SSDGS__FALLS; i++) level += distance > falls[i];
     if (!level) return 1;
-    if (level == SSDGS__FALLS || falls[level] >= SSDGS__NEVER) return falls[SSDGS__FALLS];
-    return ssdgs__fall[level - 1] + (ssdgs__fall[level] - ssdgs__fall[level - 1]) * (distance - falls[level - 1]) /
-                                        (falls[level] - falls[level - 1]);
+    if (level == SSDGS__FALLS) return falls[SSDGS__BEHIND];
+    left = falls[SSDGS__LEFT + level - 1];
+    begin = falls[level] - thick > falls[level - 1] ? falls[level] - thick : falls[level - 1];
+    if (distance <= begin) return left;
+    return left + (falls[SSDGS__BEFORE + level - 1] - left) * (distance - begin) / (falls[level] - begin);
 }
 
 /* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
@@ -4081,7 +4110,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u -= (ssdgs_real)x;
     w -= (ssdgs_real)y;
     for (i = 0; i < 2; i++)
-        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance) + u * ssdgs__passed(map, x + 1, y + i, distance);
+        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance, bias) + u * ssdgs__passed(map, x + 1, y + i, distance, bias);
     return (1 - w) * row[0] + w * row[1];
 }
 
@@ -4523,14 +4552,14 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, image metrics ==== */
 
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear) {
-    ssdgs_real out;
-    ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
+    ssdgs_real out = linear;
+    if (ssdgs__finite(linear)) ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
     return out;
 }
 
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
-    ssdgs_real out;
-    ssdgs__srgb_decode_scalar(&out, &encoded, 1);
+    ssdgs_real out = encoded;
+    if (ssdgs__finite(encoded)) ssdgs__srgb_decode_scalar(&out, &encoded, 1);
     return out;
 }
 
@@ -4852,7 +4881,7 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
     if (!context || !metrics) return SSDGS_ERR_ARGUMENT;
     memset(metrics, 0, sizeof *metrics);
     if (!image || !reference) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: an image is NULL");
-    if (width < 1 || height < 1 || width > 1 << 15 || height > 1 << 15)
+    if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
     pixels = (size_t)width * (size_t)height;
     result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
@@ -5754,13 +5783,15 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotat
         "scattering network", "shadow network"};
 
 /* What is no failure, for the log alone. */
-static void ssdgs__note(const ssdgs_context *context, const char *text) {
-    if (context->logger.write) context->logger.write(context->logger.user, SSDGS_OK, text);
-}
-
-/* Whether positions are in a length unit, which the paper's form does not have. */
-static int ssdgs__has_unit(const ssdgs_settings *s) {
-    return s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0;
+static void ssdgs__note(const ssdgs_context *context, const char *format, ...) {
+    char text[SSDGS__MESSAGE] = "";
+    size_t at = 0;
+    va_list arguments;
+    if (!context->logger.write) return;
+    va_start(arguments, format);
+    ssdgs__append_format(text, &at, format, arguments);
+    va_end(arguments);
+    context->logger.write(context->logger.user, SSDGS_OK, text);
 }
 
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
@@ -5772,6 +5803,7 @@ typedef struct ssdgs__correction {
 struct ssdgs_trainer {
     ssdgs_context *context;
     ssdgs_model *model;
+    uint64_t arrangement;     /* the model's, that the planes below belong to */
     ssdgs_train_options options;
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
@@ -5876,6 +5908,12 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
     for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++)
         learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg || asg == SSDGS_ASG_DEFERRED;
     return terms;
+}
+
+/* Whether opacities are reset after an iteration. */
+static int ssdgs__resets(const ssdgs_train_options *o, int iteration) {
+    return o->opacity_reset_every && iteration > 0 && iteration % o->opacity_reset_every == 0 &&
+           ssdgs__schedule_time(o, iteration + o->opacity_reset_every / 2) <= o->densify_until;
 }
 
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
@@ -6184,11 +6222,12 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
 }
 
-/* Which terms a group serves: it rests while none of them is in use. */
-static int ssdgs__group_used(int group, int terms) {
+/* Which terms a group serves: it rests while none of them is in use. Where light is deferred an ASG weight is how soft shadows are. */
+static int ssdgs__group_used(int group, int terms, int asg) {
     switch (group) {
         case SSDGS__G_DIFFUSE: return terms & SSDGS_DIFFUSE_TERM;
-        case SSDGS__G_SPECULAR: case SSDGS__G_ASG_WEIGHT: return terms & SSDGS_SPECULAR_TERM;
+        case SSDGS__G_SPECULAR: return terms & SSDGS_SPECULAR_TERM;
+        case SSDGS__G_ASG_WEIGHT: return terms & (SSDGS_SPECULAR_TERM | (asg == SSDGS_ASG_DEFERRED ? SSDGS_SHADOW_TERM : 0));
         case SSDGS__G_SCATTERING: return terms & SSDGS_SCATTERING_TERM;
         case SSDGS__G_MATERIAL: return terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM);
         case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return terms & SSDGS_SHADOW_TERM;
@@ -6210,7 +6249,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     job.chunks = 0;
     for (group = 0; group < SSDGS__GROUPS; group++) {
         const int shared = group - SSDGS__PLANE_GROUPS;
-        if (!learns[group] || !ssdgs__group_used(group, terms)) continue;
+        if (!learns[group] || !ssdgs__group_used(group, terms, model->settings.asg)) continue;
         if (shared >= 0) {
             const size_t at = first[shared], n = first[shared + 1] - at;
             if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
@@ -6232,7 +6271,8 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
                                "iteration %d refused: the gradient of %s, element %z, is not finite", trainer->iteration,
                                ssdgs__group_names[job.range[i].group], job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
-    for (group = 0; group < SSDGS__GROUPS; group++) trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms);
+    for (group = 0; group < SSDGS__GROUPS; group++)
+        trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms, model->settings.asg);
     return SSDGS_OK;
 }
 
@@ -6300,6 +6340,8 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 #define SSDGS__HALVED 0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
 #define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
 
+static void ssdgs__rearranged(ssdgs_trainer *trainer) { trainer->arrangement = ++trainer->model->arrangement; }
+
 /* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move: all or nothing. */
 static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs_context *context = trainer->context;
@@ -6330,6 +6372,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     trainer->screen_count = statistics + capacity;
     trainer->contribution = statistics + 2 * capacity;
     trainer->half_shadow = statistics + 3 * capacity;
+    if (capacity != model->capacity) model->arrangement++;
+    trainer->arrangement = model->arrangement;
     trainer->stride = model->capacity = capacity;
     return SSDGS_OK;
 }
@@ -6363,6 +6407,7 @@ static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count,
     ssdgs__arrange(trainer->mean, trainer->stride, keys, count, scratch);
     ssdgs__arrange(trainer->square, trainer->stride, keys, count, scratch);
     model->count = (int)count;
+    ssdgs__rearranged(trainer);
 }
 
 /* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it is small, two
@@ -6485,8 +6530,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
     /* opacities were reset since the last control: weights say little */
-    const int before = trainer->iteration - 1, resets = o->opacity_reset_every;
-    const int recovering = resets && before / resets > (before - o->densify_every) / resets;
+    const int before = trainer->iteration - 1, last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
+    const int recovering = last > before - o->densify_every && ssdgs__resets(o, last);
     ssdgs__ranked *candidates;
     uint64_t *order;
     unsigned char *drop;
@@ -6596,6 +6641,17 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 
 /* ==== >>steps  the trainer's public functions ==== */
 
+/* The bounds' longest side. */
+static double ssdgs__bounds_side(const ssdgs_train_options *o) {
+    double longest = 0;
+    int j;
+    for (j = 0; j < 3; j++) {
+        const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
+        longest = side > longest ? side : longest;
+    }
+    return longest;
+}
+
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
     static const char *const names[12] = {"position", "opacity", "scale", "rotation", "color", "asg", "frame", "material", "shadow",
         "scattering", "camera_rate", "light_rate"};
@@ -6633,6 +6689,9 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
         if (!ssdgs__finite(o->background[i])) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                 "train options: background[%d] is not finite", i);
     }
+    if (!(ssdgs__bounds_side(o) >= 2e-15 && ssdgs__bounds_side(o) <= 2e15))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
+                           "2e-15 .. 2e15", ssdgs__bounds_side(o));
     return SSDGS_OK;
 }
 
@@ -6755,6 +6814,123 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     return result;
 }
 
+/* ---- whether photographs, cameras and bounds suit each other: notes ---- */
+
+typedef struct ssdgs__silhouette {
+    int left, right, top, bottom; /* of what a photograph shows; right < left: nothing */
+    double shown, outside;        /* pixels, and those beside the bounds' picture */
+} ssdgs__silhouette;
+
+static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
+    const ssdgs_camera *camera = &photo->camera;
+    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0};
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+    int corner, c, x, y;
+    for (corner = 0; corner < 8; corner++) {
+        double world[3], seen[3];
+        for (c = 0; c < 3; c++) world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
+        ssdgs__to_camera(camera, world, 1, seen);
+        for (c = 0; c < 2; c++) {
+            const double f = (double)(c ? camera->fy : camera->fx), at = (double)(c ? camera->cy : camera->cx);
+            const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
+            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c] : -1e30; /* reaching behind the camera it may be anywhere */
+            high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
+        }
+    }
+    for (y = 0; y < camera->height; y++)
+        for (x = 0; x < camera->width; x++) {
+            if (ssdgs__photo_alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 32768) continue;
+            if (s.right < s.left) s.left = s.right = x, s.top = y;
+            s.left = x < s.left ? x : s.left;
+            s.right = x > s.right ? x : s.right;
+            s.bottom = y;
+            s.shown++;
+            s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
+        }
+    return s;
+}
+
+/* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the middles of the silhouettes
+   meet about where the object is; `within` cameras stand within the bounds. */
+static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
+    const ssdgs_context *context = trainer->context;
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3], m[9], cross[3], determinant;
+    double shown = 0, outside = 0, half = 0, miss = 0, step;
+    ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(trainer->context,
+                                                                          (size_t)trainer->photo_count * sizeof *silhouettes);
+    int rays = 0, behind = 0, doubtful, i, j, l;
+    if (!silhouettes) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < trainer->photo_count; i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
+        const ssdgs_camera *camera = &trainer->photos[i].camera;
+        ssdgs__silhouette *s = silhouettes + i;
+        double eye[3], ray[3], d[3], length;
+        if (trainer->transparent[i] != 2) continue;
+        *s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
+        if (!(s->shown > 0)) continue;
+        rays++;
+        shown += s->shown;
+        outside += s->outside;
+        ray[0] = (0.5 * (s->left + s->right + 1) - (double)camera->cx) / (double)camera->fx;
+        ray[1] = (0.5 * (s->top + s->bottom + 1) - (double)camera->cy) / (double)camera->fy;
+        ray[2] = 1;
+        length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+        ssdgs__camera_centre(camera, eye);
+        for (j = 0; j < 3; j++)
+            for (d[j] = 0, l = 0; l < 3; l++) d[j] += (double)camera->view[4 * l + j] * ray[l] / length;
+        for (j = 0; j < 3; j++)
+            for (l = 0; l < 3; l++) {
+                a[3 * j + l] += (j == l) - d[j] * d[l];
+                b[j] += ((j == l) - d[j] * d[l]) * eye[l];
+                miss += ((j == l) - d[j] * d[l]) * eye[j] * eye[l];
+            }
+    }
+    ssdgs__cross(a + 3, a + 6, cross);
+    determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
+    for (j = 0; j < 3 && determinant > 1e-6; j++) { /* Cramer's rule on a symmetric matrix */
+        memcpy(m, a, sizeof m);
+        memcpy(m + 3 * j, b, sizeof b);
+        ssdgs__cross(m + 3, m + 6, cross);
+        x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
+    }
+    if (determinant > 1e-6) { /* else they are parallel */
+        for (i = 0; i < trainer->photo_count; i++) {
+            const ssdgs_camera *camera = &trainer->photos[i].camera;
+            const ssdgs__silhouette *s = silhouettes + i;
+            double seen[3], wide, high;
+            ssdgs__to_camera(camera, x, 1, seen);
+            wide = s->shown > 0 ? 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx : 0;
+            high = s->shown > 0 ? 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy : 0;
+            wide = wide > high ? wide : high;
+            half = wide > half ? wide : half;
+            behind += wide < 0;
+        }
+        for (j = 0; j < 3; j++)
+            for (miss -= 2 * b[j] * x[j], l = 0; l < 3; l++) miss += x[j] * a[3 * j + l] * x[l];
+        miss = sqrt(miss > 0 ? miss / rays : 0);
+    }
+    ssdgs__release(trainer->context, silhouettes);
+    doubtful = determinant > 1e-6 && miss > 0.5 * half;
+    if (doubtful && behind > rays / 2)
+        ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes x right, y down, z forward?");
+    else if (doubtful)
+        ssdgs__note(context, "what the photographs show is in no one place, lines of sight to it miss each other by %g where it is %g "
+                    "wide: are the cameras' poses, axes and lenses right?", miss, 2 * half);
+    if (within)
+        ssdgs__note(context, "%d cameras of %d stand within bounds_min .. bounds_max, which should hold the object alone", within,
+                    trainer->photo_count);
+    if (outside > 0.1 * shown && !doubtful)
+        ssdgs__note(context, "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
+                    (int)(100 * outside / shown));
+    if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return SSDGS_OK;
+    step = pow(10, floor(log10(half)) - 1);
+    ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g", step * floor((x[0] - half) / step),
+                step * floor((x[1] - half) / step), step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
+                step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));
+    return SSDGS_OK;
+}
+
+/* ---- */
+
 static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
@@ -6762,7 +6938,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int outlined = 0, i, j;
+    int outlined = 0, empty = 0, dark = 0, within = 0, i, j;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
@@ -6793,9 +6969,11 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
         outlined += trainer->transparent[i] == 2;
+        empty += clear == pixels;
     }
     trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
-    if (!trainer->outlines)
+    if (empty) ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty, photo_count);
+    if (!trainer->outlines && empty < photo_count)
         ssdgs__note(context, "too few photographs are transparent around the object: its outlines are not known, and Gaussians of "
                     "the background's colour may stay around it");
     for (i = 0; i < photo_count; i++) {
@@ -6808,11 +6986,17 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         ssdgs__camera_centre(&photos[i].camera, centre);
         for (j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
         radius = sqrt(d2) > radius ? sqrt(d2) : radius;
+        for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j]; j++) {}
+        within += j == 3;
+        for (j = 0; j < 3 && !(photos[i].light.intensity[j] > 0); j++) {}
+        dark += j == 3;
     }
-    for (j = 0; j < 3; j++) {
-        const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
-        trainer->unit = side > trainer->unit ? side : trainer->unit;
-    }
+    trainer->unit = ssdgs__bounds_side(o);
+    if (dark) ssdgs__note(context, "%d photographs of %d have a light of intensity 0", dark, photo_count);
+    if (radius < 1e-3 * trainer->unit)
+        ssdgs__note(context, "all photographs are taken from one place: other views cannot be right");
+    else result = ssdgs__note_bounds(trainer, within);
+    if (result) return result;
     trainer->extent = 1.1 * (radius > trainer->unit ? radius : trainer->unit); /* one camera has no radius */
     result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
     if (fresh && !result) { /* the model stays as it was when that fails */
@@ -6893,6 +7077,12 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, s
     }
 }
 
+/* Whether the Gaussians are where the trainer left them. */
+static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
+    return trainer->arrangement == trainer->model->arrangement ? SSDGS_OK : ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT,
+            "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
+}
+
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     const ssdgs_train_options *o;
     ssdgs__loss_values values;
@@ -6906,6 +7096,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     int learns[SSDGS__GROUPS], frozen[2], moves[2], terms, photo, j;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__trainer_check(trainer);
+    if (result) return result;
     o = &trainer->options;
     t = ssdgs__schedule_time(o, trainer->iteration);
     terms = ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
@@ -6951,9 +7143,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (!result && until <= o->densify_until) {
         ssdgs__gather_statistics(trainer, &frame);
         if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) result = ssdgs__densify(trainer);
-        if (o->opacity_reset_every && trainer->iteration % o->opacity_reset_every == 0 &&
-            ssdgs__schedule_time(o, trainer->iteration + o->opacity_reset_every / 2) <= o->densify_until)
-            ssdgs__reset_opacity(trainer);
+        if (ssdgs__resets(o, trainer->iteration)) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
         stats->iteration = trainer->iteration;
@@ -6993,8 +7183,8 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
     ssdgs_frame frame;
     double across, map;
-    if (!settings || !options || width < 1 || height < 1 || ssdgs__settings_check(NULL, settings) ||
-        ssdgs__options_check(NULL, options)) return 0;
+    if (!settings || settings->baked || !options || width < 1 || height < 1 || width > SSDGS__MAX_SIDE ||
+        height > SSDGS__MAX_SIDE || ssdgs__settings_check(NULL, settings) || ssdgs__options_check(NULL, options)) return 0;
     memset(&frame, 0, sizeof frame);
     frame.settings = *settings;
     frame.terms = settings->terms;
@@ -7014,8 +7204,8 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
         6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     /* a light's map inside of the scene, of Gaussians on surfaces */
-    map = settings->light_map_size ? settings->light_map_size : 6 * sqrt((double)n) < 512 ? 6 * sqrt((double)n) : 512;
-    if (layers > 1) fixed += 6 * (SSDGS__FALLS + 1) * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
+    map = settings->light_map_size ? settings->light_map_size : 11 * sqrt((double)n) < 512 ? 11 * sqrt((double)n) : 512;
+    if (layers > 1) fixed += 6 * SSDGS__FALL_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
@@ -7218,6 +7408,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
     ssdgs__checkpoint_io io;
     ssdgs__writer writer;
     if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
+    if (ssdgs__trainer_check(trainer)) return SSDGS_ERR_ARGUMENT;
     if (ssdgs__savable(trainer->model, path)) return SSDGS_ERR_NONFINITE;
     ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_describe(trainer, &head);
@@ -7270,7 +7461,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     int i;
     if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
     context = trainer->context;
-    result = ssdgs__read_file(context, path, &bytes, &size);
+    result = ssdgs__trainer_check(trainer);
+    if (!result) result = ssdgs__read_file(context, path, &bytes, &size);
     if (result) return result;
     ssdgs__checkpoint_describe(trainer, &own);
     if (size >= sizeof head + 8) memcpy(&head, bytes, sizeof head);
@@ -7313,6 +7505,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
         io.bytes = bytes + sizeof head;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
         ssdgs__model_changed(trainer->model);
+        ssdgs__rearranged(trainer);
     }
     ssdgs__release(context, bytes);
     return result;
@@ -8172,18 +8365,22 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 const int index = ssdgs__lowest_bit(left);
                 const V distance = VSET(applied.record[index][6]);
                 VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                    const V before = t[v];
                     V dx, dy, raw, alpha, w;
                     VM drawn;
                     unsigned fell;
                     alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    if (cue || flux) w = VMUL(alpha, t[v]);
+                    if (cue || flux) w = VMUL(alpha, before);
                     if (flux) energy[index][v] = VFMA(omega[v], w, energy[index][v]);
-                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
                     fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
-                    if (fell)
-                        ssdgs__falls_note(tile, micro, fell, history[0][index + 1], applied.record[index][6], next[micro],
+                    if (fell) {
+                        R from[16];
+                        VSTORE(from + v * SSDGS__VW, before);
+                        ssdgs__falls_note(tile, micro, fell, from, history[0][index + 1], applied.record[index][6], next[micro],
                                           fallen[micro]);
+                    }
                     if (!cue) continue;
                     b[v] = VFMA(w, distance, b[v]);
                     VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);

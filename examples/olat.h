@@ -1151,7 +1151,8 @@ static void olat__read_camera(olat__json *j, const olat__node *node, const olat_
     double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, origin[3] = {0, 0, 0}, t[3], focal;
     int refined = olat__find(j, node, "R_opt") != NULL, i, k;
     int in_pixels = lens->fx > 0 || lens->has_centre;
-    if (in_pixels && ((lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height))) {
+    if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
+                  : lens->w && lens->h && fabs(w * lens->h - h * lens->w) > (w > h ? w : h)) { /* an angle allows another size alone */
         olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
     }
     if (!(lens->fx > 0 || lens->angle > 0)) olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");

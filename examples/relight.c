@@ -279,9 +279,12 @@ static int make_planes(job *j)
 {
     ssdgs_real *next;
     size_t most = 0, pixels;
-    int i;
+    int i, width = 0, height = 0;
     for (i = 0; i < j->data.count; i++) {
-        pixels = (size_t)j->data.frames[i].camera.width * (size_t)j->data.frames[i].camera.height;
+        const ssdgs_camera *camera = &j->data.frames[i].camera;
+        if (camera->width > width) width = camera->width;
+        if (camera->height > height) height = camera->height;
+        pixels = (size_t)camera->width * (size_t)camera->height;
         if (pixels > most) most = pixels;
     }
     j->metrics = (ssdgs_metrics *)calloc((size_t)j->data.count + 1, sizeof *j->metrics);
@@ -289,10 +292,10 @@ static int make_planes(job *j)
     j->bytes = (unsigned char *)malloc(most * 3 + 1);
     if (j->given[SHEET] && j->data.count > 0) {
         j->sheet_rows = j->data.count < SHEET_ROWS ? j->data.count : SHEET_ROWS;
-        j->shrink = (j->data.frames[0].camera.width + SHEET_CELL - 1) / SHEET_CELL;
-        j->cell_width = j->data.frames[0].camera.width / j->shrink;
-        j->cell_height = j->data.frames[0].camera.height / j->shrink;
-        j->sheet = (unsigned char *)calloc(most * SHEET_COLUMNS, (size_t)j->sheet_rows * 3);
+        j->shrink = (width + SHEET_CELL - 1) / SHEET_CELL;
+        j->cell_width = width / j->shrink;
+        j->cell_height = (height + j->shrink - 1) / j->shrink; /* never 0 */
+        j->sheet = (unsigned char *)calloc((size_t)j->cell_width * SHEET_COLUMNS, (size_t)(j->cell_height * j->sheet_rows) * 3);
     }
     if (!j->metrics || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet)) return !fail("out of memory");
     j->image = next;
@@ -367,7 +370,7 @@ static void show(job *j, const olat_frame *frame, int output)
     ssdgs_to_bytes(out, 3 * pixels, transfer, j->bytes);
 }
 
-/* Puts the bytes, shrunk, into a cell of the sheet, cut to its size. */
+/* Puts the bytes, shrunk, into a cell of the sheet, which holds the largest frame. */
 static void paste(job *j, const olat_frame *frame, int row, int column)
 {
     const int n = j->shrink;

@@ -51,34 +51,37 @@ static const field fields[] = {
     OPTION(1, 3, bounds_min), OPTION(1, 3, bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size), OPTION(1, 1, densify_shadow),
     OPTION(1, 1, prune_opacity), OPTION(1, 1, prune_weight), OPTION(1, 1, prune_outside), OPTION(1, 1, opacity_fade),
     OPTION(1, 2, position), OPTION(1, 2, opacity), OPTION(1, 2, scale), OPTION(1, 2, rotation),
-    OPTION(1, 2, color), {"asg_rate", 1, 1, 2, offsetof(ssdgs_train_options, asg)}, OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
+    OPTION(1, 2, color), OPTION(1, 2, asg), OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
     OPTION(1, 2, scattering), OPTION(1, 2, camera_rate), OPTION(1, 2, light_rate)
 };
 
-/* NAME=VALUE[,VALUE...]; 0 when it is not understood. */
-static int set_field(ssdgs_settings *settings, ssdgs_train_options *options, const char *text)
+/* NAME=VALUE[,VALUE...], the name and the number of values telling the field; what is wrong, or NULL. */
+static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, const char *text)
 {
     size_t length = strcspn(text, "="), i;
+    const char *p = text + length, *problem = "--set knows no such number:";
+    int count = 0, n;
+    for (i = length; text[i]; i++) count += text[i] == '=' || text[i] == ',';
     for (i = 0; i < sizeof fields / sizeof *fields; i++) {
         const field *f = fields + i;
         unsigned char *to = (f->in_options ? (unsigned char *)options : (unsigned char *)settings) + f->at;
-        const char *p = text + length;
-        int n;
         if (strlen(f->name) != length || strncmp(text, f->name, length)) continue;
-        for (n = 0; n < f->count && *p; n++) {
+        problem = "cannot set (rates take START,END, corners X,Y,Z)";
+        if (f->count != count) continue;
+        for (n = 0; n < count; n++) {
             char *end;
             double value = strtod(p + 1, &end);
             ssdgs_real real = (ssdgs_real)value;
             int whole = value > -2e9 && value < 2e9 ? (int)value : 0;
-            if (end == p + 1 || (*end && *end != ',')) return 0;
-            if (!f->reals && !(value >= whole && value <= whole)) return 0;
+            if (end == p + 1 || (*end && *end != ',')) return problem;
+            if (!f->reals && !(value >= whole && value <= whole)) return problem;
             if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
             else memcpy(to, &whole, sizeof whole);
             p = end;
         }
-        return n == f->count && !*p;
+        return NULL;
     }
-    return 0;
+    return problem;
 }
 
 /* The place of word[0 .. length) in a list like "black|white", or -1. */
@@ -208,6 +211,7 @@ static void hear(void *user, ssdgs_result code, const char *message)
 static int parse(job *j, int argc, char **argv)
 {
     const char **given = j->given, *terms;
+    const char *problem;
     int i, option, sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
     for (i = 1; i < argc; i++) {
         if (argv[i][0] != '-') {
@@ -251,7 +255,7 @@ static int parse(job *j, int argc, char **argv)
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
     j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
     for (i = 0; i < sets; i++)
-        if (!set_field(&j->settings, &j->options, argv[i])) return usage("cannot set (rates take START,END, corners X,Y,Z)", argv[i]);
+        if ((problem = set_field(&j->settings, &j->options, argv[i])) != NULL) return usage(problem, argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
     j->desc.logger.write = hear;
     return 0;
@@ -318,6 +322,7 @@ static int train(job *j)
     const char *output = j->given[OUTPUT], *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
     char error[512] = "", text[32], *test_json = (char *)malloc(strlen(j->dataset) + 32);
     int i, width = 0, height = 0, has_test;
+    const int refines = j->options.refine_camera || j->options.refine_light;
     double start = seconds_now();
     ssdgs_result result;
     FILE *file;
@@ -379,7 +384,7 @@ static int train(job *j)
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
     print_peak_memory();
     printf("\n");
-    if (j->given[REFINE] && save_refined(j, error)) return fail(error);
+    if (refines && save_refined(j, error)) return fail(error);
 
     ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
     ssdgs_model_destroy(j->model);
@@ -390,7 +395,7 @@ static int train(job *j)
     j->test_photos = olat_photos(&j->test_set);
     if (!j->test_photos) return fail("out of memory");
     if (evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test") ||
-        (j->given[REFINE] && evaluate(j, j->test_photos, j->test_set.count, 1, 200,
+        (refines && evaluate(j, j->test_photos, j->test_set.count, 1, 200,
                                       "test (each photograph's pose and light fitted to it)")) ||
         evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training"))
         return fail(ssdgs_error_message(j->context));

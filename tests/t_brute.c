@@ -328,22 +328,25 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
     }
 }
 
-/* Transmittance to a distance along the ray of a map's pixel: linear between the distances at which it falls below three
-   levels, all of them a little higher or lower. */
+/* Transmittance to a distance along the ray of a map's pixel, of which the falls below three levels are known, all of these a
+   little higher or lower: from the light bias before a fall on it goes straight to what there was just before it. */
 static double passed(const splat *p, int n, int x, int y, double distance, double higher) {
     static const double level[3] = {0.9, 0.5, 0.1};
-    double t = 1, fall[3];
+    const double thick = ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
+    double t = 1, fall[3], before[3], left[3], since;
     int k, falls = 0;
     for (k = 0; k < n; k++) {
-        const double raw = response(p + k, x + 0.5, y + 0.5);
+        const double raw = response(p + k, x + 0.5, y + 0.5), above = t;
         if (raw < (double)s.options.alpha_threshold) continue;
         t *= 1 - (raw < 0.999 ? raw : 0.999);
-        for (; falls < 3 && t < level[falls] * higher; falls++) fall[falls] = p[k].depth;
+        for (; falls < 3 && t < level[falls] * higher; falls++) fall[falls] = p[k].depth, before[falls] = above, left[falls] = t;
     }
     for (k = 0; k < falls && distance > fall[k]; k++) {}
     if (!k) return 1;
-    if (k == falls) return t;
-    return level[k - 1] + (level[k] - level[k - 1]) * (distance - fall[k - 1]) / (fall[k] - fall[k - 1]);
+    if (k == 3) return t;
+    if (k == falls) return left[k - 1];
+    since = distance - fmax(fall[k] - thick, fall[k - 1]);
+    return since <= 0 ? left[k - 1] : left[k - 1] + (before[k] - left[k - 1]) * since / (since + fall[k] - distance);
 }
 
 /* Visibility of a place from the first light. 0 where the last bits of float decide what is in the way. */
@@ -990,6 +993,43 @@ static void test_gap(void) {
     CHECK(fabs((double)(image->color[3 * (8 * 17 + 8)] - image[1].color[3 * (8 * 17 + 8)])) < 1e-6);
 }
 
+/* What a veil leaves arrives on the floor behind it, all along the gap: also where it is no level of the light's map. */
+static void test_veil(void) {
+    enum { ROW = 60, FLOOR = ROW * ROW, PX = 32 };
+    static ssdgs_real values[PX * PX * 5];
+    const ssdgs_real eye[3] = {(ssdgs_real)0.9, 0, (ssdgs_real)0.25}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, PX, PX);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_light light = {SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}};
+    ssdgs_image out = {0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    ssdgs_model *model = NULL;
+    int tenth, i, c;
+    out.color = values;
+    out.alpha = values + 3 * PX * PX;
+    out.shadow = values + 4 * PX * PX;
+    settings.shadow_layers = 0;
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    if (!CHECK(!ssdgs_model_create(best(), &settings, FLOOR + 1, &model))) exit(1);
+    for (tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
+        const ssdgs_model_view v = ssdgs_model_get(model);
+        double shadow;
+        for (i = 0; i <= FLOOR; i++) {
+            ssdgs_real *p = v.gaussians + i;
+            for (c = 0; c < 2; c++) p[(size_t)c * v.stride] = (ssdgs_real)(i == FLOOR ? 0 : ((c ? i / ROW : i % ROW) + 0.5) / ROW - 0.5);
+            p[2 * v.stride] = (ssdgs_real)(i == FLOOR ? 0.4 : 0);
+            for (c = 0; c < 3; c++) p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = (ssdgs_real)log(c == 2 ? 0.002 : i == FLOOR ? 1 : 0.016);
+            p[SSDGS_OPACITY * v.stride] = (ssdgs_real)(i < FLOOR ? 6 : tenth ? log(tenth / (10.0 - tenth)) : -20);
+            p[(SSDGS_ASG_WEIGHT + 3) * v.stride] = -20; /* hard */
+        }
+        if (!CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &out, NULL))) exit(1);
+        i = PX / 2 * PX + PX / 2;
+        shadow = (double)(out.shadow[i] / out.alpha[i]);
+        if (!CHECK(fabs(shadow - (tenth < 2 ? 1 : 1 - 0.1 * tenth)) < 0.01)) printf("    a veil of %d tenths leaves %g\n", tenth, shadow);
+    }
+    ssdgs_model_destroy(model);
+}
+
 /* Without a map, as where a hook walks the lights and makes none, pixels take the visibility of their Gaussians. */
 static void test_no_map(void) {
     ssdgs_model *model;
@@ -1339,7 +1379,7 @@ int main(int argc, char **argv) {
     TEST_ROW("24", "weights add up to one", test_unity());
     TEST_ROW("23", "order of the Gaussians", test_permutation());
     TEST_ROW("25", "coincident Gaussians", test_coincident());
-    TEST_ROW("45", "slabs, gaps, added occluders", (test_layers(), test_gap(), test_occluder()));
+    TEST_ROW("45", "slabs, gaps, added occluders", (test_layers(), test_gap(), test_veil(), test_occluder()));
     test_no_map();
     TEST_ROW("3", "images of one pixel, row, column; crops", test_crop());
     TEST_ROW("21,22", "scaled, moved, turned scenes", test_similarity());

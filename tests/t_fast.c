@@ -476,11 +476,47 @@ static void test_frozen(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Where all that is glimpsed may go unshaded, it has the first such Gaussian's look, not that of one that is not drawn. */
+static void test_all_glimpsed(void) {
+    static ssdgs_real planes[PIXELS * 5];
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_camera camera = camera_at(0);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_image out;
+    ssdgs_model_view v;
+    double depth[2];
+    size_t c;
+    int pass, i;
+    memset(&out, 0, sizeof out);
+    out.color = planes;
+    out.alpha = planes + 3 * PIXELS;
+    out.depth = planes + 4 * PIXELS;
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_model_create(context, NULL, 3, &model))) exit(1);
+    for (pass = 0; pass < 2; pass++) {
+        options.max_error = (ssdgs_real)(pass ? 0.5 : 0);
+        v = ssdgs_model_get(model);
+        for (i = 0; i < 3; i++) {
+            v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.5;
+            for (c = 0; c < 3; c++) v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
+        }
+        v.gaussians[0] = (ssdgs_real)NAN;
+        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + 1] = -3 * camera.view[8 + c]; /* behind the camera */
+        CHECK(!ssdgs_render_ex(model, &camera, NULL, 0, &options, &out, NULL));
+        for (depth[pass] = 0, i = 0; i < PIXELS; i++)
+            if ((double)out.alpha[i] > 0.005) depth[pass] = (double)(out.depth[i] / out.alpha[i]);
+    }
+    CHECK(depth[0] > 0.5 && fabs(depth[1] - depth[0]) < 1e-4 * depth[0]);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     test_kept();
     test_walk();
     test_max_error();
     test_spent_budget();
+    test_all_glimpsed();
     test_presets();
     test_dead_neurons();
     test_far_out();

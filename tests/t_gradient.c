@@ -532,6 +532,8 @@ int main(void) {
     s = base, s.name = "released dipole, shadow on scattering, no shadow network, a wall", s.settings.dipole = SSDGS_DIPOLE_RELEASED, s.wall = 1;
     s.settings.shadow_on_scattering = 1, s.settings.shadow_layers = 0;
     run(&s);
+    s = base, s.name = "shadow network of one layer", s.settings.shadow_layers = 1;
+    run(&s);
     s = base, s.name = "lights at the back", s.lights[0].position[1] = 1.3; /* where Fresnel's term is steep */
     s.light_count = 2, s.lights[1].position[0] = -0.2, s.lights[1].position[1] = 1.5, s.lights[1].position[2] = -0.2; /* wo.h < 0.25 */
     run(&s);

@@ -678,6 +678,7 @@ static void test_datasets(void) {
         {"{\"frames\":[]}", "frames"}, {TOP "1]}", "line 2: frames[0]: an object"},
         {"{\"frames\":[" FRAME "]}", "camera_angle_x, camera_intrinsics or fl_x is missing"},
         {TOP FRAME ",\n{" LIGHT POSE "}]}", "line 3: frames[1]: file_path or img_path is missing"},
+        {"{\"camera_angle_x\":1,\"w\":60,\"h\":60,\"frames\":[" FRAME "]}", "the image has 6 x 4 pixels, not w x h"},
         {TOP "{" FILE_A POSE "}]}", "pl_pos or pl_dir is missing"},
         {TOP "{" FILE_A LIGHT "\"a\":0}]}", "transform_matrix or R_opt is missing"},
         {TOP "{" FILE_A LIGHT "\"pl_dir\":[0,0,1]," POSE "}]}", "both"},
@@ -739,6 +740,8 @@ static void test_datasets(void) {
             photos[0].light.intensity[0] == a->light.intensity[0]);
         meter_free(photos);
     }
+    olat_free(&set);
+    if (CHECK(loads("{\"camera_angle_x\":1,\"w\":599,\"h\":400,\"frames\":[" FRAME "]}", 0))) CHECK(set.frames->camera.width == 6);
     olat_free(&set);
     if (CHECK(loads("{\"fl_x\":10,\"fl_y\":11,\"cx\":2,\"cy\":1,\"w\":6,\"h\":4,\"k1\":0,\"frames\":["
               "{\"file_path\":\"a.PNG\",\"camera_intrinsics\":[4,5,6,7]," LIGHT POSE "},{" LIGHT POSE "},"

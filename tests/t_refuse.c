@@ -107,6 +107,15 @@ static void test_bounds(void) {
             CHECK(make_trainer() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), k < 3 ? "bounds_min" : "background"));
             train_options = kept;
         }
+    for (k = 0; k < 4; k++) { /* lengths that a model's file could not hold */
+        const ssdgs_train_options kept = train_options;
+        for (i = 0; i < 3; i++) {
+            train_options.bounds_min[i] = 0;
+            train_options.bounds_max[i] = (ssdgs_real)(k == 0 ? 1e-15 : k == 1 ? 3e-15 : k == 2 ? 1e15 : 3e15);
+        }
+        CHECK(k == 1 || k == 2 ? !make_trainer() : make_trainer() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), "longest side"));
+        train_options = kept;
+    }
 }
 
 #define MISSING(call) CHECK((call) == SSDGS_ERR_ARGUMENT)
@@ -251,11 +260,24 @@ static void test_missing(void) {
     ssdgs_trainer_destroy(trainer);
     CHECK(!ssdgs_train_memory(NULL, &train_options, 4, 4) && !ssdgs_train_memory(&settings, NULL, 4, 4));
     CHECK(!ssdgs_train_memory(&settings, &train_options, 0, 4) && !ssdgs_train_memory(&settings, &train_options, 4, 0));
+    CHECK(ssdgs_train_memory(&settings, &train_options, 32768, 4) && !ssdgs_train_memory(&settings, &train_options, 32769, 4));
+    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 32768) && !ssdgs_train_memory(&settings, &train_options, 4, 32769));
     settings.baked = 1;
+    CHECK(!ssdgs_train_memory(&settings, &train_options, 4, 4));
     CHECK(!ssdgs_model_create(context, &settings, 0, &made));
     MISSING(ssdgs_trainer_create(made, &photo, 1, NULL, &trainer)); /* baked colours do not learn */
     settings.baked = 0;
     ssdgs_model_destroy(made);
+}
+
+/* The transfer curve leaves alone what is no number. */
+static void test_curve(void) {
+    const ssdgs_real values[3] = {(ssdgs_real)NAN, (ssdgs_real)INFINITY, (ssdgs_real)-INFINITY};
+    int i;
+    for (i = 0; i < 3; i++) {
+        const ssdgs_real encoded = ssdgs_srgb_encode(values[i]), decoded = ssdgs_srgb_decode(values[i]);
+        CHECK(!memcmp(&encoded, values + i, sizeof encoded) && !memcmp(&decoded, values + i, sizeof decoded));
+    }
 }
 
 int main(void) {
@@ -274,6 +296,7 @@ int main(void) {
     check_ranges(render_fields, sizeof render_fields / sizeof *render_fields, &render_options, render);
     check_ranges(train_fields, sizeof train_fields / sizeof *train_fields, &train_options, make_trainer);
     test_bounds();
+    test_curve();
     test_missing();
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);

@@ -1035,6 +1035,7 @@ static void test_units(void) {
         ssdgs_settings settings = kind == 1 ? ssdgs_settings_published() : ssdgs_settings_default();
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
+        ssdgs_frame frame;
         double want;
         if (kind == 2) settings.depth_cue = settings.residual_shadow = settings.transport = 0; /* the light bias has a length */
         for (i = 0; i < PHOTOS; i++) {
@@ -1047,6 +1048,8 @@ static void test_units(void) {
         want = kind ? 1e30 : PHOTOS / (100 * (0.25 + (PHOTOS - 1) / 16.0)); /* at the centre: as from 2 away */
         CHECK(fabs((double)model->settings.light_scale / want - 1) < 1e-6);
         CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 && fabs(trainer->unit - 4) < 1e-12);
+        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
+        CHECK(fabs((double)frame.views[0].near_plane - (kind == 1 ? 0.01 : 0.04)) < 1e-7);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1106,31 +1109,137 @@ static void test_prune_weight(void) {
     CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
     for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (pass = 0; pass < 2; pass++) { /* opacities are reset at 30 */
+    for (pass = 0; pass < 3; pass++) { /* opacities are reset at 30, and no more at 90, so near the end */
+        ssdgs_real *const names = model->gaussians + (size_t)SSDGS_DIFFUSE * model->capacity;
+        model->count = MANY;
         for (i = 0; i < MANY; i++) {
-            model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
+            names[i] = (ssdgs_real)i;
             trainer->screen_count[i] = i == LIGHT ? 0 : 4;
             trainer->screen_gradient[i] = 3; /* in four photographs: too little to make more of it */
             trainer->contribution[i] = trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
         }
-        trainer->iteration = pass ? 50 : 40;
+        trainer->iteration = pass == 2 ? 100 : pass ? 50 : 40;
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == (pass ? MANY - LIGHT : MANY));
+        for (i = 0; i < model->count && pass; i++) CHECK(names[i] >= LIGHT);
     }
-    for (i = 0; i < model->count; i++) CHECK(model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= LIGHT);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
 
-/* Notes in the log: of bounds that hold nothing, of outlines that are not known, of nothing in view. */
-static int heard[3];
+/* Notes in the log, by words of theirs. */
+enum { NO_POINT, NO_OUTLINES, NO_VIEW, OUTSIDE, WITHIN, CUBE, ONE_PLACE, NO_PLACE, BEHIND, DARK, EMPTY, NOTES };
+static const char *const note_words[NOTES] = {"no random point is inside", "outlines are not known", "no Gaussian in view",
+    "in 100 pixels lie outside", "6 cameras of 6 stand within", "object lies about within", "taken from one place", "in no one place",
+    "behind the cameras", "2 photographs of 6 have a light of intensity 0", "6 photographs of 6 are wholly transparent"};
+static int heard[NOTES];
+static double cube[6]; /* that is said to hold the object */
 
 static void hear(void *user, ssdgs_result code, const char *message) {
+    int i;
     (void)user;
-    heard[0] += code == SSDGS_OK && strstr(message, "bounds_min") != NULL;
-    heard[1] += code == SSDGS_OK && strstr(message, "outlines are not known") != NULL;
-    heard[2] += code == SSDGS_OK && strstr(message, "no Gaussian in view") != NULL;
+    for (i = 0; i < NOTES; i++) heard[i] += code == SSDGS_OK && strstr(message, note_words[i]) != NULL;
+    if (strstr(message, note_words[CUBE]))
+        CHECK(sscanf(strstr(message, "bounds_min"), "bounds_min=%lf,%lf,%lf bounds_max=%lf,%lf,%lf", cube, cube + 1, cube + 2, cube + 3,
+                     cube + 4, cube + 5) == 6);
+}
+
+/* Photographs, cameras and bounds that do not suit each other are noted, and others are not; the ball's cube is found. */
+static void test_doubts(void) {
+    static const int wanted[9][NOTES] = {
+        {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0},
+        {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1},
+        {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}};
+    static unsigned char clear[SIDE * SIDE * 4];
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    int kind, i, c;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    CHECK(!ssdgs_context_create(&desc, &context));
+    for (kind = 0; kind < 9; kind++) {
+        ssdgs_train_options options = short_run(60);
+        ssdgs_photo shots[PHOTOS];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        memcpy(shots, photos, sizeof shots);
+        options.prune_outside = 0;
+        for (c = 0; c < 3 && (kind == 1 || kind == 2); c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)(kind == 1 ? 0.1 : 3));
+        for (i = 0; i < PHOTOS; i++) {
+            if (kind == 3) shots[i].camera = photos[0].camera;
+            for (c = 0; c < 3 && kind == 4 && i < 2; c++) shots[i].light.intensity[c] = 0;
+            for (c = 4; c < 12 && kind == 5; c++) shots[i].camera.view[c] = -shots[i].camera.view[c];
+            if (kind == 6) shots[i].camera.cx += 20;
+            if (kind == 7) shots[i].pixels = clear;
+            for (c = 0; c < 3 && kind == 8; c++) shots[i].camera.view[4 * c + 3] -= 5 * shots[i].camera.view[4 * c + 1]; /* the world moves by 5 */
+        }
+        memset(heard, 0, sizeof heard);
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        if (!CHECK(!memcmp(heard, wanted[kind], sizeof heard)))
+            for (i = 0; i < NOTES; i++) printf("    %d: \"%s\" %d times\n", kind, note_words[i], heard[i]);
+        for (c = 0; c < 6 && heard[CUBE]; c++) /* its radius is 0.4 */
+            CHECK(fabs(fabs(cube[c] - (kind == 8 && c % 3 == 1 ? 5 : 0)) - 0.42) < 0.06 && (cube[c] > (kind == 8 && c % 3 == 1 ? 5 : 0)) == (c > 2));
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+    memset(heard, 0, sizeof heard);
+}
+
+/* How soft shadows are is learnt with the shadow term, whether there are highlights or not; other forms' weights rest without them. */
+static void test_softness(void) {
+    int kind, i, k;
+    for (kind = 0; kind < 3; kind++) {
+        ssdgs_train_options options = short_run(6);
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        double moved = 0;
+        options.schedule = SSDGS_SCHEDULE_JOINT;
+        settings.terms = kind == 1 ? SSDGS_DIFFUSE_TERM : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+        if (kind == 2) settings.asg = SSDGS_ASG_GEOMETRIC;
+        CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer) && !ssdgs_trainer_run(trainer, NULL, NULL));
+        for (k = 0; k < SSDGS_ASG_COUNT; k++)
+            for (i = 0; i < model->count; i++) moved += fabs((double)model->gaussians[(size_t)(SSDGS_ASG_WEIGHT + k) * model->capacity + (size_t)i]);
+        CHECK(kind ? moved <= 0 : moved > 0);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
+/* A trainer whose model another one, or a sort, has rearranged refuses to go on; one that is made then does. */
+static void test_rearranged(void) {
+    ssdgs_train_options grows = short_run(100), rests = short_run(100);
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *a = NULL, *b = NULL;
+    int i;
+    rests.densify_until = 0;
+    grows.densify_from = grows.densify_every = 2;
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &rests, &a) && !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
+    for (i = 0; i < 4; i++) {
+        CHECK(!ssdgs_trainer_step(b, NULL));
+        CHECK(ssdgs_trainer_step(a, NULL) == (i ? SSDGS_ERR_ARGUMENT : SSDGS_OK)); /* the control is after the second */
+    }
+    CHECK(strstr(ssdgs_error_message(context), "has moved the Gaussians"));
+    CHECK(ssdgs_trainer_save(a, "build/t_train_moved.ckpt") == SSDGS_ERR_ARGUMENT && !ssdgs_trainer_save(b, "build/t_train_moved.ckpt"));
+    CHECK(ssdgs_trainer_load(a, "build/t_train_moved.ckpt") == SSDGS_ERR_ARGUMENT);
+    CHECK(!ssdgs_model_sort(model) && ssdgs_trainer_step(b, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_trainer_destroy(a);
+    ssdgs_trainer_destroy(b);
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &grows, &a) && !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
+    CHECK(!ssdgs_trainer_load(a, "build/t_train_moved.ckpt") && !ssdgs_trainer_step(a, NULL));
+    CHECK(ssdgs_trainer_step(b, NULL) == SSDGS_ERR_ARGUMENT); /* the file's Gaussians have come in */
+    ssdgs_trainer_destroy(a);
+    ssdgs_trainer_destroy(b);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
 }
 
 /* Cameras that see nothing are noted, once. */
@@ -1150,7 +1259,7 @@ static void test_nothing_in_view(void) {
         for (i = 0; i < PHOTOS && blind; i++) shots[i].camera.near_plane = 10;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
-        for (i = 0; i < 2; i++) CHECK(!ssdgs_trainer_step(trainer, NULL) && heard[2] == blind);
+        for (i = 0; i < 2; i++) CHECK(!ssdgs_trainer_step(trainer, NULL) && heard[NO_VIEW] == blind);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1282,17 +1391,17 @@ static void test_prune_outside(void) {
         const double size = 0.71812 * 0.4 * pow(MANY, -1.0 / 3);
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        CHECK(!heard[0] && !heard[1]);
+        CHECK(!heard[NO_POINT] && !heard[NO_OUTLINES]);
         clear[3] = 255; /* a corner */
         for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
         for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
         CHECK(fabs(exp((double)model->gaussians[SSDGS_LOG_SCALE * model->capacity]) / size - 1) < 1e-4);
-        CHECK(heard[0] == 1 && !heard[1]);
+        CHECK(heard[NO_POINT] == 1 && !heard[NO_OUTLINES]);
         ssdgs_trainer_destroy(trainer);
         clear[3] = 0;
-        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && heard[0] == 1 && heard[1] == 1);
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && heard[NO_POINT] == 1 && !heard[NO_OUTLINES] && heard[EMPTY] == 1);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1496,6 +1605,9 @@ int main(void) {
     test_prune_outside();
     test_nothing_in_view();
     test_outlines_known();
+    test_doubts();
+    test_softness();
+    test_rearranged();
     test_fade();
     test_half_shadow();
     test_learning();
