@@ -6816,14 +6816,16 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
 
 /* ---- whether photographs, cameras and bounds suit each other: notes ---- */
 
+/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds' picture. */
 typedef struct ssdgs__silhouette {
-    int left, right, top, bottom; /* of what a photograph shows; right < left: nothing */
-    double shown, outside;        /* pixels, and those beside the bounds' picture */
+    int left, right, top, bottom; /* right < left: nothing */
+    int whole;                    /* not cut by the picture's border, so that its middle is known */
+    double shown, outside;
 } ssdgs__silhouette;
 
 static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
     const ssdgs_camera *camera = &photo->camera;
-    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0};
+    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0, 0};
     double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
     int corner, c, x, y;
     for (corner = 0; corner < 8; corner++) {
@@ -6847,6 +6849,7 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
             s.shown++;
             s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
         }
+    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 && s.bottom < camera->height - 1;
     return s;
 }
 
@@ -6854,7 +6857,7 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
    meet about where the object is; `within` cameras stand within the bounds. */
 static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
     const ssdgs_context *context = trainer->context;
-    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3], m[9], cross[3], determinant;
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0}, m[9], cross[3], determinant;
     double shown = 0, outside = 0, half = 0, miss = 0, step;
     ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(trainer->context,
                                                                           (size_t)trainer->photo_count * sizeof *silhouettes);
@@ -6866,10 +6869,10 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
         double eye[3], ray[3], d[3], length;
         if (trainer->transparent[i] != 2) continue;
         *s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
-        if (!(s->shown > 0)) continue;
-        rays++;
         shown += s->shown;
         outside += s->outside;
+        if (!s->whole) continue;
+        rays++;
         ray[0] = (0.5 * (s->left + s->right + 1) - (double)camera->cx) / (double)camera->fx;
         ray[1] = (0.5 * (s->top + s->bottom + 1) - (double)camera->cy) / (double)camera->fy;
         ray[2] = 1;
@@ -6898,8 +6901,9 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
             const ssdgs__silhouette *s = silhouettes + i;
             double seen[3], wide, high;
             ssdgs__to_camera(camera, x, 1, seen);
-            wide = s->shown > 0 ? 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx : 0;
-            high = s->shown > 0 ? 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy : 0;
+            if (!s->whole) continue;
+            wide = 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx;
+            high = 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy;
             wide = wide > high ? wide : high;
             half = wide > half ? wide : half;
             behind += wide < 0;
@@ -6911,7 +6915,7 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
     ssdgs__release(trainer->context, silhouettes);
     doubtful = determinant > 1e-6 && miss > 0.5 * half;
     if (doubtful && behind > rays / 2)
-        ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes x right, y down, z forward?");
+        ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes right?");
     else if (doubtful)
         ssdgs__note(context, "what the photographs show is in no one place, lines of sight to it miss each other by %g where it is %g "
                     "wide: are the cameras' poses, axes and lenses right?", miss, 2 * half);
@@ -6929,7 +6933,7 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
     return SSDGS_OK;
 }
 
-/* ---- */
+/* ---- a trainer and its steps ---- */
 
 static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
     ssdgs_context *context = trainer->context;
