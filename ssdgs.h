@@ -7207,8 +7207,9 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) + 160;
     fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
         6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
-    /* a light's map inside of the scene, of Gaussians on surfaces */
-    map = settings->light_map_size ? settings->light_map_size : 11 * sqrt((double)n) < 512 ? 11 * sqrt((double)n) : 512;
+    /* a light's map inside of the scene: the more Gaussians the smaller they are */
+    map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
+    if (settings->light_map_size) map = settings->light_map_size;
     if (layers > 1) fixed += 6 * SSDGS__FALL_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
