@@ -1096,6 +1096,17 @@ static void test_blur(void) {
     }
 }
 
+/* Opacities are reset every so often, but not where less than half of that is left until density control ends, at 5/6 of a run. */
+static void test_resets(void) {
+    ssdgs_train_options options = short_run(90);
+    int i;
+    for (i = 0; i < 90; i++) CHECK(ssdgs__resets(&options, i) == (i == 30 || i == 60));
+    options.iterations = 89;
+    for (i = 0; i < 89; i++) CHECK(ssdgs__resets(&options, i) == (i == 30));
+    options.opacity_reset_every = 0;
+    CHECK(!ssdgs__resets(&options, 30));
+}
+
 /* Gaussians that hardly show go, but neither those never seen nor all of them after opacities were reset. */
 static void test_prune_weight(void) {
     enum { MANY = 8, LIGHT = 3 };
@@ -1605,6 +1616,7 @@ int main(void) {
     test_cap();
     test_units();
     test_blur();
+    test_resets();
     test_prune_weight();
     test_prune_outside();
     test_nothing_in_view();
