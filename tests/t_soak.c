@@ -561,7 +561,7 @@ static void row_61(void) {
     }
     printf("    %d Gaussians, %lu bytes live, largest parameter %g\n", t.model->count, (unsigned long)m.live,
            largest_parameter(t.model));
-    CHECK(t.model->count > 25 && t.model->count <= 50 && largest_parameter(t.model) < (full ? 150 : 25));
+    CHECK(t.model->count > 25 && t.model->count <= 50 && largest_parameter(t.model) < 25 * sqrt(full ? 50 : 1)); /* a random walk's growth */
     finish(&t);
     CHECK(m.live == 0);
 }
@@ -731,7 +731,7 @@ static void pose_error(const ssdgs_camera *camera, const ssdgs_light *light, con
 static void row_64(void) {
     static const char *const names[3] = {"pose_centre_left", "pose_angle_left", "light_left"};
     static ssdgs_photo truth[PHOTOS];
-    ssdgs_train_options o = short_run(500 * (full ? PHOTOS : 2));
+    ssdgs_train_options o = short_run((full ? 1000 : 500) * (full ? PHOTOS : 2));
     ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material,
                                    &o.shadow, &o.scattering};
     double before[3] = {0, 0, 0}, after[3] = {0, 0, 0};
