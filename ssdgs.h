@@ -647,6 +647,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real opacity_fade;   /* px: where only a fiftieth of the photographs have outlines, or one of eight or more, an opaque
                                   Gaussian costs as much as so many px wrong by 1, less and less up to iteration 30,000*, as those
                                   of the background's colour have no other reason to go; 0.8; 0 = nothing */
+    ssdgs_real adam_epsilon;   /* in what one step of 255 in one colour of one pixel adds to the loss: what photographs do not show
+                                  hardly moves, where noise of 1e-15, as published, drives it without end; 0.1; 0 = 1e-15 */
     ssdgs_rate position, opacity, scale, rotation, color; /* over the whole run; position: of 1.1 x the cameras' radius */
     ssdgs_rate asg, frame;                /* start up to iteration 40,000*, end at 90,000*: the published shape */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
@@ -1068,7 +1070,7 @@ typedef struct ssdgs__kernels {
                               const ssdgs_real *,
                               const ssdgs_real *, ssdgs_real, ssdgs_real, ssdgs_real *);
     int (*finite)(const ssdgs_real *, size_t);
-    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real);
+    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real, ssdgs_real);
 } ssdgs__kernels;
 
 /* Pixel offsets of the lanes of a 4x4 micro-tile, and the lanes' numbers. */
@@ -5853,6 +5855,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
     o.opacity_fade = (ssdgs_real)0.8;
+    o.adam_epsilon = (ssdgs_real)0.1;
 #define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
@@ -5878,7 +5881,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
-    o.prune_weight = o.prune_outside = o.opacity_fade = 0;
+    o.prune_weight = o.prune_outside = o.opacity_fade = o.adam_epsilon = 0;
     return o;
 }
 
@@ -6162,7 +6165,7 @@ typedef struct ssdgs__adam_range {
     ssdgs_real *parameter, *mean, *square;
     const ssdgs_real *gradient;
     size_t n;
-    ssdgs_real rate, correct_mean, correct_square;
+    ssdgs_real rate, correct_mean, correct_square, epsilon;
     int group;
     size_t first_chunk;
     size_t bad; /* first non-finite gradient + 1, per range */
@@ -6192,7 +6195,7 @@ static void ssdgs__adam_task(void *data, int index) {
     begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
     n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
     job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate, r->correct_mean,
-                 r->correct_square);
+                 r->correct_square, r->epsilon);
 }
 
 static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - beta^steps), the power by squaring */
@@ -6205,7 +6208,7 @@ static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - b
 
 static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, ssdgs_real *parameter,
                             const ssdgs_real *gradient,
-                            ssdgs_real *mean, ssdgs_real *square, size_t n) {
+                            ssdgs_real *mean, ssdgs_real *square, size_t n, double epsilon) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     const double rate = ssdgs__group_rate(trainer, group, t);
     r->parameter = parameter;
@@ -6218,6 +6221,8 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
     r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
     r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
+    if (group == SSDGS__G_POSITION) epsilon /= trainer->unit; /* of a move by the bounds' longest side */
+    r->epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
     r->first_chunk = job->chunks;
     job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
 }
@@ -6240,6 +6245,8 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
                                      const int learns[SSDGS__GROUPS]) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
+    const double pixels = (double)frame->camera.width * frame->camera.height;
+    const double epsilon = (double)trainer->options.adam_epsilon / (255 * 3 * pixels);
     ssdgs__adam_job job;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     int group, c, i;
@@ -6254,13 +6261,13 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
             const size_t at = first[shared], n = first[shared + 1] - at;
             if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
                                    trainer->global_mean + at,
-                                   trainer->global_square + at, n);
+                                   trainer->global_square + at, n, epsilon);
         } else {
             for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
                 ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at, trainer->mean + at,
                                 trainer->square + at,
-                                (size_t)model->count);
+                                (size_t)model->count, epsilon);
             }
         }
     }
@@ -6676,6 +6683,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(opacity_fade, 0, most);
+    SSDGS__RANGE(adam_epsilon, 0, most);
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
@@ -9709,7 +9717,8 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
    Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that flushes subnormals
    finds the same. Those beyond 1e18 count as that: no square and no product with a rate overflows. */
-SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square) {
+SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square,
+                              R epsilon) {
     V g = VLOAD(gradient), m, v;
     g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
     m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
@@ -9719,15 +9728,16 @@ SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square
     VSTORE(mean, m);
     VSTORE(square, v);
     m = VMUL(VSET(rate), VMUL(m, VSET(correct_mean)));
-    v = VADD(VSQRT(VMUL(v, VSET(correct_square))), VSET(1e-15));
+    v = VADD(VSQRT(VMUL(v, VSET(correct_square))), VSET(epsilon));
     VSTORE(parameter, VSUB(VLOAD(parameter), VDIV(m, v)));
 }
 
-SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean, R correct_square) {
+SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean, R correct_square,
+                        R epsilon) {
     R tail[4][SSDGS__VW];
     size_t i, l;
     for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW)
-        F(adam_lanes)(parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square);
+        F(adam_lanes)(parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
     if (i == n) return;
     for (l = 0; l < SSDGS__VW; l++) {
         tail[0][l] = i + l < n ? parameter[i + l] : 0;
@@ -9735,7 +9745,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
         tail[2][l] = i + l < n ? mean[i + l] : 0;
         tail[3][l] = i + l < n ? square[i + l] : 0;
     }
-    F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate, correct_mean, correct_square);
+    F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate, correct_mean, correct_square, epsilon);
     for (l = 0; i + l < n; l++) {
         parameter[i + l] = tail[0][l];
         mean[i + l] = tail[2][l];

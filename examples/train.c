@@ -49,7 +49,7 @@ static const field fields[] = {
     OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
     OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim), OPTION(1, 1, normal_weight),
     OPTION(1, 3, bounds_min), OPTION(1, 3, bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size), OPTION(1, 1, densify_shadow),
-    OPTION(1, 1, prune_opacity), OPTION(1, 1, prune_weight), OPTION(1, 1, prune_outside), OPTION(1, 1, opacity_fade),
+    OPTION(1, 1, prune_opacity), OPTION(1, 1, prune_weight), OPTION(1, 1, prune_outside), OPTION(1, 1, opacity_fade), OPTION(1, 1, adam_epsilon),
     OPTION(1, 2, position), OPTION(1, 2, opacity), OPTION(1, 2, scale), OPTION(1, 2, rotation),
     OPTION(1, 2, color), OPTION(1, 2, asg), OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
     OPTION(1, 2, scattering), OPTION(1, 2, camera_rate), OPTION(1, 2, light_rate)

@@ -582,7 +582,8 @@ static void test_adam(void) {
     v = reals(n);
     rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
     for (t = 0; t < steps; t++) {
-        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1), ssdgs__bias_correction(0.999, (int)t + 1));
+        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1), ssdgs__bias_correction(0.999, (int)t + 1),
+                         (ssdgs_real)1e-15);
         CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6, "adam: trajectory");
     }
     free(p);

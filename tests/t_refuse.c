@@ -32,6 +32,7 @@ static const field train_fields[] = {
     I(iterations, 1, 100000000), I(schedule, 0, 3), I(max_gaussians, 1, 1 << 28), I(densify_every, 1, 2000000000),
     I(opacity_reset_every, 0, 2000000000), R(dssim, 0, 1), R(normal_weight, 0, 1e30), R(densify_gradient, 0, 1e30), R(densify_size, 1e-30, 1e30),
     R(densify_shadow, 0, 1e30), R(prune_opacity, 1e-30, 0.999), R(prune_weight, 0, 1e30), R(prune_outside, 0, 1), R(opacity_fade, 0, 1e30),
+    R(adam_epsilon, 0, 1e30),
     RATE(position), RATE(opacity), RATE(scale), RATE(rotation), RATE(color), RATE(asg), RATE(frame), RATE(material), RATE(shadow), RATE(scattering),
     RATE(camera_rate), RATE(light_rate)
 #undef I

@@ -625,8 +625,9 @@ static void test_learning(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Every parameter takes Adam's steps at its group's rate, by its group's clock; what is frozen or not in use stands still. */
-static void test_adam(void) {
+/* Every parameter takes Adam's steps at its group's rate, by its group's clock; what is frozen or not in use stands still. Epsilon is
+   a share of what 1/255 in one of 3 x 20 x 15 colours costs, the published one or nothing (1e30: no step at all). */
+static void test_adam(double share) {
     enum { MANY = 70, STEPS = 6, ALL = SSDGS_ALL_TERMS };
     static const double times[STEPS] = {0, 1, 45e3, 45001, 70e3, 95e3}; /* of 100,000 */
     static const struct { int rate, terms; double from, over; } learning[SSDGS__GROUPS] = { /* rate: in the order of the options */
@@ -650,6 +651,8 @@ static void test_adam(void) {
         rates[g].end = (ssdgs_real)(0.002 * (10 - g));
     }
     memcpy(&options.position, rates, sizeof rates);
+    options.adam_epsilon = (ssdgs_real)share;
+    options.bounds_max[1] = 2; /* so that the longest side is 2.5 */
     settings.asg = SSDGS_ASG_ANGULAR; /* so that there is a sigma */
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, MANY, &model));
@@ -664,6 +667,8 @@ static void test_adam(void) {
     for (step = 0; step < STEPS; step++) {
         ssdgs_frame frame;
         memset(&frame, 0, sizeof frame);
+        frame.camera.width = 20;
+        frame.camera.height = 15;
         frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
         frame.global_gradient = frame.gradient + planes;
         for (i = 0; i < values; i++) { /* of all sizes: those below 1e-18 count as 0, those beyond 1e18 as that */
@@ -675,11 +680,12 @@ static void test_adam(void) {
         CHECK(!ssdgs__adam_step(trainer, &frame, times[step], terms[step], learns));
     }
     for (i = 0; i < values; i++) {
-        double mean = 0, square = 0, value = (double)start[i];
+        double mean = 0, square = 0, value = (double)start[i], epsilon = share / (255 * 3 * 20 * 15);
         int clock = 0;
         if (i < planes && i % stride >= MANY) continue;
         for (g = 0; g < SSDGS__PLANE_GROUPS && i / stride >= (size_t)ssdgs__group_plane[g + 1];) g++;
         while (i >= planes && i - planes >= first[g - SSDGS__PLANE_GROUPS + 1]) g++;
+        epsilon = fmax(g ? epsilon : epsilon / 2.5, 1e-15);
         for (step = 0; step < STEPS; step++) {
             const double raw = (double)gradient[step][i], slope = fabs(raw) < 1e-18 ? 0 : fmin(fmax(raw, -1e18), 1e18);
             const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0 ? 0 : past > 1 ? 1 : past;
@@ -689,12 +695,12 @@ static void test_adam(void) {
             mean = 0.9 * mean + 0.1 * slope;
             square = 0.999 * square + 0.001 * slope * slope;
             value -= (g ? 1 : trainer->extent) * pow((double)rate.start, 1 - x) * pow((double)rate.end, x) *
-                     mean / (1 - pow(0.9, clock)) / (sqrt(square / (1 - pow(0.999, clock))) + 1e-15);
+                     mean / (1 - pow(0.9, clock)) / (sqrt(square / (1 - pow(0.999, clock))) + epsilon);
         }
         value = fabs(value - (double)(i < planes ? model->gaussians[i] : model->globals[i - planes]));
         worst = value <= worst ? worst : value;
     }
-    if (!CHECK(worst < 4e-6)) printf("    Adam: off by %.3g\n", worst); /* six roundings of values up to 4 */
+    if (!CHECK(worst < 4e-6)) printf("    Adam, epsilon %g: off by %.3g\n", share, worst); /* six roundings of values up to 4 */
     for (step = 0; step < STEPS; step++) free(gradient[step]);
     free(start);
     ssdgs_trainer_destroy(trainer);
@@ -1605,7 +1611,9 @@ static void test_half_shadow(void) {
 
 int main(void) {
     make_photos();
-    test_adam();
+    test_adam(0);
+    test_adam(0.1);
+    test_adam(1e30);
     test_same_bits();
     test_resume();
     test_refused_step();
