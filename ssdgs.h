@@ -111,8 +111,8 @@ CONVENTIONS
             of settings.length_unit (published: 0.01). Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
   light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB irradiance. Any
             number of them in a rendering, one in a photograph. Intensities have the unit of the photographs':
-            ssdgs_trainer_create() gives an empty model the light_scale that makes E 1 on average at the centre of the
-            bounds; it stays in the model.
+            ssdgs_trainer_create() gives an empty model the light_scale that makes E's geometric mean 1 at the centre of
+            the bounds; it stays in the model.
   colour    transfer says how stored values, in photographs and image files, relate to the colours that are blended:
             SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and Gaussians blend linear light;
             SSDGS_TRANSFER_NONE: they are the same. A photograph's alpha blends stored values, as image programs do it, and
@@ -633,7 +633,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so
                                   that normals are right where only highlights tell; 0.05; 0 = none */
     ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start: the object's box, not the cameras'; -0.5, 0.5 */
-    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4 */
+    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4. Where outlines
+                                  show that the object fills less than 0.15 of a photograph it counts for more, by the root */
     ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
     ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on average, is halved,
                                   since no shadow's edge shows within a Gaussian; 0.5; 0 = none is */
@@ -643,12 +644,14 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
                                   its centre in the picture, and more than one of eight or more, are transparent there, 1/128 of
                                   the width around, or where none has it; 0.02; 0 = none. Photographs have outlines where more
-                                  than a hundredth of the picture is wholly transparent, but not all of it */
+                                  than a hundredth of the picture is wholly transparent, but not all of it; of eight or more those
+                                  are left out that are transparent on a third of what the others show */
     ssdgs_real opacity_fade;   /* px: where only a fiftieth of the photographs have outlines, or one of eight or more, an opaque
                                   Gaussian costs as much as so many px wrong by 1, less and less up to iteration 30,000*, as those
                                   of the background's colour have no other reason to go; 0.8; 0 = nothing */
-    ssdgs_real adam_epsilon;   /* in what one step of 255 in one colour of one pixel adds to the loss: what photographs do not show
-                                  hardly moves, where noise of 1e-15, as published, drives it without end; 0.1; 0 = 1e-15 */
+    ssdgs_real adam_epsilon;   /* Adam's epsilon, in what 1 / 255 in one colour of one pixel of the photograph costs (positions: by a
+                                  move of the bounds' longest side). What no photograph shows hardly moves; with the published
+                                  1e-15 rounding noise takes full steps without end; 0.1; 0 = 1e-15 */
     ssdgs_rate position, opacity, scale, rotation, color; /* over the whole run; position: of 1.1 x the cameras' radius */
     ssdgs_rate asg, frame;                /* start up to iteration 40,000*, end at 90,000*: the published shape */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
@@ -2186,6 +2189,28 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     return camera;
 }
 
+/* Where a Gaussian reaches, and its mean log scale; 0 where alpha_threshold, by its logit, lets it draw nothing. */
+static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint, double low[3], double high[3], double *log_scale) {
+    const ssdgs_real *p = g->gaussians + index;
+    ssdgs_real largest = -20;
+    double reach;
+    int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
+    for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
+    for (*log_scale = 0; j < SSDGS_OPACITY; j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
+        const ssdgs_real s = p[(size_t)j * g->stride];
+        usable = usable && s < 20;
+        largest = s > largest ? s : largest;
+        *log_scale += (double)(s > -20 ? s : -20) / 3;
+    }
+    if (!usable) return 0;
+    reach = (double)(3 * ssdgs__exp_scalar(largest));
+    for (j = 0; j < 3; j++) {
+        low[j] = (double)p[(size_t)j * g->stride] - reach;
+        high[j] = (double)p[(size_t)j * g->stride] + reach;
+    }
+    return 1;
+}
+
 typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; ssdgs_real faint; } ssdgs__bounds_job;
 
 static void ssdgs__bounds_task(void *data, int index) {
@@ -2193,6 +2218,7 @@ static void ssdgs__bounds_task(void *data, int index) {
     const ssdgs_model_view *g = job->g;
     ssdgs__bounds *b = job->chunk + index;
     const int end = (index + 1) * SSDGS__CHUNK < g->count ? (index + 1) * SSDGS__CHUNK : g->count;
+    double low[3], high[3], log_scale;
     int i, j;
     for (j = 0; j < 3; j++) {
         b->low[j] = 1e30;
@@ -2201,26 +2227,43 @@ static void ssdgs__bounds_task(void *data, int index) {
     b->log_scale = 0;
     b->count = 0;
     for (i = index * SSDGS__CHUNK; i < end; i++) {
-        const ssdgs_real *p = g->gaussians + i;
-        ssdgs_real largest = -20, reach;
-        double mean = 0;
-        int usable = p[SSDGS_OPACITY * g->stride] >= job->faint;
-        for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
-        for (; j < SSDGS_OPACITY; j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
-            const ssdgs_real s = p[(size_t)j * g->stride];
-            usable = usable && s < 20;
-            largest = s > largest ? s : largest;
-            mean += (double)(s > -20 ? s : -20) / 3;
-        }
-        if (!usable) continue;
-        reach = 3 * ssdgs__exp_scalar(largest);
-        b->log_scale += mean;
+        if (!ssdgs__box_of(g, i, job->faint, low, high, &log_scale)) continue;
+        b->log_scale += log_scale;
         b->count++;
         for (j = 0; j < 3; j++) {
-            const double x = (double)p[(size_t)j * g->stride];
-            if (x - (double)reach < b->low[j]) b->low[j] = x - (double)reach;
-            if (x + (double)reach > b->high[j]) b->high[j] = x + (double)reach;
+            b->low[j] = low[j] < b->low[j] ? low[j] : b->low[j];
+            b->high[j] = high[j] > b->high[j] ? high[j] : b->high[j];
         }
+    }
+}
+
+/* least, in order, are the `keep` least of the numbers it was shown. */
+static void ssdgs__keep_least(double *least, int keep, double number) {
+    int i = keep - 1;
+    if (number >= least[i]) return;
+    for (; i > 0 && least[i - 1] > number; i--) least[i] = least[i - 1];
+    least[i] = number;
+}
+
+/* Cuts what a few stray Gaussians add to the bounds: these stay within thrice the box that, on each side, one in 200 of a sample
+   reaches beyond. A light's map that had to hold them would have few pixels left for the scene. */
+static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs__bounds *total) {
+    enum { SAMPLE = 4096, KEEP = SAMPLE / 200 + 1 };
+    double least[6][KEEP], low[3], high[3], log_scale;
+    int i, j, seen = 0;
+    for (i = 0; i < 6 * KEEP; i++) least[i / KEEP][i % KEEP] = 1e300;
+    for (i = 0; i < g->count; i += 1 + (g->count - 1) / SAMPLE) {
+        if (!ssdgs__box_of(g, i, faint, low, high, &log_scale)) continue;
+        seen++;
+        for (j = 0; j < 3; j++) {
+            ssdgs__keep_least(least[j], KEEP, low[j]);
+            ssdgs__keep_least(least[3 + j], KEEP, -high[j]);
+        }
+    }
+    for (j = 0; j < 3 && seen; j++) {
+        const double from = least[j][seen / 200], to = -least[3 + j][seen / 200], margin = to - from;
+        if (from - margin > total->low[j]) total->low[j] = from - margin;
+        if (to + margin < total->high[j]) total->high[j] = to + margin;
     }
 }
 
@@ -2248,6 +2291,7 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
         total->log_scale += b->log_scale;
     }
     if (total->count) total->log_scale /= total->count;
+    ssdgs__cut_strays(g, job.faint, total);
     return SSDGS_OK;
 }
 
@@ -5810,6 +5854,7 @@ struct ssdgs_trainer {
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
     unsigned char *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
+    ssdgs_real *magnify;        /* per photograph: what makes up for an object small in the picture, 1 for others */
     int photo_count;
     uint32_t *order;          /* the photographs in this pass's order */
     size_t stride;            /* of the planes below: the model's capacity */
@@ -5944,19 +5989,29 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
 
 /* ---- one photograph ---- */
 
-/* Stored values of pixels begin .. end of a photograph on the background, as planes. */
+/* A stored value, 3: alpha. */
+static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, size_t pixel, int c) {
+    return photo->format == SSDGS_PIXELS_RGBA8
+        ? (ssdgs_real)(1.0 / 255) * (ssdgs_real)((const uint8_t *)photo->pixels)[4 * pixel + (size_t)c]
+        : (ssdgs_real)(1.0 / 65535) * (ssdgs_real)((const uint16_t *)photo->pixels)[4 * pixel + (size_t)c];
+}
+
+/* A pixel's stored values on the background. */
+static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real background[3], size_t pixel, ssdgs_real value[3]) {
+    const ssdgs_real alpha = ssdgs__photo_value(photo, pixel, 3);
+    int c;
+    for (c = 0; c < 3; c++) value[c] = alpha * ssdgs__photo_value(photo, pixel, c) + (1 - alpha) * background[c];
+}
+
+/* Those of pixels begin .. end, as planes. */
 static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin, size_t end,
                                 ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    const ssdgs_real unit = photo->format == SSDGS_PIXELS_RGBA8 ? (ssdgs_real)(1.0 / 255) : (ssdgs_real)(1.0 / 65535);
-    size_t i;
-    int c;
+    ssdgs_real value[3];
+    size_t i, c;
     for (i = begin; i < end; i++) {
-        ssdgs_real v[4];
-        for (c = 0; c < 4; c++)
-            v[c] = unit * (ssdgs_real)(photo->format == SSDGS_PIXELS_RGBA8 ? ((const uint8_t *)photo->pixels)[4 * i + (size_t)c]
-                                                                         : ((const uint16_t *)photo->pixels)[4 * i + (size_t)c]);
-        for (c = 0; c < 3; c++) planes[pixels * (size_t)c + i] = v[3] * v[c] + (1 - v[3]) * background[c];
+        ssdgs__photo_pixel(photo, background, i, value);
+        for (c = 0; c < 3; c++) planes[pixels * c + i] = value[c];
     }
 }
 
@@ -6025,6 +6080,7 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
 }
 
 #define SSDGS__PIXELS 1024 /* of an exposure task */
+#define SSDGS__CLIPPED (ssdgs_real)0.999 /* stored values beyond may have been more */
 
 typedef struct ssdgs__exposure_job {
     ssdgs_frame *frame;
@@ -6034,7 +6090,8 @@ typedef struct ssdgs__exposure_job {
 } ssdgs__exposure_job;
 
 /* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 - T),
-   image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u encode'(u). */
+   image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u encode'(u). A photograph's
+   1 may stand for anything brighter, so there encode(u) is at most 1. */
 static void ssdgs__exposure_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -6052,7 +6109,9 @@ static void ssdgs__exposure_task(void *data, int index) {
         if (frame->settings.transfer == SSDGS_TRANSFER_SRGB) frame->context->k->srgb_encode(stored, slope, straight, n);
         for (i = 0; i < n; i++) {
             const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
-            const ssdgs_real s = linear ? straight[i] : stored[i], d = linear ? 1 : slope[i];
+            const ssdgs_real rendered = linear ? straight[i] : stored[i], shown = ssdgs__photo_value(job->photo, begin + i, c);
+            const int clipped = shown > SSDGS__CLIPPED && rendered > shown;
+            const ssdgs_real s = clipped ? shown : rendered, d = clipped ? 0 : linear ? 1 : slope[i];
             job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
             job->slope[at + i] = d;
             job->lift[at + i] = job->background[c] - s + d * straight[i];
@@ -6344,6 +6403,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
 #define SSDGS__STATISTICS 4
+#define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
 #define SSDGS__HALVED 0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
 #define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
 
@@ -6632,8 +6692,8 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
     }
 }
 
-static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame) {
-    const ssdgs_real half_w = (ssdgs_real)frame->camera.width / 2, half_h = (ssdgs_real)frame->camera.height / 2;
+static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame, ssdgs_real magnify) {
+    const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2, half_h = magnify * (ssdgs_real)frame->camera.height / 2;
     int i;
     for (i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
@@ -6712,6 +6772,49 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
     }
 }
 
+/* Leaves out the outlines of photographs whose mask or pose must be wrong: of eight or more with outlines those that are transparent
+   where more than a third of the places lie that all but one of these, or nine in ten, show. */
+static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
+    enum { PLACES = 2048, FEW = 30 };
+    const int photos = trainer->photo_count;
+    int *shown = (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos), *refused;
+    int outlined = 0, wrong = 0, first = 0, place, i;
+    unsigned char *side;
+    if (!shown) return SSDGS_ERR_MEMORY;
+    refused = shown + photos;
+    side = (unsigned char *)(refused + photos);
+    memset(shown, 0, 2 * (size_t)photos * sizeof *shown);
+    for (i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
+    for (place = 0; place < PLACES && outlined >= 8; place++) {
+        double u[3];
+        ssdgs_real x[3];
+        int seen = 0, outside = 0;
+        ssdgs__draw_place(&trainer->options, (uint64_t)place, u, x);
+        for (i = 0; i < photos; i++) {
+            const ssdgs_photo *photo = trainer->photos + i;
+            side[i] = trainer->transparent[i] == 2 ? (unsigned char)ssdgs__outline_side(photo, &photo->camera, 1, x) : 0;
+            seen += side[i] > 0;
+            outside += side[i] == 2;
+        }
+        if (outside > 1 && 10 * outside > seen) continue;
+        for (i = 0; i < photos; i++) {
+            shown[i] += side[i] > 0;
+            refused[i] += side[i] == 2;
+        }
+    }
+    for (i = photos - 1; i >= 0; i--) {
+        if (shown[i] < FEW || 3 * refused[i] <= shown[i]) continue;
+        trainer->transparent[i] = 1;
+        first = i;
+        wrong++;
+    }
+    if (wrong)
+        ssdgs__note(trainer->context, "%d photographs of %d, the first number %d, are transparent where the others show the object: is "
+                    "it their masks or poses that are wrong? Their outlines are not used", wrong, photos, first);
+    ssdgs__release(trainer->context, shown);
+    return SSDGS_OK;
+}
+
 /* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
    away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where few
    would be left others are drawn. */
@@ -6747,7 +6850,9 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             if (!outside[i]) draws[kept++] = draws[i];
     }
     if (!kept) { /* never none */
-        ssdgs__note(trainer->context, "no random point is inside of the outlines: do bounds_min and bounds_max hold the object?");
+        ssdgs__note(trainer->context, "no random point is inside of the outlines, so these are not used: do bounds_min and bounds_max "
+                    "hold the object, are masks and poses right?");
+        trainer->outlines = 0;
         kept = n;
         round = 1;
     }
@@ -6787,6 +6892,7 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
     ssdgs__release(context, trainer->photos);
     ssdgs__release(context, trainer->corrections);
     ssdgs__release(context, trainer->transparent);
+    ssdgs__release(context, trainer->magnify);
     ssdgs__release(context, trainer->order);
     ssdgs__release(context, trainer->mean);
     ssdgs__release(context, trainer->square);
@@ -6943,6 +7049,36 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
 
 /* ---- a trainer and its steps ---- */
 
+/* Opaque photographs have their own background: whether their borders are of one colour, and not options.background. */
+static void ssdgs__note_background(const ssdgs_trainer *trainer) {
+    const ssdgs_real *background = trainer->options.background;
+    double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, spread = 0, off = 0;
+    int i, x, y, c;
+    for (i = 0; i < trainer->photo_count; i++) {
+        const ssdgs_photo *photo = trainer->photos + i;
+        const size_t w = (size_t)photo->camera.width, h = (size_t)photo->camera.height;
+        for (y = 0; y < (int)h; y++)
+            for (x = 0; x < (int)w; x += y == 0 || y == (int)h - 1 || w == 1 ? 1 : (int)w - 1) {
+                ssdgs_real plane[3];
+                ssdgs__photo_pixel(photo, background, (size_t)y * w + (size_t)x, plane);
+                for (c = 0; c < 3; c++) {
+                    mean[c] += (double)plane[c];
+                    square[c] += (double)plane[c] * (double)plane[c];
+                }
+                count++;
+            }
+    }
+    for (c = 0; c < 3; c++) {
+        const double apart = fabs((mean[c] /= count) - (double)background[c]), v = square[c] / count - mean[c] * mean[c];
+        off = apart > off ? apart : off;
+        spread = v > spread ? v : spread;
+    }
+    if (off > 0.1 && spread < 0.01)
+        ssdgs__note(trainer->context, "the photographs' borders are about %g,%g,%g: is that the background, and not "
+                    "options.background, %g,%g,%g?", floor(100 * mean[0] + 0.5) / 100, floor(100 * mean[1] + 0.5) / 100,
+                    floor(100 * mean[2] + 0.5) / 100, (double)background[0], (double)background[1], (double)background[2]);
+}
+
 static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
@@ -6950,7 +7086,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int outlined = 0, empty = 0, dark = 0, within = 0, i, j;
+    int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0, i, j;
     if (result) return result;
     if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                                   "a baked model cannot be trained: it has no reflectance");
@@ -6964,15 +7100,17 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->corrections = (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
     trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
     trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
+    trainer->magnify = (ssdgs_real *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->magnify);
     trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->global_mean ||
-        !trainer->global_square) return SSDGS_ERR_MEMORY;
+    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->magnify ||
+        !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
     for (i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
         size_t clear = 0, veiled = 0, at;
+        double small;
         for (at = 0; at < pixels; at++) {
             const int alpha = ssdgs__photo_alpha(photos + i, at);
             clear += !alpha;
@@ -6980,14 +7118,21 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         }
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
-        outlined += trainer->transparent[i] == 2;
+        /* the mean loss pulls at a screen's width as little as the object is small in it */
+        small = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
+        trainer->magnify[i] = (ssdgs_real)(small > 1 ? sqrt(small) : 1);
         empty += clear == pixels;
     }
+    result = ssdgs__doubt_outlines(trainer);
+    if (result) return result;
+    for (i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
     trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
     if (empty) ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty, photo_count);
-    if (!trainer->outlines && empty < photo_count)
+    if (!trainer->outlines && empty < photo_count) {
         ssdgs__note(context, "too few photographs are transparent around the object: its outlines are not known, and Gaussians of "
                     "the background's colour may stay around it");
+        ssdgs__note_background(trainer);
+    }
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -7014,7 +7159,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (fresh && !result) { /* the model stays as it was when that fails */
         const ssdgs_settings *s = &model->settings;
         const int scaled = ssdgs__has_unit(s);
-        /* I / d^2 at the object averages 1; a light inside of it, as far away as its surface, must not darken all others */
+        /* the logarithm of I / d^2 at the object averages 0: few strong lights, or one inside of it, must not darken all others */
         const double nearest2 = 0.25 * trainer->unit * trainer->unit;
         double scale;
         if (scaled) model->settings.length_unit = (ssdgs_real)(0.5 * trainer->unit);
@@ -7027,10 +7172,12 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
                 intensity += (double)photos[i].light.intensity[j] / 3;
                 if (scaled) model->settings.centre[j] = (ssdgs_real)centre;
             }
-            irradiance += intensity / (photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > nearest2 ? d2 : nearest2) /
-                          photo_count;
+            intensity /= photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > nearest2 ? d2 : nearest2;
+            if (!(intensity > 0)) continue;
+            irradiance += log(intensity);
+            lit++;
         }
-        scale = irradiance > 0 ? 1 / irradiance : 1;
+        scale = lit ? exp(-irradiance / lit) : 1;
         model->settings.light_scale = (ssdgs_real)(scale < SSDGS__MOST_LIGHT ? scale : SSDGS__MOST_LIGHT);
         ssdgs__globals_reset(model, o->seed);
     }
@@ -7153,7 +7300,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
-        ssdgs__gather_statistics(trainer, &frame);
+        ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photo]);
         if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) result = ssdgs__densify(trainer);
         if (ssdgs__resets(o, trainer->iteration)) ssdgs__reset_opacity(trainer);
     }
@@ -7920,12 +8067,12 @@ SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V 
 
 /* What both directions need of a projection, per lane. */
 typedef struct F(projection) {
-    V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], a, b, c, det0, h, det, opacity;
+    V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det, opacity; /* cross = m0 x m1 */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
 SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, const R *g, size_t stride, VM off) {
-    V raw[4], cross[3];
+    V raw[4];
     int i, j;
     for (i = 0; i < 3; i++) p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
     for (i = 0; i < 4; i++) raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
@@ -7950,9 +8097,9 @@ SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, co
     for (i = 0; i < 3; i++) { /* difference of products, its rounding error put back by the fused operation */
         V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3], v1 = p->m[1][(i + 1) % 3];
         V product = VMUL(u1, v1);
-        cross[i] = VADD(VFMA(u0, v0, VNEG(product)), VFNMA(u1, v1, product));
+        p->cross[i] = VADD(VFMA(u0, v0, VNEG(product)), VFNMA(u1, v1, product));
     }
-    p->det0 = VDOT3(cross[0], cross[1], cross[2], cross[0], cross[1], cross[2]);
+    p->det0 = VDOT3(p->cross[0], p->cross[1], p->cross[2], p->cross[0], p->cross[1], p->cross[2]);
     if (k->blur == SSDGS_BLUR_ADD) {
         p->h = VSET(k->variance);
     } else {
@@ -8035,7 +8182,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         F(projection) p;
         const size_t v = i / SSDGS__VW % SSDGS__NV;
         R lane[8][SSDGS__VW], any = 0;
-        V g[8], total, inverse_det, ka, kb, kc, da, db, dc, du[2][3], dr[9], dq[4], dt[3];
+        V g[8], total, inverse_det, inverse_det0, ka, kb, kc, half_g, du[2][3], dr[9], dq[4], dt[3];
         for (l = 0; l < SSDGS__VW; l++)
             for (j = 0; j < 8; j++) {
                 lane[j][l] = j == 6 ? 0 : splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
@@ -8052,24 +8199,28 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         ka = VMUL(VADD(p.c, p.h), inverse_det);
         kb = VNEG(VMUL(p.b, inverse_det));
         kc = VMUL(VADD(p.a, p.h), inverse_det);
-        /* d(covariance) = -K G K with K the conic */
-        da = VNEG(VFMA(VMUL(ka, ka), g[2], VFMA(VMUL(ka, kb), g[3], VMUL(VMUL(kb, kb), g[4]))));
-        dc = VNEG(VFMA(VMUL(kb, kb), g[2], VFMA(VMUL(kb, kc), g[3], VMUL(VMUL(kc, kc), g[4]))));
-        db = VNEG(VFMA(VMUL(VMUL(VSET(2), ka), kb), g[2],
-                       VFMA(VFMA(ka, kc, VMUL(kb, kb)), g[3], VMUL(VMUL(VMUL(VSET(2), kb), kc), g[4]))));
-        if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
-            V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20))), half = VMUL(VSET(0.5), g[5]);
-            da = VFMA(half, VSUB(VMUL(p.c, inverse_det0), ka), da);
-            dc = VFMA(half, VSUB(VMUL(p.a, inverse_det0), kc), dc);
-            db = VFMA(g[5], VMUL(p.b, VSUB(inverse_det, inverse_det0)), db);
-        }
+        half_g = VMUL(VSET(0.5), g[3]);
+        inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         for (j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
-        for (j = 0; j < 3; j++) { /* m = (J W) (R S) */
-            V dm0 = VFMA(VMUL(VSET(2), da), p.m[0][j], VMUL(db, p.m[1][j]));
-            V dm1 = VFMA(VMUL(VSET(2), dc), p.m[1][j], VMUL(db, p.m[0][j]));
+        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2 u_j.G u_j with u = K m.
+           Of a thin Gaussian K G K and K m as products are differences of large numbers; u = (h m + (m1 x X, X x m0)) / det with
+           X = m0 x m1 is none. */
+        for (j = 0; j < 3; j++) {
+            const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+            const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
+                across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
+            const V u0 = VMUL(VFMA(p.h, p.m[0][j], across0), inverse_det), u1 = VMUL(VFMA(p.h, p.m[1][j], across1), inverse_det);
+            const V gu0 = VFMA(g[2], u0, VMUL(half_g, u1)), gu1 = VFMA(half_g, u0, VMUL(g[4], u1));
+            V dm0 = VMUL(VSET(-2), VFMA(ka, gu0, VMUL(kb, gu1))), dm1 = VMUL(VSET(-2), VFMA(kb, gu0, VMUL(kc, gu1)));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
-            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
-                ds = VFMA(dm0, p.m[0][j], VMUL(dm1, p.m[1][j]));
+            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i), ds = VMUL(VSET(-2), VFMA(u0, gu0, VMUL(u1, gu1)));
+            if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
+                const V push0 = VMUL(g[5], VSUB(VMUL(across0, inverse_det0), u0)),
+                    push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), u1));
+                dm0 = VADD(dm0, push0);
+                dm1 = VADD(dm1, push1);
+                ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));
+            }
             VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(20)), ds, VSET(0))));
             dm0 = VMUL(dm0, p.s[j]);
             dm1 = VMUL(dm1, p.s[j]);

@@ -569,6 +569,84 @@ static void test_loss(void) {
     gold_close(&file);
 }
 
+/* Sum of weight . conic (px^-2) + weight[3] ln opacity of a Gaussian under an orthographic view of 1 px a unit, from its quaternion (4)
+   and log scales (3). */
+static double weighted_conic(const double raw[7], const double weight[4], double variance, int compensated) {
+    double q[4], r[6], m[2][3], cov[3] = {0, 0, 0}, det, blurred, length = 0;
+    int i, j;
+    for (i = 0; i < 4; i++) length += raw[i] * raw[i];
+    for (i = 0; i < 4; i++) q[i] = raw[i] / sqrt(length);
+    r[0] = 1 - 2 * (q[2] * q[2] + q[3] * q[3]);
+    r[1] = 2 * (q[1] * q[2] - q[0] * q[3]);
+    r[2] = 2 * (q[1] * q[3] + q[0] * q[2]);
+    r[3] = 2 * (q[1] * q[2] + q[0] * q[3]);
+    r[4] = 1 - 2 * (q[1] * q[1] + q[3] * q[3]);
+    r[5] = 2 * (q[2] * q[3] - q[0] * q[1]);
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 3; j++) m[i][j] = r[3 * i + j] * exp(raw[4 + j]);
+    for (j = 0; j < 3; j++) {
+        cov[0] += m[0][j] * m[0][j];
+        cov[1] += m[0][j] * m[1][j];
+        cov[2] += m[1][j] * m[1][j];
+    }
+    det = pow(m[0][0] * m[1][1] - m[0][1] * m[1][0], 2) + pow(m[0][1] * m[1][2] - m[0][2] * m[1][1], 2) +
+          pow(m[0][2] * m[1][0] - m[0][0] * m[1][2], 2);
+    blurred = det + variance * (cov[0] + cov[2] + variance);
+    return (weight[0] * (cov[2] + variance) - weight[1] * cov[1] + weight[2] * (cov[0] + variance)) / blurred +
+           (compensated ? 0.5 * weight[3] * (log(det) - log(blurred)) : 0);
+}
+
+/* Rotations' and log scales' gradients of thin Gaussians, 3 to 300 px long and 0.1 to 1 px thin, against central differences in double:
+   what products of conics would lose. */
+static void test_needles(void) {
+    enum { MANY = 16, PLANES = SSDGS_CHANNELS * MANY };
+    static const double long_side[4] = {3, 30, 100, 300}, thin_side[2] = {0.1, 1};
+    ssdgs_real *gaussians = reals(PLANES), *gradient = reals(PLANES), *splat = reals(MANY * SSDGS__SPLAT), slot[12];
+    ssdgs__projection view;
+    int compensated, i, j;
+    for (compensated = 0; compensated < 2; compensated++) {
+        double worst[2] = {0, 0};
+        memset(&view, 0, sizeof view);
+        view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
+        view.orthographic = 1;
+        view.compensate = compensated;
+        view.variance = (ssdgs_real)0.1;
+        view.blur = SSDGS_BLUR_ADD;
+        memset(gradient, 0, PLANES * sizeof *gradient);
+        for (i = 0; i < MANY; i++) {
+            for (j = 0; j < 4; j++) {
+                gaussians[(SSDGS_ROTATION + j) * MANY + i] = (ssdgs_real)(2 * ssdgs__uniform(1, (uint64_t)(4 * i + j)) - 1);
+                splat[i * SSDGS__SPLAT + 2 + j] = (ssdgs_real)(2 * ssdgs__uniform(2, (uint64_t)(4 * i + j)) - 1);
+            }
+            for (j = 0; j < 3; j++)
+                gaussians[(SSDGS_LOG_SCALE + j) * MANY + i] = (ssdgs_real)log(j == i % 3 ? long_side[i % 4] : thin_side[i / 4 % 2]);
+        }
+        context->k->project_backward(&view, gaussians, MANY, 0, MANY, splat, gradient, MANY, slot);
+        for (i = 0; i < MANY; i++) {
+            double raw[7], weight[4], error[2] = {0, 0}, norm[2] = {0, 0};
+            for (j = 0; j < 7; j++) raw[j] = (double)gaussians[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
+            for (j = 0; j < 4; j++) weight[j] = (double)splat[i * SSDGS__SPLAT + 2 + j];
+            for (j = 0; j < 7; j++) {
+                const double start = raw[j], step = 1e-5, got = (double)gradient[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
+                double want = 0;
+                raw[j] = start + step;
+                want += weighted_conic(raw, weight, 0.1, compensated);
+                raw[j] = start - step;
+                want = (want - weighted_conic(raw, weight, 0.1, compensated)) / (2 * step);
+                raw[j] = start;
+                error[j > 3] += (got - want) * (got - want);
+                norm[j > 3] += want * want;
+            }
+            for (j = 0; j < 2; j++) worst[j] = fmax(worst[j], sqrt(error[j] / norm[j]));
+        }
+        if (!CHECK(worst[0] < (real64 ? 1e-6 : 1e-2) && worst[1] < (real64 ? 1e-6 : 1e-3)))
+            printf("    needles%s: rotations off by %.3g, scales by %.3g\n", compensated ? ", compensated" : "", worst[0], worst[1]);
+    }
+    free(gaussians);
+    free(gradient);
+    free(splat);
+}
+
 static void test_adam(void) {
     ssdgs_real *p, *g, *m, *v;
     size_t n, steps, t;
@@ -733,6 +811,7 @@ int main(void) {
         test_network("shadow_mlp", 1, 0, 0);
         test_network("shadow_mlp", 1, 1, 1);
         test_loss();
+        test_needles();
         test_adam();
         test_full("full", 0);
         test_full("full_default", 1);

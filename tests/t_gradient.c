@@ -391,8 +391,9 @@ static void test_empty_tiles(void) {
     ssdgs_model_destroy(model);
 }
 
-/* A photograph with transparency on a background: the gradient goes through the blending of stored values. */
-static void test_photo(int transfer) {
+/* A photograph with transparency on a background: the gradient goes through the blending of stored values, and stops where a bright
+   rendering meets a photograph's 1. */
+static void test_photo(int transfer, double intensity) {
     static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
     static const int frozen[2] = {1, 1};
     static unsigned char pixels[SIDE * SIDE * 4];
@@ -409,9 +410,9 @@ static void test_photo(int transfer) {
     memset(&photo, 0, sizeof photo);
     photo.camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     photo.light.position[0] = photo.light.position[1] = -2;
-    photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = 9;
+    photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = intensity;
     photo.pixels = pixels;
-    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)(255.9 * draw(7000 + i));
+    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)(intensity > 9 && i / 4 % 3 ? 255 : 255.9 * draw(7000 + i));
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
     fill(model);
     stride = model->capacity;
@@ -431,7 +432,7 @@ static void test_photo(int transfer) {
         t.norm += slope * slope;
         t.error += (slope - gradient[i]) * (slope - gradient[i]);
     }
-    if (!CHECK(t.error < 1e-6 * t.norm && t.norm > 0)) printf("    transfer %d: relative error %.3g\n", transfer, sqrt(t.error / t.norm));
+    if (!CHECK(t.error < 1e-6 * t.norm && t.norm > 0)) printf("    transfer %d, intensity %g: relative error %.3g\n", transfer, intensity, sqrt(t.error / t.norm));
     ssdgs_model_destroy(model);
 }
 
@@ -486,15 +487,17 @@ static void test_octaves(void) {
 
 int main(void) {
     scene base, s;
-    int i;
+    int transfer, i;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
     test_shared_sums();
     test_moved_camera();
     test_edges();
     test_sharpest();
-    test_photo(SSDGS_TRANSFER_SRGB);
-    test_photo(SSDGS_TRANSFER_NONE);
+    for (transfer = 0; transfer < 2; transfer++) {
+        test_photo(transfer, 9);
+        test_photo(transfer, 300);
+    }
     test_compose();
     test_octaves();
     test_empty_tiles();

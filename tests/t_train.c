@@ -1051,7 +1051,7 @@ static void test_units(void) {
         }
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, lit, PHOTOS, &options, &trainer));
-        want = kind ? 1e30 : PHOTOS / (100 * (0.25 + (PHOTOS - 1) / 16.0)); /* at the centre: as from 2 away */
+        want = kind ? 1e30 : 1 / (100 * pow(0.25, 1.0 / PHOTOS) * pow(1 / 16.0, 1 - 1.0 / PHOTOS)); /* at the centre: as from 2 away */
         CHECK(fabs((double)model->settings.light_scale / want - 1) < 1e-6);
         CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 && fabs(trainer->unit - 4) < 1e-12);
         CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
@@ -1146,10 +1146,11 @@ static void test_prune_weight(void) {
 }
 
 /* Notes in the log, by words of theirs. */
-enum { NO_POINT, NO_OUTLINES, NO_VIEW, OUTSIDE, WITHIN, CUBE, ONE_PLACE, NO_PLACE, BEHIND, DARK, EMPTY, NOTES };
+enum { NO_POINT, NO_OUTLINES, NO_VIEW, OUTSIDE, WITHIN, CUBE, ONE_PLACE, NO_PLACE, BEHIND, DARK, EMPTY, WRONG, BORDER, NOTES };
 static const char *const note_words[NOTES] = {"no random point is inside", "outlines are not known", "no Gaussian in view",
     "in 100 pixels lie outside", "cameras of 6 stand within", "object lies about within", "taken from one place", "in no one place",
-    "behind the cameras", "photographs of 6 have a light of intensity 0", "photographs of 6 are wholly transparent"};
+    "behind the cameras", "photographs of 6 have a light of intensity 0", "photographs of 6 are wholly transparent",
+    "are transparent where the others show", "borders are about"};
 static int heard[NOTES], told; /* how often; the number that the last one begins with */
 static double cube[6]; /* that is said to hold the object */
 
@@ -1433,6 +1434,145 @@ static void test_prune_outside(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Of eight photographs or more those whose mask or pose contradicts the others' lose their outlines, and nothing else is doubted. */
+static void test_wrong_outlines(void) {
+    static const struct { int photographs, wrong, turned, doubted; } cases[] = {
+        {12, 0, 0, 0}, {12, 1, 0, 1}, {12, 1, 1, 1}, {8, 1, 0, 1}, {7, 1, 0, 0}, {24, 2, 0, 2}, {24, 2, 1, 2}, {24, 9, 0, 0}};
+    static unsigned char speck[SIDE * SIDE * 4];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    size_t i;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    for (i = 0; i < SIDE * SIDE; i++) speck[4 * i + 3] = i % SIDE < SIDE / 6 && i / SIDE < SIDE / 6 ? 255 : 0;
+    CHECK(!ssdgs_context_create(&desc, &context));
+    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const int wrong = cases[i].wrong, first = 3; /* of all the first that is wrong */
+        ssdgs_photo shots[24];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        int k, c, left_out = 0;
+        for (k = 0; k < cases[i].photographs; k++) {
+            shots[k] = photos[k % PHOTOS];
+            if (k < first || k >= first + wrong) continue;
+            if (!cases[i].turned) shots[k].pixels = speck;
+            for (c = 0; c < 4 && cases[i].turned; c++) { /* by 0.3 radians about y, half the angle of view */
+                const ssdgs_real x = shots[k].camera.view[c], z = shots[k].camera.view[8 + c];
+                shots[k].camera.view[c] = (ssdgs_real)(cos(0.3) * (double)x + sin(0.3) * (double)z);
+                shots[k].camera.view[8 + c] = (ssdgs_real)(cos(0.3) * (double)z - sin(0.3) * (double)x);
+            }
+        }
+        memset(heard, 0, sizeof heard);
+        told = 0;
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
+        for (k = 0; k < cases[i].photographs; k++) {
+            left_out += trainer->transparent[k] == 1;
+            CHECK(trainer->transparent[k] == 2 || (k >= first && k < first + wrong));
+        }
+        if (!CHECK(left_out == cases[i].doubted && heard[WRONG] == (left_out > 0) && (!left_out || told == left_out)))
+            printf("    case %d: %d of %d\n", (int)i, left_out, cases[i].doubted);
+        CHECK((trainer->outlines == 0) == (heard[NO_POINT] > 0) && !heard[NO_POINT] == (i != 4 && i != 7));
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+    memset(heard, 0, sizeof heard);
+}
+
+/* Opaque photographs with borders of one colour that is not options.background are noted. */
+static void test_borders(void) {
+    static const struct { double border, noise, background; int noted; } cases[] = {
+        {1, 0, 0, 1}, {1, 0, 1, 0}, {0, 0, 0, 0}, {0.5, 0.1, 0, 1}, {0.5, 0.5, 0, 0}, {0.12, 0, 0, 1}, {0.08, 0, 0, 0}};
+    static unsigned char opaque[SIDE * SIDE * 4];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    ssdgs_context_desc desc;
+    size_t i;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    CHECK(!ssdgs_context_create(&desc, &context));
+    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ssdgs_photo shots[PHOTOS];
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        size_t k;
+        for (k = 0; k < sizeof opaque; k++) { /* what is within does not count */
+            const size_t x = k / 4 % SIDE, y = k / 4 / SIDE;
+            const int border = !x || !y || x == SIDE - 1 || y == SIDE - 1;
+            const double value = cases[i].border + cases[i].noise * (2 * ssdgs__uniform(5, k) - 1);
+            opaque[k] = (unsigned char)(k % 4 == 3 ? 255 : border ? 255 * value + 0.5 : k / 4 % 2 ? 255 : 0);
+        }
+        for (k = 0; k < PHOTOS; k++) {
+            shots[k] = photos[k];
+            shots[k].pixels = opaque;
+        }
+        for (k = 0; k < 3; k++) options.background[k] = (ssdgs_real)cases[i].background;
+        memset(heard, 0, sizeof heard);
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        if (!CHECK(heard[BORDER] == cases[i].noted && heard[NO_OUTLINES] == 1)) printf("    case %d\n", (int)i);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+    memset(heard, 0, sizeof heard);
+}
+
+/* A model has no loss against its own photograph, however far its light lies beyond what that can hold; a value of 254 is no limit. */
+static void test_clipped(void) {
+    static ssdgs_real image[SIDE * SIDE * 3];
+    static unsigned char bytes[SIDE * SIDE * 4];
+    static const int frozen[2] = {1, 1};
+    const ssdgs_real black[3] = {0, 0, 0};
+    int transfer, dim, i, c, full;
+    for (transfer = 0; transfer < 2; transfer++) {
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_photo photo = photos[0];
+        ssdgs__loss_values values;
+        ssdgs_frame frame;
+        ssdgs_real alpha[SIDE * SIDE], *g;
+        ssdgs_image out;
+        ssdgs_render_options exact = ssdgs_render_options_exact();
+        settings.transfer = transfer;
+        settings.terms = SSDGS_DIFFUSE_TERM;
+        CHECK(!ssdgs_context_create(NULL, &context));
+        if (!CHECK(!ssdgs_model_create(context, &settings, 40, &model))) exit(1);
+        g = ssdgs_model_get(model).gaussians;
+        for (i = 0; i < 40; i++) {
+            for (c = 0; c < 3; c++) {
+                g[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(3 * i + c)) - 0.4);
+                g[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = -2;
+            }
+            g[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 3;
+        }
+        memset(&out, 0, sizeof out);
+        out.color = image;
+        out.alpha = alpha;
+        CHECK(!ssdgs_render_ex(model, &photo.camera, &photo.light, 1, &exact, &out, NULL));
+        for (dim = 0; dim < 2; dim++) {
+            for (i = full = 0; i < SIDE * SIDE; i++) {
+                for (c = 0; c < 3; c++) {
+                    const double straight = (double)image[3 * i + c] / fmax((double)alpha[i], 1e-4);
+                    const double stored = transfer == SSDGS_TRANSFER_SRGB ? (double)ssdgs_srgb_encode((ssdgs_real)straight) : straight;
+                    bytes[4 * i + c] = (unsigned char)(stored < 1 ? 255 * stored + 0.5 : 255 - dim);
+                    full += stored > 1.2;
+                }
+                bytes[4 * i + 3] = (unsigned char)(255 * (double)alpha[i] + 0.5);
+            }
+            photo.pixels = bytes;
+            CHECK(!ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, black, SSDGS_DIFFUSE_TERM, frozen, (ssdgs_real)0.2, 0, &values));
+            CHECK(full > SIDE);
+            if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01)) printf("    transfer %d, %d: loss %g\n", transfer, dim, values.loss);
+        }
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
 /* Outlines are known where more than a fiftieth of the photographs, and more than one of eight or more, are transparent on a hundredth
    of the picture, but not on all of it. */
 static void test_outlines_known(void) {
@@ -1460,8 +1600,28 @@ static void test_outlines_known(void) {
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         CHECK(trainer->outlines == cases[i].known);
         for (k = 0; k < cases[i].photographs; k++) CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
+        { /* where an object fills less than 0.15 of the picture, screen gradients count for more */
+            const double shown = cases[i].clear < SIDE * SIDE ? SIDE * SIDE - cases[i].clear : SIDE * SIDE;
+            CHECK(fabs((double)trainer->magnify[0] - fmax(1, sqrt(0.15 * SIDE * SIDE / shown))) < 1e-5);
+        }
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
+    }
+    {
+        double sum[2] = {0, 0};
+        int pass, k;
+        for (pass = 0; pass < 2; pass++) {
+            ssdgs_model *model = NULL;
+            ssdgs_trainer *trainer = NULL;
+            CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+            if (!CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer))) exit(1);
+            for (k = 0; k < PHOTOS && pass; k++) trainer->magnify[k] = 3;
+            CHECK(!ssdgs_trainer_step(trainer, NULL));
+            for (k = 0; k < model->count; k++) sum[pass] += (double)trainer->screen_gradient[k];
+            ssdgs_trainer_destroy(trainer);
+            ssdgs_model_destroy(model);
+        }
+        CHECK(sum[0] > 0 && fabs(sum[1] / sum[0] - 3) < 1e-4);
     }
     ssdgs_context_destroy(context);
 }
@@ -1598,11 +1758,11 @@ static void test_half_shadow(void) {
         frame.visibility = &lit;
         splat[6] = (ssdgs_real)(i == 2 ? 0.9 : 11);
         if (i < 3) trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] = trainer->screen_count[0] = 0;
-        ssdgs__gather_statistics(trainer, &frame);
-        if (i == 3) ssdgs__gather_statistics(trainer, &frame);
+        ssdgs__gather_statistics(trainer, &frame, 1);
+        if (i == 3) ssdgs__gather_statistics(trainer, &frame, 2);
         CHECK(fabs((double)trainer->half_shadow[0] - (i == 0 ? 6.4 : i == 3 ? 12.8 : 0)) < 1e-5);
         CHECK(fabs((double)trainer->contribution[0] - (i == 2 ? 0.9 : i == 3 ? 22.9 : 11)) < 1e-5);
-        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 15 : 5)) < 1e-5 && trainer->screen_count[0] == (i == 3 ? 3 : 1));
+        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 20 : 5)) < 1e-5 && trainer->screen_count[0] == (i == 3 ? 3 : 1));
     }
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -1633,6 +1793,9 @@ int main(void) {
     test_prune_outside();
     test_nothing_in_view();
     test_outlines_known();
+    test_wrong_outlines();
+    test_borders();
+    test_clipped();
     test_doubts();
     test_softness();
     test_rearranged();
