@@ -438,7 +438,8 @@ typedef struct ssdgs_settings {
     int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
     int shadow_width;
     int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide */
+    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene, but of strays, at
+                                 most one in 200 Gaussians on each side, no more than fits thrice the others' box */
     ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
                                  layer of Gaussians that would shadow each other at random. 3 standard deviations of a
                                  surface's Gaussians, where a model made in code is coarser than trained ones */
@@ -7110,7 +7111,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     for (i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
         size_t clear = 0, veiled = 0, at;
-        double small;
+        double lack;
         for (at = 0; at < pixels; at++) {
             const int alpha = ssdgs__photo_alpha(photos + i, at);
             clear += !alpha;
@@ -7119,8 +7120,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
         /* the mean loss pulls at a screen's width as little as the object is small in it */
-        small = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
-        trainer->magnify[i] = (ssdgs_real)(small > 1 ? sqrt(small) : 1);
+        lack = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
+        trainer->magnify[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
         empty += clear == pixels;
     }
     result = ssdgs__doubt_outlines(trainer);
