@@ -438,8 +438,8 @@ typedef struct ssdgs_settings {
     int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
     int shadow_width;
     int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene, but of strays, at
-                                 most one in 200 Gaussians on each side, no more than fits thrice the others' box */
+    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene; of strays, at most
+                                 one Gaussian in 200 on each side, only those within three times the others' box */
     ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
                                  layer of Gaussians that would shadow each other at random. 3 standard deviations of a
                                  surface's Gaussians, where a model made in code is coarser than trained ones */
