@@ -599,9 +599,9 @@ static double weighted_conic(const double raw[7], const double weight[4], double
 /* Rotations' and log scales' gradients of thin Gaussians, 3 to 300 px long and 0.1 to 1 px thin, against central differences in double:
    what products of conics would lose. */
 static void test_needles(void) {
-    enum { MANY = 16, PLANES = SSDGS_CHANNELS * MANY };
+    enum { MANY = 16, VALUES = SSDGS_CHANNELS * MANY };
     static const double long_side[4] = {3, 30, 100, 300}, thin_side[2] = {0.1, 1};
-    ssdgs_real *gaussians = reals(PLANES), *gradient = reals(PLANES), *splat = reals(MANY * SSDGS__SPLAT), slot[12];
+    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT), slot[12];
     ssdgs__projection view;
     int compensated, i, j;
     for (compensated = 0; compensated < 2; compensated++) {
@@ -612,7 +612,7 @@ static void test_needles(void) {
         view.compensate = compensated;
         view.variance = (ssdgs_real)0.1;
         view.blur = SSDGS_BLUR_ADD;
-        memset(gradient, 0, PLANES * sizeof *gradient);
+        memset(gradient, 0, VALUES * sizeof *gradient);
         for (i = 0; i < MANY; i++) {
             for (j = 0; j < 4; j++) {
                 gaussians[(SSDGS_ROTATION + j) * MANY + i] = (ssdgs_real)(2 * ssdgs__uniform(1, (uint64_t)(4 * i + j)) - 1);
