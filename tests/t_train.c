@@ -1436,15 +1436,17 @@ static void test_prune_outside(void) {
 
 /* Of eight photographs or more those whose mask or pose contradicts the others' lose their outlines, and nothing else is doubted. */
 static void test_wrong_outlines(void) {
-    static const struct { int photographs, wrong, turned, doubted; } cases[] = {
-        {12, 0, 0, 0}, {12, 1, 0, 1}, {12, 1, 1, 1}, {8, 1, 0, 1}, {7, 1, 0, 0}, {24, 2, 0, 2}, {24, 2, 1, 2}, {24, 9, 0, 0}};
-    static unsigned char speck[SIDE * SIDE * 4];
+    static const struct { int photographs, opaque, wrong, turned, doubted; } cases[] = {
+        {12, 0, 0, 0, 0}, {12, 0, 1, 0, 1}, {12, 0, 1, 1, 1}, {8, 0, 1, 0, 1}, {7, 0, 1, 0, 0}, {24, 0, 2, 0, 2}, {24, 0, 2, 1, 2}, {24, 0, 9, 0, 0},
+        {24, 4, 2, 1, 2}}; /* the last ones are opaque */
+    static unsigned char speck[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
     size_t i;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
+    memset(opaque, 255, sizeof opaque);
     for (i = 0; i < SIDE * SIDE; i++) speck[4 * i + 3] = i % SIDE < SIDE / 6 && i / SIDE < SIDE / 6 ? 255 : 0;
     CHECK(!ssdgs_context_create(&desc, &context));
     for (i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -1455,6 +1457,7 @@ static void test_wrong_outlines(void) {
         int k, c, left_out = 0;
         for (k = 0; k < cases[i].photographs; k++) {
             shots[k] = photos[k % PHOTOS];
+            if (k >= cases[i].photographs - cases[i].opaque) shots[k].pixels = opaque;
             if (k < first || k >= first + wrong) continue;
             if (!cases[i].turned) shots[k].pixels = speck;
             for (c = 0; c < 4 && cases[i].turned; c++) { /* by 0.3 radians about y, half the angle of view */
@@ -1469,7 +1472,7 @@ static void test_wrong_outlines(void) {
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         for (k = 0; k < cases[i].photographs; k++) {
             left_out += trainer->transparent[k] == 1;
-            CHECK(trainer->transparent[k] == 2 || (k >= first && k < first + wrong));
+            CHECK(trainer->transparent[k] == (k >= cases[i].photographs - cases[i].opaque ? 0 : 2) || (k >= first && k < first + wrong));
         }
         if (!CHECK(left_out == cases[i].doubted && heard[WRONG] == (left_out > 0) && (!left_out || told == left_out)))
             printf("    case %d: %d of %d\n", (int)i, left_out, cases[i].doubted);
