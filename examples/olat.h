@@ -894,7 +894,7 @@ static const char *olat__json_string(olat__json *j, const char **text, size_t *l
         }
         j->at += n;
         n = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3; /* bytes after the first */
-        *out++ = (char)(unsigned char)(n ? (0xF00u >> n & 0xFF) | code >> 6 * n : code);
+        *out++ = (char)(unsigned char)(n ? (0xF80u >> n & 0xFF) | code >> 6 * n : code);
         while (n-- > 0) *out++ = (char)(unsigned char)(0x80 | (code >> 6 * n & 0x3F));
     }
     j->at++;
@@ -998,37 +998,17 @@ static const char *olat__json_values(olat__json *j) {
     }
 }
 
-static int olat__compare_keys(const void *a, const void *b) {
-    const olat__node *x = *(const olat__node *const *)a, *y = *(const olat__node *const *)b;
-    int order = x->key_length == y->key_length ? memcmp(x->key, y->key, x->key_length) : x->key_length < y->key_length ? -1 : 1;
-    return order ? order : x->index - y->index;
-}
-
-static void olat__json_duplicates(olat__json *j) {
-    const olat__node **keys = (const olat__node **)malloc((size_t)j->count * sizeof *keys);
-    int i, k, child;
-    if (!keys) olat__json_fail(j, j->nodes, "out of memory");
-    for (i = 0; i < j->count && !j->failed; i++) {
-        if (j->nodes[i].type != OLAT__OBJECT) continue;
-        for (k = 0, child = j->nodes[i].child; child; child = j->nodes[child].next) keys[k++] = &j->nodes[child];
-        qsort(keys, (size_t)k, sizeof *keys, olat__compare_keys);
-        for (k--; k > 0; k--) {
-            size_t length = keys[k]->key_length;
-            if (length != keys[k - 1]->key_length || memcmp(keys[k]->key, keys[k - 1]->key, length) != 0) continue;
-            olat__json_fail(j, keys[k], "the key appears twice");
-        }
-    }
-    free(keys);
-}
-
 /* Parses j->text .. j->end, NUL-terminated; j->failed tells. */
 static void olat__json_parse(olat__json *j) {
+    const unsigned char *text = (const unsigned char *)j->text;
     const char *problem;
     j->line = 1;
     j->at = j->text + (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
     olat__skip_space(j);
-    if ((problem = olat__json_values(j)) == NULL) olat__json_duplicates(j);
-    else if (!j->nodes) j->failed = olat__fail(j->error, "%s: %s", olat__tail(j->path), problem);
+    if (j->end - j->text > 1 && (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* its mark, or an ASCII letter */
+        problem = "the file is UTF-16: save it as UTF-8";
+    } else if ((problem = olat__json_values(j)) == NULL) return;
+    if (!j->nodes) j->failed = olat__fail(j->error, "%s: %s", olat__tail(j->path), problem);
     else {
         j->nodes[j->where].line = j->line;
         olat__json_fail(j, &j->nodes[j->where], "%s", problem);
@@ -1037,11 +1017,16 @@ static void olat__json_parse(olat__json *j) {
 
 /* ==== the dataset: after a failure readers return 0 and go on, since only the first one is reported ==== */
 
+/* The member `key`: the last one where there are several, as for Python's json. */
 static const olat__node *olat__find(const olat__json *j, const olat__node *object, const char *key) {
+    const olat__node *found = NULL, *node;
     size_t length = strlen(key);
-    int i = object->child;
-    while (i && (j->nodes[i].key_length != length || memcmp(j->nodes[i].key, key, length) != 0)) i = j->nodes[i].next;
-    return i ? &j->nodes[i] : NULL;
+    int i;
+    for (i = object->child; i; i = node->next) {
+        node = &j->nodes[i];
+        if (node->key_length == length && !memcmp(node->key, key, length)) found = node;
+    }
+    return found;
 }
 
 /* Reads an array of count numbers; a single one may stand without brackets. Their limit keeps float arithmetic finite. */
@@ -1336,13 +1321,26 @@ static void olat__write(olat__writer *w, const char *text) {
     w->size += size;
 }
 
-/* The numbers, with a point in every locale, between two texts. */
-static void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count, const char *after) {
+/* A JSON string, with its quotes. */
+OLAT__API void olat__write_string(olat__writer *w, const char *text) {
+    char escape[8];
+    olat__write(w, "\"");
+    for (; *text; text++) {
+        if ((unsigned char)*text < 32) snprintf(escape, sizeof escape, "\\u%04x", (unsigned)*text);
+        else snprintf(escape, sizeof escape, "%s%c", *text == '"' || *text == '\\' ? "\\" : "", *text);
+        olat__write(w, escape);
+    }
+    olat__write(w, "\"");
+}
+
+/* The numbers, with so many digits and a point in every locale, between two texts. */
+static void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count, int digits,
+                                const char *after) {
     char text[64];
     int i, k;
     olat__write(w, before);
     for (i = 0; i < count; i++) {
-        snprintf(text, sizeof text, "%s%.9g", i ? ", " : "", v[i]);
+        snprintf(text, sizeof text, "%s%.*g", i ? ", " : "", digits, v[i]);
         for (k = i ? 2 : 0; text[k]; k++) {
             if (!strchr("+-.0123456789einfa", text[k])) text[k] = '.';
         }
@@ -1358,33 +1356,28 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const ch
     double v[4];
     int k, m;
     if (frame->file && !strncmp(frame->file, folder, used) && (!used || frame->file[used] == '/')) {
-        const char *c = frame->file + used + (used > 0);
-        char text[3] = "";
-        olat__write(w, "\"file_path\": \"");
-        for (; *c; c++) {
-            snprintf(text, sizeof text, "%s%c", *c == '"' || *c == '\\' ? "\\" : "", *c);
-            olat__write(w, text);
-        }
-        olat__write(w, "\", ");
+        olat__write(w, "\"file_path\": ");
+        olat__write_string(w, frame->file + used + (used > 0));
+        olat__write(w, ", ");
     }
     v[0] = camera->width, v[1] = camera->height;
-    olat__write_numbers(w, "\"w\": ", v, 1, ", ");
-    olat__write_numbers(w, "\"h\": ", v + 1, 1, ",\n  ");
+    olat__write_numbers(w, "\"w\": ", v, 1, 9, ", ");
+    olat__write_numbers(w, "\"h\": ", v + 1, 1, 9, ",\n  ");
     v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx, v[3] = (double)camera->fy;
-    olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, "],\n  \"transform_matrix\": [");
+    olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, 9, "],\n  \"transform_matrix\": [");
     for (k = 0; k < 3; k++) { /* camera to world, y up and z backward */
         for (m = 0, v[3] = 0; m < 3; m++) {
             v[m] = (double)camera->view[4 * m + k];
             v[3] -= v[m] * (double)camera->view[4 * m + 3];
             if (m) v[m] = -v[m];
         }
-        olat__write_numbers(w, "[", v, 4, "], ");
+        olat__write_numbers(w, "[", v, 4, 9, "], ");
     }
-    olat__write_numbers(w, "[", last_row, 4, "]],\n  ");
+    olat__write_numbers(w, "[", last_row, 4, 9, "]],\n  ");
     for (k = 0; k < 3; k++) v[k] = (double)frame->light.position[k];
-    olat__write_numbers(w, frame->light.kind == SSDGS_LIGHT_POINT ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, "], ");
+    olat__write_numbers(w, frame->light.kind == SSDGS_LIGHT_POINT ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, 9, "], ");
     for (k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
-    olat__write_numbers(w, "\"pl_intensity\": [", v, 3, "]}");
+    olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]}");
 }
 
 /* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined poses, say. */

@@ -576,6 +576,113 @@ static void fuzz_json(const unsigned char *data, size_t size) {
     free(j.text);
 }
 
+/* A string's value by RFC 8259 and 3629, of one to its end at `end`; -1 where it is none. */
+static long string_value(const unsigned char *p, const unsigned char *end, unsigned char *out) {
+    static const char escapes[] = "\"\"\\\\//b\bf\fn\nr\rt\t";
+    long length = 0, code, unit;
+    int i, more, halves;
+    for (p++; p < end && *p != '"';) {
+        if (*p < 32) return -1;
+        if (*p >= 128) { /* the shortest form, no surrogates, nothing beyond U+10FFFF */
+            more = *p >= 240 ? 3 : *p >= 224 ? 2 : 1;
+            code = *p++ - (more == 3 ? 240 : more == 2 ? 224 : 192);
+            for (i = 0; i < more; i++, p++) {
+                if (p >= end || *p < 128 || *p > 191) return -1;
+                code = 64 * code + (*p - 128);
+            }
+            if (code < (more == 3 ? 0x10000 : more == 2 ? 0x800 : 0x80)) return -1;
+        } else if (*p != '\\') code = *p++;
+        else if (end - p < 2) return -1;
+        else if (p[1] != 'u') {
+            for (i = 0; escapes[i] && escapes[i] != p[1]; i += 2) {}
+            if (!escapes[i]) return -1;
+            code = escapes[i + 1];
+            p += 2;
+        } else {
+            for (code = 0, halves = 0; halves < 2; halves++) {
+                if (end - p < 6 || p[0] != '\\' || p[1] != 'u') return -1;
+                for (unit = 0, i = 2; i < 6; i++) {
+                    static const char digits[] = "0123456789abcdef0123456789ABCDEF";
+                    const char *digit = p[i] ? strchr(digits, p[i]) : NULL;
+                    if (!digit) return -1;
+                    unit = 16 * unit + (digit - digits) % 16;
+                }
+                p += 6;
+                if (halves && (unit < 0xDC00 || unit > 0xDFFF)) return -1;
+                code = halves ? 0x10000 + 0x400 * (code - 0xD800) + unit - 0xDC00 : unit;
+                if (!halves && (unit < 0xD800 || unit > 0xDBFF)) break;
+            }
+        }
+        if (code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return -1;
+        if (code < 0x80) out[length++] = (unsigned char)code;
+        else {
+            more = code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+            out[length++] = (unsigned char)((more == 1 ? 192 : more == 2 ? 224 : 240) + (code >> 6 * more));
+            while (more-- > 0) out[length++] = (unsigned char)(128 + (code >> 6 * more) % 64);
+        }
+    }
+    return p + 1 == end ? length : -1;
+}
+
+/* Parses the text, whose value is so many bytes, -1: none; then what the value is written as. */
+static void parse_string(const char *text, size_t size, const unsigned char *want, long length) {
+    char error[512] = "", path[] = "fuzz.json";
+    olat__writer w;
+    olat__json j;
+    memset(&j, 0, sizeof j);
+    j.text = (char *)malloc(size + 1);
+    HOLDS(j.text);
+    memcpy(j.text, text, size);
+    j.text[size] = 0;
+    j.path = path;
+    j.error = error;
+    j.end = j.text + size;
+    olat__json_parse(&j);
+    HOLDS(j.failed == (length < 0));
+    if (length >= 0) {
+        const olat__node *value = j.nodes;
+        long i, n;
+        HOLDS(value->type == OLAT__STRING && value->text_length == (size_t)length && !memcmp(value->text, want, (size_t)length));
+        for (i = 0; i < length; i += n) HOLDS((n = olat__utf8_length(value->text + i)) > 0);
+        if (strlen(value->text) == (size_t)length) {
+            w.size = 0;
+            w.room = 1;
+            w.text = (char *)malloc(1);
+            olat__write_string(&w, value->text);
+            HOLDS(w.text);
+            if (w.size != size || memcmp(w.text, text, size)) parse_string(w.text, w.size, want, length);
+            free(w.text);
+        }
+    }
+    free(j.nodes);
+    free(j.text);
+}
+
+/* The bytes between quotes as they are; then as code points, 3 bytes each, written raw or as escapes. */
+static void fuzz_json_string(const unsigned char *data, size_t size) {
+    char *text = (char *)malloc(4 * size + 40);
+    unsigned char *want = (unsigned char *)malloc(4 * size + 40);
+    size_t used = 1, at;
+    HOLDS(text && want);
+    text[0] = '"';
+    if (size) memcpy(text + 1, data, size);
+    text[1 + size] = '"';
+    parse_string(text, size + 2, want, string_value((unsigned char *)text, (unsigned char *)text + size + 2, want));
+    for (at = 0; at + 3 <= size; at += 3) {
+        const unsigned bits = (unsigned)data[at] << 16 | (unsigned)data[at + 1] << 8 | data[at + 2], code = bits & 0x1FFFFF;
+        if (!(bits >> 22) && code < 0x80 && code > 31 && code != '"' && code != '\\') text[used++] = (char)code;
+        else if (!(bits >> 22) && code >= 0x80 && code < 0x800) { /* raw, whatever it is */
+            text[used++] = (char)(unsigned char)(192 + code / 64);
+            text[used++] = (char)(unsigned char)(128 + code % 64);
+        } else if (code < 0x10000) used += (size_t)sprintf(text + used, bits >> 23 ? "\\u%04X" : "\\u%04x", code);
+        else used += (size_t)sprintf(text + used, "\\u%04x\\u%04X", 0xD7C0 + code / 1024 % 0x440, 0xDC00 + code % 1024);
+    }
+    text[used++] = '"';
+    parse_string(text, used, want, string_value((unsigned char *)text, (unsigned char *)text + used, want));
+    free(text);
+    free(want);
+}
+
 /* JSON, then, after a NUL, the image it may call fuzz_image.png. What is accepted can be trained on. */
 static void fuzz_dataset(const unsigned char *data, size_t size) {
     const unsigned char *nul = (const unsigned char *)(size ? memchr(data, 0, size) : NULL);
@@ -611,8 +718,8 @@ typedef struct target {
     void (*run)(const unsigned char *data, size_t size);
 } target;
 static const target targets[] = {{"png", fuzz_png}, {"unfilter", fuzz_unfilter}, {"inflate", fuzz_inflate}, {"json", fuzz_json},
-                                 {"dataset", fuzz_dataset}, {"ply", fuzz_ply}, {"checkpoint", fuzz_checkpoint},
-                                 {"render", fuzz_render}, {"train", fuzz_train}};
+                                 {"json_string", fuzz_json_string}, {"dataset", fuzz_dataset}, {"ply", fuzz_ply},
+                                 {"checkpoint", fuzz_checkpoint}, {"render", fuzz_render}, {"train", fuzz_train}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
