@@ -777,7 +777,7 @@ typedef struct olat__json {
 /* Records the first failure: file, line, keys from the root to the node, message. Returns 0, which callers pass on. */
 OLAT__PRINTF(3, 4) static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
     const olat__node *chain[OLAT__MAX_DEPTH + 1], *n;
-    char keys[160] = "", what[160];
+    char keys[160] = "", what[240];
     size_t used = 0;
     int depth = 0;
     va_list list;
@@ -1053,7 +1053,7 @@ static int olat__get(olat__json *j, const olat__node *object, const char *key, i
 static double olat__dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent. The axes must be
-   a rotation times a scale, and become exactly a rotation: rounded files then cannot shear the image. */
+   a rotation times a scale, up to three decimals, and become exactly a rotation: rounding then cannot shear the image. */
 static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale, double axes[3][3],
                           double origin[3]) {
     const olat__node *node = olat__find(j, object, key), *row;
@@ -1074,7 +1074,7 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
     }
     if (any_scale) scale2 = (olat__dot(axes[0], axes[0]) + olat__dot(axes[1], axes[1]) + olat__dot(axes[2], axes[2])) / 3;
     for (i = 0; i < 9; i++) {
-        if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 1e-3) continue;
+        if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 5e-3) continue;
         return olat__json_fail(j, node, "the 3 x 3 part is not a rotation%s", any_scale ? " times a scale" : "");
     }
     z_length = sqrt(olat__dot(axes[2], axes[2]));
@@ -1090,62 +1090,91 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
 }
 
 typedef struct olat__lens {
-    double angle, fx, fy, cx, cy; /* 0 = not given; an angle replaces focal lengths */
+    double focal[4], centre[2]; /* focal lengths of x and y, then angles of view; 0 = not given */
     int w, h, has_centre;
 } olat__lens;
 
+/* Is there anything in it but 0, false, null and empty texts? */
+static int olat__nonzero(const olat__json *j, const olat__node *node) {
+    int i, found = node->type == OLAT__NUMBER ? fabs(node->number) > 0 : node->type == OLAT__TRUE || node->text_length > 0;
+    for (i = node->child; i && !found; i = j->nodes[i].next) found = olat__nonzero(j, &j->nodes[i]);
+    return found;
+}
+
+/* Refuses a lens that is no pinhole's by its model's name, and by any coefficient that is not 0. */
+static void olat__check_lens(olat__json *j, const olat__node *object) {
+    static const char *const models[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "full_opencv", "simple_radial",
+                                         "radial"};
+    static const char *const keys[] = {
+        "camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "p1", "p2", "p3", "p4", "p5", "p6",
+        "p7", "p8", "p9", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1",
+        "ftheta_p2", "ftheta_p3", "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
+    size_t i, m;
+    for (i = 0; i < sizeof keys / sizeof *keys; i++) {
+        const olat__node *node = olat__find(j, object, keys[i]);
+        const char *value;
+        int fine = !node || !olat__nonzero(j, node);
+        for (m = 0; !fine && i == 0 && node->type == OLAT__STRING && m < sizeof models / sizeof *models; m++)
+            fine = node->text_length == strlen(models[m]) && olat__same_letters(node->text, models[m], node->text_length);
+        if (fine) continue;
+        value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
+        olat__json_fail(j, node, "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
+            " image_undistorter or Metashape's Export > Undistort, say", value, value[0] ? ": " : "");
+    }
+}
+
 /* Reads what the object says about the lens over what is there already. */
 static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens *lens) {
-    static const char *const distortion[] = {"k1", "k2", "k3", "k4", "p1", "p2"};
-    double v[4];
-    int i, has_cx, has_cy;
-    for (i = 0; i < 6; i++) {
-        if (olat__get(j, object, distortion[i], 1, v) && fabs(v[0]) > 0) {
-            olat__json_fail(j, object, "%s: distorted lenses are not supported, undistort the images first", distortion[i]);
-        }
-    }
+    static const char *const focal[4] = {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"};
+    double v[4] = {0, 0, 0, 0};
+    int i, given = 0, has_cx, has_cy;
+    olat__check_lens(j, object);
     for (i = 0; i < 2; i++) {
         const char *key = i ? "h" : "w";
-        if (!olat__get(j, object, key, 1, v)) continue;
-        if (!(v[0] >= 1 && v[0] <= 32768 && floor(v[0]) >= v[0])) olat__json_fail(j, object, "%s is not 1 to 32768", key);
-        else if (i) lens->h = (int)v[0];
-        else lens->w = (int)v[0];
+        double side;
+        if (!olat__get(j, object, key, 1, &side)) continue;
+        if (!(side >= 1 && side <= 32768 && floor(side) >= side)) olat__json_fail(j, object, "%s is not 1 to 32768", key);
+        else if (i) lens->h = (int)side;
+        else lens->w = (int)side;
     }
-    if (olat__get(j, object, "camera_angle_x", 1, &lens->angle)) {
-        if (!(lens->angle > 1e-4 && lens->angle < 3.14)) olat__json_fail(j, object, "camera_angle_x is not between 0 and pi");
-        lens->fx = lens->fy = 0;
+    for (i = 0; i < 4; i++) {
+        if (!olat__get(j, object, focal[i], 1, &v[i])) continue;
+        given = 1;
+        if (i < 2 && !(v[i] > 0)) olat__json_fail(j, object, "%s is not positive", focal[i]);
+        if (i > 1 && !(v[i] > 1e-4 && v[i] < 3.14)) olat__json_fail(j, object, "%s is not between 0 and pi", focal[i]);
     }
-    if (olat__get(j, object, "fl_x", 1, &lens->fx)) lens->fy = lens->fx;
-    olat__get(j, object, "fl_y", 1, &lens->fy);
-    has_cx = olat__get(j, object, "cx", 1, &lens->cx);
-    has_cy = olat__get(j, object, "cy", 1, &lens->cy);
+    if (given) memcpy(lens->focal, v, sizeof v); /* a frame's camera is another one than the top's */
+    has_cx = olat__get(j, object, "cx", 1, &lens->centre[0]);
+    has_cy = olat__get(j, object, "cy", 1, &lens->centre[1]);
     if (has_cx != has_cy) olat__json_fail(j, object, "cx and cy come in pairs");
     if (olat__get(j, object, "camera_intrinsics", 4, v)) {
-        lens->cx = v[0], lens->cy = v[1], lens->fx = v[2], lens->fy = v[3];
+        if (!(v[2] > 0 && v[3] > 0)) olat__json_fail(j, object, "camera_intrinsics: focal lengths must be positive");
+        memcpy(lens->centre, v, 2 * sizeof *v);
+        memcpy(lens->focal, v + 2, 2 * sizeof *v);
         has_cx = 1;
     }
     lens->has_centre |= has_cx;
-    if (lens->fx < 0 || lens->fy < 0 || (lens->fx > 0) != (lens->fy > 0)) {
-        olat__json_fail(j, object, "focal lengths must be positive");
-    }
 }
 
 /* Fills the camera, whose size is known, from the lens and the frame's pose. */
 static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens, ssdgs_camera *camera) {
     const double w = camera->width, h = camera->height;
-    double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, origin[3] = {0, 0, 0}, t[3], focal;
+    double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, origin[3] = {0, 0, 0}, t[3], focal[2];
     int refined = olat__find(j, node, "R_opt") != NULL, i, k;
-    int in_pixels = lens->fx > 0 || lens->has_centre;
+    int in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
     if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
                   : lens->w && lens->h && fabs(w * lens->h - h * lens->w) > (w > h ? w : h)) { /* an angle allows another size alone */
         olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
     }
-    if (!(lens->fx > 0 || lens->angle > 0)) olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
-    focal = lens->fx > 0 ? lens->fx : lens->angle > 0 ? 0.5 * w / tan(0.5 * lens->angle) : 0;
-    camera->fx = (ssdgs_real)focal;
-    camera->fy = (ssdgs_real)(lens->fx > 0 ? lens->fy : focal);
-    camera->cx = (ssdgs_real)(lens->has_centre ? lens->cx : 0.5 * w);
-    camera->cy = (ssdgs_real)(lens->has_centre ? lens->cy : 0.5 * h);
+    for (i = 0; i < 2; i++) {
+        const double angle = lens->focal[2 + i];
+        focal[i] = lens->focal[i] > 0 ? lens->focal[i] : angle > 0 ? 0.5 * (i ? h : w) / tan(0.5 * angle) : 0;
+    }
+    if (!(focal[0] + focal[1] > 0)) olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
+    camera->fx = (ssdgs_real)(focal[0] > 0 ? focal[0] : focal[1]); /* else pixels are square */
+    camera->fy = (ssdgs_real)(focal[1] > 0 ? focal[1] : focal[0]);
+    camera->cx = (ssdgs_real)(lens->has_centre ? lens->centre[0] : 0.5 * w);
+    camera->cy = (ssdgs_real)(lens->has_centre ? lens->centre[1] : 0.5 * h);
     if (refined) {
         olat__get_pose(j, node, "R_opt", 0, axes, origin);
         if (!olat__get(j, node, "T_opt", 3, t)) olat__json_fail(j, node, "T_opt is missing");
@@ -1165,7 +1194,7 @@ static void olat__read_light(olat__json *j, const olat__node *node, ssdgs_light 
     int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v), i;
     if (is_point == is_far) olat__json_fail(j, node, is_far ? "both pl_pos and pl_dir" : "pl_pos or pl_dir is missing");
     if (is_far) length = sqrt(olat__dot(v, v));
-    if (!(fabs(length - 1) < 1e-3)) olat__json_fail(j, node, "pl_dir is not a unit vector");
+    if (!(fabs(length - 1) < 1e-2)) olat__json_fail(j, node, "pl_dir is not a unit vector");
     if (intensity && intensity->type == OLAT__ARRAY && intensity->size != 1) olat__numbers(j, intensity, 3, rgb);
     else if (intensity && olat__numbers(j, intensity, 1, rgb)) rgb[1] = rgb[2] = rgb[0];
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
@@ -1261,8 +1290,8 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, olat
         olat__read_lens(j, node, &lens);
         olat__read_light(j, node, &frame->light);
         olat__read_path(j, node, folder, flags, &frame->file);
-        camera->width = lens.w ? lens.w : olat__side(lens.cx);
-        camera->height = lens.h ? lens.h : olat__side(lens.cy);
+        camera->width = lens.w ? lens.w : olat__side(lens.centre[0]);
+        camera->height = lens.h ? lens.h : olat__side(lens.centre[1]);
         if (!(flags & OLAT_NO_IMAGES) && !j->failed) {
             j->failed = olat_read_png(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, j->error);
             frame->has_image = 1;

@@ -829,7 +829,11 @@ static void test_datasets(void) {
         {"{\"camera_angle_x\":\"1\",\"frames\":[" FRAME "]}", "camera_angle_x: a number"},
         {"{\"camera_intrinsics\":[1,2,3],\"frames\":[" FRAME "]}", "4 numbers"},
         {"{\"camera_intrinsics\":[1,2,-3,3],\"frames\":[" FRAME "]}", "positive"},
-        {"{\"fl_y\":3,\"frames\":[" FRAME "]}", "positive"}, {"{\"fl_x\":3,\"cx\":1,\"frames\":[" FRAME "]}", "cx and cy"},
+        {"{\"fl_y\":-3,\"frames\":[" FRAME "]}", "fl_y is not positive"},
+        {"{\"fl_x\":0,\"frames\":[" FRAME "]}", "fl_x is not positive"},
+        {"{\"camera_angle_y\":3.15,\"frames\":[" FRAME "]}", "camera_angle_y is not between"},
+        {"{\"camera_angle_x\":null,\"frames\":[" FRAME "]}", "camera_angle_x: a number"},
+        {"{\"fl_x\":3,\"cx\":1,\"frames\":[" FRAME "]}", "cx and cy"},
         {"{\"fl_x\":3,\"w\":7,\"frames\":[" FRAME "]}", "6 x 4 pixels"}, {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
         {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
     unsigned char pixels[6 * 4 * 3];
@@ -899,6 +903,121 @@ static void test_datasets(void) {
     }
     CHECK(olat_load(FOLDER, "none.json", 0, &set, error) && strstr(error, "none.json") && live == 0);
     CHECK(olat_load(FOLDER, "b", 0, &set, error) && strstr(error, "regular") && live == 0);
+}
+
+/* The first frame's focal lengths, and whether they are these. */
+static int lens_is(const char *top, const char *frame, double fx, double fy) {
+    const double want[2] = {fx, fy};
+    char text[1200];
+    int good;
+    snprintf(text, sizeof text, "{%s\"w\":60,\"h\":40,\"frames\":[{%s" LIGHT POSE "}]}", top, frame);
+    good = loads(text, OLAT_NO_IMAGES) && near_all(&set.frames->camera.fx, want, 2);
+    if (!good) printf("%s %s: %g %g\n", top, frame, set.count ? (double)set.frames->camera.fx : 0,
+                      set.count ? (double)set.frames->camera.fy : 0);
+    olat_free(&set);
+    return good;
+}
+
+static int lens_fails(const char *key, const char *value, const char *message) {
+    char text[1200], wanted[200];
+    int good;
+    snprintf(wanted, sizeof wanted, "frames[0].%s: %s", key, message);
+    snprintf(text, sizeof text, TOP "{" LIGHT POSE ",\"%s\":%s}]}", key, value);
+    good = load_fails(text, OLAT_NO_IMAGES, wanted);
+    snprintf(text, sizeof text, "{\"%s\":%s,\"camera_angle_x\":1,\"frames\":[{" LIGHT POSE "}]}", key, value);
+    return good & load_fails(text, OLAT_NO_IMAGES, strchr(wanted, '.') + 1);
+}
+
+static int lens_loads(const char *key, const char *value) {
+    char text[1200];
+    int good;
+    snprintf(text, sizeof text, TOP "{" LIGHT POSE ",\"%s\":%s}]}", key, value);
+    good = loads(text, OLAT_NO_IMAGES);
+    olat_free(&set);
+    return good;
+}
+
+static void test_lenses(void) {
+    static const char *const models[][2] = { /* 1: a pinhole's, when no coefficient says otherwise */
+        {"\"PINHOLE\"", "1"}, {"\"pinhole\"", "1"}, {"\"Simple_Pinhole\"", "1"}, {"\"perspective\"", "1"}, {"\"OPENCV\"", "1"},
+        {"\"FULL_OPENCV\"", "1"}, {"\"SIMPLE_RADIAL\"", "1"}, {"\"RADIAL\"", "1"}, {"null", "1"}, {"\"\"", "1"},
+        {"\"OPENCV_FISHEYE\"", "OPENCV_FISHEYE: distorted"}, {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: distorted"},
+        {"\"equirectangular\"", "equirectangular: distorted"}, {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
+        {"\"SPHERICAL\"", "SPHERICAL: distorted"}, {"\"pinhol\"", "pinhol: distorted"}, {"\"pinholes\"", "pinholes: distorted"},
+        {"7", "distorted"}, {"true", "true: distorted"}, {"{\"type\":\"a\"}", "distorted"}};
+    static const char *const values[][2] = {
+        {"0", "1"}, {"-0.0", "1"}, {"null", "1"}, {"false", "1"}, {"[]", "1"}, {"[0,0.0,[false,null]]", "1"}, {"{\"a\":0}", "1"},
+        {"1e-9", "distorted"}, {"-0.1", "distorted"}, {"true", "true: distorted"}, {"[0,0,0,1e-300]", "distorted"},
+        {"{\"a\":[0,-1]}", "distorted"}, {"\"0.1\"", "0.1: distorted"}};
+    static const char *const others[] = {"is_fisheye", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1", "ftheta_p2", "ftheta_p3",
+        "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
+    const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
+    char key[8];
+    size_t i, k;
+    CHECK(lens_is("\"camera_angle_x\":1,", "", of_x, of_x) && lens_is("\"camera_angle_y\":0.8,", "", of_y, of_y));
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "", of_x, of_y));
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, of_y));
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_y\":50,", "", of_x, 50));
+    CHECK(lens_is("\"fl_y\":51,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, 51) && lens_is("\"fl_x\":50,", "", 50, 50));
+    CHECK(lens_is("\"fl_y\":51,", "", 51, 51) && lens_is("\"camera_angle_x\":1,\"fl_y\":51,", "", of_x, 51));
+    CHECK(lens_is("\"fl_x\":50,\"fl_y\":51,", "\"camera_angle_x\":1,", of_x, of_x));
+    CHECK(lens_is("\"fl_x\":50,", "\"camera_angle_y\":0.8,", of_y, of_y));
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"fl_x\":50,\"fl_y\":51,", 50, 51));
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"camera_intrinsics\":[1,2,50,51],", 50, 51));
+    CHECK(lens_is("\"camera_intrinsics\":[1,2,50,51],", "\"camera_angle_x\":1,\"camera_angle_y\":0.8,", of_x, of_y));
+    CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"frames\":[" FRAME "]}", 0) && set.count == 1 &&
+          fabs((double)set.frames->camera.fx - 3 / tan(0.5)) < 1e-5 && fabs((double)set.frames->camera.fy - 2 / tan(0.4)) < 1e-5);
+    olat_free(&set);
+    for (i = 0; i < sizeof models / sizeof *models; i++)
+        CHECK(*models[i][1] == '1' ? lens_loads("camera_model", models[i][0])
+                                   : lens_fails("camera_model", models[i][0], models[i][1]));
+    for (k = 0; k < 27 + sizeof others / sizeof *others; k++) {
+        snprintf(key, sizeof key, "%c%d", "kps"[k / 9 % 3], (int)(k % 9) + 1);
+        for (i = 0; i < sizeof values / sizeof *values; i++)
+            CHECK(*values[i][1] == '1' ? lens_loads(k < 27 ? key : others[k - 27], values[i][0])
+                                       : lens_fails(k < 27 ? key : others[k - 27], values[i][0], values[i][1]));
+    }
+    CHECK(lens_fails("k1", "1", "distorted lenses are not supported: undistort the images first, with COLMAP's"
+                     " image_undistorter or Metashape's Export > Undistort, say"));
+    CHECK(lens_loads("k10", "1") && lens_loads("k0", "1")); /* not of any model's */
+    CHECK(live == 0);
+}
+
+/* Axes rounded to three decimals become a rotation; a light's direction of two decimals a unit vector. */
+static void test_rounding(void) {
+    double axes[9], worst = 0;
+    char text[1200];
+    int turn, i, k, m;
+    for (turn = 0; turn < 200; turn++) {
+        double q[4], length = 0, dot;
+        for (i = 0; i < 4; i++) q[i] = random_bits() / 8388608.0 - 1, length += q[i] * q[i];
+        for (i = 0; i < 4; i++) q[i] /= sqrt(length);
+        for (i = 0; i < 9; i++) {
+            const int r = i / 3, c = i % 3, o = 3 - r - c; /* o: the axis that is neither */
+            axes[i] = r == c ? 1 - 2 * (q[1 + (r + 1) % 3] * q[1 + (r + 1) % 3] + q[1 + (r + 2) % 3] * q[1 + (r + 2) % 3])
+                             : 2 * (q[1 + r] * q[1 + c] + ((c + 1) % 3 == r ? 1 : -1) * q[0] * q[1 + o]);
+            axes[i] = floor(axes[i] * 1000 + 0.5) / 1000;
+        }
+        snprintf(text, sizeof text, TOP "{\"pl_dir\":[0.267,-0.535,0.802],\"transform_matrix\":[[%.3f,%.3f,%.3f,0],"
+                 "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}", axes[0], axes[1], axes[2], axes[3], axes[4], axes[5], axes[6],
+                 axes[7], axes[8]);
+        if (!CHECK(loads(text, OLAT_NO_IMAGES))) continue;
+        for (i = 0; i < 3; i++)
+            for (k = 0; k < 3; k++) {
+                const ssdgs_real *view = set.frames->camera.view;
+                for (m = 0, dot = i == k ? -1 : 0; m < 3; m++) dot += (double)(view[4 * i + m] * view[4 * k + m]);
+                if (fabs(dot) > worst) worst = fabs(dot);
+                if (fabs((double)view[4 * i + k] * (i ? -1 : 1) - axes[3 * k + i]) > 2e-3) worst = 1;
+            }
+        olat_free(&set);
+    }
+    CHECK(worst < 1e-6);
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
+    CHECK(loads(TOP "{\"pl_dir\":[0,0.6,0.792]," POSE "}]}", OLAT_NO_IMAGES));
+    CHECK(set.count == 1 && fabs((double)set.frames->light.position[2] - 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
+    olat_free(&set);
+    CHECK(load_fails(TOP "{\"pl_dir\":[0,0,1.011]," POSE "}]}", OLAT_NO_IMAGES, "unit vector") && live == 0);
 }
 
 /* What is saved loads again: the same up to the rounding of the origin. */
@@ -1035,7 +1154,7 @@ int main(void) {
     test_writer();
     TEST_ROW("76", "JSON good and bad", (test_json(), test_strings(), test_write_string()));
     TEST_ROW("77", "numbers, correctly rounded", test_numbers());
-    TEST_ROW("78,79", "datasets and paths, good and bad", test_datasets());
+    TEST_ROW("78,79", "datasets and paths, good and bad", (test_datasets(), test_lenses(), test_rounding()));
     test_saving();
     TEST_ROW("83", "allocations that fail", test_memory());
     test_views();
