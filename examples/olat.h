@@ -7,9 +7,12 @@
    if (olat_load("scene", "transforms_train.json", 0, &set, error)) { puts(error); return 1; }
    ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
 
-   KEYS      camera_angle_x, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or in a frame;
-             frames[]: file_path (+ file_ext) or img_path; transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt;
-             pl_pos or pl_dir; pl_intensity. A frame's own key wins over the top's. Distorted lenses are refused.
+   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or in a
+             frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep); transform_matrix (camera to world,
+             OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's own key wins over the top's, one that
+             tells a focal length over all of them. Distorted lenses are refused.
+   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are not sRGB become
+             so, masks become alpha; the notes say what was done.
    ERRORS    Functions return 0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept.
    HOSTILE   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its links).
    SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
@@ -53,7 +56,7 @@ enum { /* flags of olat_load */
 typedef struct olat_frame {
     ssdgs_camera camera;
     ssdgs_light light;
-    char *file;          /* folder/path of the image; NULL if the frame names none */
+    char *file, *mask;   /* folder/path of the image and its mask; NULL if the frame names none */
     void *pixels;        /* (h,w,4) straight alpha, tightly packed; NULL without image */
     ssdgs_pixels format;
     int has_image;
@@ -62,6 +65,8 @@ typedef struct olat_frame {
 typedef struct olat_dataset {
     olat_frame *frames;
     int count;
+    double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far away */
+    char notes[512];  /* what was done or may be wrong: a line each, without a newline at the end; "" if there is nothing */
 } olat_dataset;
 
 enum {
@@ -439,7 +444,8 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 /* ==== PNG ==== */
 
 enum {
-    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44, OLAT__TRNS = 0x74524E53
+    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44, OLAT__TRNS = 0x74524E53,
+    OLAT__GAMA = 0x67414D41, OLAT__SRGB = 0x73524742, OLAT__ICCP = 0x69434350, OLAT__CICP = 0x63494350
 };
 static const unsigned char olat__signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
 
@@ -448,7 +454,8 @@ static const unsigned char olat__passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0,
                                                  {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}, {0, 0, 1, 1}};
 
 typedef struct olat__png {
-    int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key;
+    int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key, curve;
+    uint32_t gamma; /* samples are light to the power of gamma / 100000; 0: like sRGB. By the highest chunk, see `curve` */
     unsigned key[3]; /* the transparent colour */
     unsigned char palette[256][4];
     unsigned char *packed, *raw, *out;
@@ -515,21 +522,56 @@ static const char *olat__png_transparency(olat__png *png, const unsigned char *d
     return NULL;
 }
 
+/* What the file is where it is no PNG, by its first bytes. */
+static const char *olat__png_foreign(const unsigned char *bytes, size_t size) {
+#define OLAT__FOREIGN(kind) "this is " kind " file, not a PNG file: convert it to PNG"
+    static const struct { size_t at, length; const char *bytes, *problem; } kinds[] = {
+        {0, 3, "\xFF\xD8\xFF", OLAT__FOREIGN("a JPEG")}, {8, 4, "WEBP", OLAT__FOREIGN("a WebP")},
+        {0, 4, "GIF8", OLAT__FOREIGN("a GIF")}, {0, 4, "II*\0", OLAT__FOREIGN("a TIFF")},
+        {0, 4, "MM\0*", OLAT__FOREIGN("a TIFF")}, {0, 2, "BM", OLAT__FOREIGN("a BMP")},
+        {0, 4, "\x76\x2F\x31\x01", OLAT__FOREIGN("an OpenEXR")}, {4, 4, "ftyp", OLAT__FOREIGN("a HEIC or AVIF")},
+        {0, 23, "version https://git-lfs", "this is a Git LFS pointer, not the image itself: run git lfs pull"}};
+#undef OLAT__FOREIGN
+    size_t i;
+    for (i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (size >= kinds[i].at + kinds[i].length && !memcmp(bytes + kinds[i].at, kinds[i].bytes, kinds[i].length))
+            return kinds[i].problem;
+    return "this is not a PNG file";
+}
+
+/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word, of one kind the
+   first chunk; malformed ones say nothing. */
+static void olat__png_curve(olat__png *png, uint32_t type, const unsigned char *data, size_t length) {
+    const uint32_t value = length == 4 ? olat__be32(data) : 0;
+    int curve = 0;
+    if (type == OLAT__GAMA && value >= 16 && value <= 625000000) curve = 1; /* libpng's limits */
+    if (type == OLAT__SRGB && length == 1) curve = 2;
+    if (type == OLAT__ICCP) curve = 3;
+    if (type == OLAT__CICP && length == 4) curve = 4;
+    if (curve <= png->curve) return;
+    png->curve = curve;
+    png->gamma = curve == 1 && (value < 40000 || value > 50000) ? value : curve == 4 && data[1] == 8 ? 100000 : 0;
+}
+
 /* Walks over the chunks: fills the header and the palette, and gathers the compressed data in png->packed. */
 static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, size_t size) {
     enum { START, HEADER, DATA, AFTER } stage = START;
-    if (size < 8 || memcmp(bytes, olat__signature, 8) != 0) return "this is not a PNG file";
+    if (size < 8 || memcmp(bytes, olat__signature, 8) != 0) return olat__png_foreign(bytes, size);
     for (png->at = 8;;) {
         const unsigned char *chunk = bytes + png->at, *data = chunk + 8;
         size_t left = size - png->at, length = left < 12 ? 0 : olat__be32(chunk);
         const char *problem = NULL;
         uint32_t type;
+        int tells_curve, intact;
         if (left < 12 || length > left - 12) return "the file ends early";
         type = olat__be32(chunk + 4);
         if (stage == START && type != OLAT__IHDR) return "the first chunk is not IHDR";
-        if ((!(chunk[4] & 32) || type == OLAT__TRNS) && olat__be32(data + length) != olat__crc32(chunk + 4, length + 4)) {
-            return "the chunk's CRC is wrong";
-        }
+        tells_curve = stage == HEADER && !png->palette_size &&
+                      (type == OLAT__GAMA || type == OLAT__SRGB || type == OLAT__ICCP || type == OLAT__CICP);
+        intact = ((chunk[4] & 32) && type != OLAT__TRNS && !tells_curve) ||
+                 olat__be32(data + length) == olat__crc32(chunk + 4, length + 4);
+        if (!intact && !tells_curve) return "the chunk's CRC is wrong";
+        if (intact && tells_curve) olat__png_curve(png, type, data, length);
         if (stage == DATA && type != OLAT__IDAT) stage = AFTER;
         if (type == OLAT__IHDR) {
             problem = stage != START ? "a second IHDR" : olat__png_header(png, data, length);
@@ -661,7 +703,7 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
 }
 
 static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width, int *height,
-                            ssdgs_pixels *format, void **pixels, char *error) {
+                            ssdgs_pixels *format, void **pixels, uint32_t *gamma, char *error) {
     olat__png png;
     const char *problem;
     memset(&png, 0, sizeof png);
@@ -673,25 +715,33 @@ static int olat__png_decode(const char *name, const unsigned char *bytes, size_t
     *height = problem ? 0 : png.height;
     *format = png.depth == 16 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
     *pixels = problem ? NULL : png.out;
+    *gamma = png.gamma;
     return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at, problem) : 0;
 }
 
-/* Decodes a PNG of any kind into (h,w,4) straight RGBA, 16 bits if the file has 16. free() the pixels. */
-OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height, ssdgs_pixels *format,
-                              void **pixels, char error[512]) {
-    return olat__png_decode("PNG", bytes, size, width, height, format, pixels, error);
-}
-
-/* The same from a file. */
-OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, char error[512]) {
+static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, uint32_t *gamma,
+                          char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
     int failed;
     *pixels = NULL;
     failed = olat__read_file(path, &bytes, &size, error) ||
-             olat__png_decode(path, bytes, size, width, height, format, pixels, error);
+             olat__png_decode(path, bytes, size, width, height, format, pixels, gamma, error);
     free(bytes);
     return failed;
+}
+
+/* Decodes a PNG of any kind into (h,w,4) straight RGBA as it is stored, 16 bits if the file has 16. free() the pixels. */
+OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height, ssdgs_pixels *format,
+                              void **pixels, char error[512]) {
+    uint32_t gamma;
+    return olat__png_decode("PNG", bytes, size, width, height, format, pixels, &gamma, error);
+}
+
+/* The same from a file. */
+OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, char error[512]) {
+    uint32_t gamma;
+    return olat__png_file(path, width, height, format, pixels, &gamma, error);
 }
 
 /* Filters a row into out: the filter byte, then the differences. Takes the filter whose differences are smallest. */
@@ -1156,12 +1206,62 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
     lens->has_centre |= has_cx;
 }
 
-/* Fills the camera, whose size is known, from the lens and the frame's pose. */
-static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens, ssdgs_camera *camera) {
-    const double w = camera->width, h = camera->height;
-    double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, origin[3] = {0, 0, 0}, t[3], focal[2];
+/* The frame's pose as a view matrix in our axes, of coordinates relative to origin. */
+static void olat__read_pose(olat__json *j, const olat__node *node, const double origin[3], double view[12]) {
+    double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, place[3] = {0, 0, 0}, t[3] = {0, 0, 0};
     int refined = olat__find(j, node, "R_opt") != NULL, i, k;
-    int in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
+    if (refined) {
+        olat__get_pose(j, node, "R_opt", 0, axes, place);
+        if (!olat__get(j, node, "T_opt", 3, t)) olat__json_fail(j, node, "T_opt is missing");
+    } else if (!olat__get_pose(j, node, "transform_matrix", 1, axes, place)) {
+        olat__json_fail(j, node, "transform_matrix or R_opt is missing");
+    }
+    for (i = 0; i < 3; i++) place[i] -= origin[i];
+    for (i = 0; i < 3; i++) { /* transform_matrix has y up and z backward, R_opt has our axes */
+        const double sign = i > 0 && !refined ? -1 : 1;
+        for (k = 0; k < 3; k++) {
+            view[4 * i + k] = sign * axes[i][k];
+            if (fabs(origin[k]) > 0) t[i] += axes[i][k] * origin[k];
+        }
+        view[4 * i + 3] = refined ? t[i] : -sign * olat__dot(axes[i], place);
+    }
+}
+
+/* What the frames' positions had better be relative to: where cameras and point lights lie too far away to be told apart in
+   floats, their mean, of which a float holds each coordinate; else 0. Cameras in one place do not tell how large a scene is:
+   these stay unless they are further away than a scene in millimetres has them. What is wrong is told by those who read. */
+static void olat__find_origin(olat__json *j, const olat__node *frames, double origin[3]) {
+    double sum[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, radius = 0, length;
+    int turn, i, k, light, places = 0;
+    for (turn = 0; turn < 2; turn++) {
+        const olat__node *node = &j->nodes[frames->child];
+        for (i = 0; i < frames->size && !j->failed; i++, node = &j->nodes[node->next])
+            for (light = 0; light < 2; light++) {
+                double view[12], place[3] = {0, 0, 0};
+                if (light && !olat__get(j, node, "pl_pos", 3, place)) continue;
+                if (!light) olat__read_pose(j, node, mean, view);
+                for (k = 0; k < 3; k++) {
+                    if (light) place[k] -= mean[k];
+                    else place[k] = -(view[k] * view[3] + view[4 + k] * view[7] + view[8 + k] * view[11]);
+                    sum[k] += place[k];
+                }
+                places += turn == 0;
+                length = sqrt(olat__dot(place, place));
+                if (turn == 1 && length > radius) radius = length;
+            }
+        for (k = 0; k < 3 && turn == 0; k++) mean[k] = sum[k] / (places ? places : 1);
+    }
+    length = sqrt(olat__dot(mean, mean));
+    for (k = 0; k < 3; k++) origin[k] = !j->failed && length > 64 * radius && length > 1000 ? (double)(float)mean[k] : 0;
+    j->failed = 0;
+}
+
+/* Fills the camera, whose size is known, from the lens and the frame's pose. */
+static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens, const double origin[3],
+                              ssdgs_camera *camera) {
+    const double w = camera->width, h = camera->height;
+    double view[12], focal[2];
+    int i, in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
     if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
                   : lens->w && lens->h && fabs(w * lens->h - h * lens->w) > (w > h ? w : h)) { /* an angle allows another size alone */
         olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
@@ -1175,20 +1275,11 @@ static void olat__read_camera(olat__json *j, const olat__node *node, const olat_
     camera->fy = (ssdgs_real)(focal[1] > 0 ? focal[1] : focal[0]);
     camera->cx = (ssdgs_real)(lens->has_centre ? lens->centre[0] : 0.5 * w);
     camera->cy = (ssdgs_real)(lens->has_centre ? lens->centre[1] : 0.5 * h);
-    if (refined) {
-        olat__get_pose(j, node, "R_opt", 0, axes, origin);
-        if (!olat__get(j, node, "T_opt", 3, t)) olat__json_fail(j, node, "T_opt is missing");
-    } else if (!olat__get_pose(j, node, "transform_matrix", 1, axes, origin)) {
-        olat__json_fail(j, node, "transform_matrix or R_opt is missing");
-    }
-    for (i = 0; i < 3 && !j->failed; i++) { /* transform_matrix has y up and z backward, R_opt has our axes */
-        const double sign = i > 0 && !refined ? -1 : 1;
-        for (k = 0; k < 3; k++) camera->view[4 * i + k] = (ssdgs_real)(sign * axes[i][k]);
-        camera->view[4 * i + 3] = (ssdgs_real)(refined ? t[i] : -sign * olat__dot(axes[i], origin));
-    }
+    olat__read_pose(j, node, origin, view);
+    for (i = 0; i < 12; i++) camera->view[i] = (ssdgs_real)view[i];
 }
 
-static void olat__read_light(olat__json *j, const olat__node *node, ssdgs_light *light) {
+static void olat__read_light(olat__json *j, const olat__node *node, const double origin[3], ssdgs_light *light) {
     const olat__node *intensity = olat__find(j, node, "pl_intensity");
     double v[3] = {0, 0, 0}, rgb[3] = {1, 1, 1}, length = 1;
     int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v), i;
@@ -1200,7 +1291,7 @@ static void olat__read_light(olat__json *j, const olat__node *node, ssdgs_light 
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
     light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
     for (i = 0; i < 3 && !j->failed; i++) {
-        light->position[i] = (ssdgs_real)(v[i] / length);
+        light->position[i] = (ssdgs_real)(is_far ? v[i] / length : v[i] - origin[i]);
         light->intensity[i] = (ssdgs_real)rgb[i];
     }
 }
@@ -1233,46 +1324,140 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
     return NULL;
 }
 
-/* Checks the path of the frame's image and joins it to the folder; file stays NULL where the frame names none. */
-static void olat__read_path(olat__json *j, const olat__node *node, const char *folder, int flags, char **file) {
-    const olat__node *whole = olat__find(j, node, "img_path"), *path = whole ? whole : olat__find(j, node, "file_path");
-    const olat__node *ext = olat__find(j, node, "file_ext");
-    const char *problem, *suffix = ".png";
-    size_t used = strlen(folder), room, i;
-    if (!path) {
-        if (!(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
-        return;
+/* Refuses a name that ends as those of another kind of image do; 1 if it does. */
+static int olat__other_image(olat__json *j, const olat__node *name) {
+    static const char *const kinds[][2] = {{".jpg", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".webp", "WebP"},
+        {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".tiff", "TIFF"}, {".bmp", "BMP"}, {".gif", "GIF"},
+        {".heic", "HEIC"}, {".avif", "AVIF"}, {".dng", "DNG"}, {".ppm", "PPM"}};
+    const size_t size = name->text_length;
+    size_t i;
+    for (i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        const size_t length = strlen(kinds[i][0]);
+        if (size < length || !olat__same_letters(name->text + size - length, kinds[i][0], length)) continue;
+        olat__json_fail(j, name, "%s: %s images cannot be read: convert them to PNG, for instance with: mogrify -format png *%s,"
+            " and name those here", name->text + (size > 60 ? size - 60 : 0), kinds[i][1], kinds[i][0]);
+        return 1;
     }
-    if (ext && !whole) {
-        suffix = ext->text;
-        if (ext->type != OLAT__STRING || ext->text_length != 4 || !olat__same_letters(suffix, ".png", 4)) {
-            olat__json_fail(j, ext, "\".png\" was expected: other images cannot be read");
-        }
-    }
+    return 0;
+}
+
+/* Checks a path out of the file and joins it to the folder, with ext or ".png" where it has no ending; NULL after a failure. */
+static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext, int whole, int flags) {
+    const char *problem, *suffix = ext ? ext->text : ".png";
+    const size_t used = strlen(folder);
+    size_t room, i;
+    char *file;
     if (path->type != OLAT__STRING) olat__json_fail(j, path, "a string was expected");
     else if ((problem = olat__path_problem(path->text, path->text_length, flags & OLAT_ALLOW_PARENT)) != NULL) {
         olat__json_fail(j, path, "%s", problem);
     }
-    if (j->failed) return;
+    if (j->failed || (!ext && !(flags & OLAT_NO_IMAGES) && olat__other_image(j, path))) return NULL;
     if (whole || (path->text_length >= 4 && olat__same_letters(path->text + path->text_length - 4, ".png", 4))) suffix = "";
     room = used + path->text_length + 8;
-    if ((*file = (char *)malloc(room)) == NULL) {
+    if ((file = (char *)malloc(room)) == NULL) {
         olat__json_fail(j, path, "out of memory");
-        return;
+        return NULL;
     }
-    snprintf(*file, room, "%s%s%s%s", folder, used ? "/" : "", path->text, suffix);
-    for (i = used; (*file)[i]; i++) {
-        if ((*file)[i] == '\\') (*file)[i] = '/'; /* datasets made on Windows */
+    snprintf(file, room, "%s%s%s%s", folder, used ? "/" : "", path->text, suffix);
+    for (i = used; file[i]; i++) {
+        if (file[i] == '\\') file[i] = '/'; /* datasets made on Windows */
     }
+    return file;
+}
+
+/* The paths of the frame's image and mask; NULL where it names none. */
+static void olat__read_paths(olat__json *j, const olat__node *node, const char *folder, int flags, char **file, char **mask) {
+    const olat__node *whole = olat__find(j, node, "img_path"), *path = whole ? whole : olat__find(j, node, "file_path");
+    const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"), *mask_path = olat__find(j, node, "mask_path");
+    if (!path && !(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
+    if (path && ext && (ext->type != OLAT__STRING || (!olat__other_image(j, ext) &&
+        (ext->text_length != 4 || !olat__same_letters(ext->text, ".png", 4))))) {
+        olat__json_fail(j, ext, "\".png\" was expected: other images cannot be read");
+    }
+    if (path) *file = olat__join(j, folder, path, ext, whole != NULL, flags);
+    if (mask_path && mask_path->type != OLAT__NULL) *mask = olat__join(j, folder, mask_path, NULL, 0, flags);
+}
+
+static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
+    return format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)pixels)[i] : ((const unsigned char *)pixels)[i];
+}
+
+/* Brings colours that are light to the power of gamma / 100000 to the sRGB curve, in 16 bits; alpha stays. */
+static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
+    const size_t count = 4 * (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const unsigned top = frame->format == SSDGS_PIXELS_RGBA16 ? 65535 : 255;
+    uint16_t *out = (uint16_t *)malloc(count * sizeof *out), *curve = (uint16_t *)malloc((top + 1) * sizeof *curve);
+    const int failed = !out || !curve;
+    size_t i;
+    for (i = 0; !failed && i <= top; i++) {
+        const double linear = pow((double)i / top, 1e5 / gamma);
+        curve[i] = (uint16_t)(65535 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055) + 0.5);
+    }
+    for (i = 0; !failed && i < count; i++) {
+        const unsigned value = olat__sample(frame->pixels, frame->format, i);
+        out[i] = i % 4 == 3 ? (uint16_t)(value * (65535 / top)) : curve[value];
+    }
+    free(curve);
+    free(failed ? (void *)out : frame->pixels);
+    if (failed) return olat__fail(error, "%s: out of memory", olat__tail(frame->file));
+    frame->pixels = out;
+    frame->format = SSDGS_PIXELS_RGBA16;
+    return 0;
+}
+
+/* Multiplies the photograph's alpha by its mask: white keeps, black leaves nothing. */
+static int olat__apply_mask(olat_frame *frame, char *error) {
+    int width, height, failed = 0;
+    ssdgs_pixels format;
+    void *mask;
+    size_t i;
+    if (olat_read_png(frame->mask, &width, &height, &format, &mask, error)) return 1;
+    if (width != frame->camera.width || height != frame->camera.height) {
+        failed = olat__fail(error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
+                            olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
+    }
+    for (i = 0; !failed && i < (size_t)width * (size_t)height; i++) {
+        const uint64_t top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255, one = top * top;
+        uint64_t value = 0, c;
+        for (c = 0; c < 3; c++) {
+            const unsigned v = olat__sample(mask, format, 4 * i + (size_t)c);
+            if (v > value) value = v;
+        }
+        value *= olat__sample(mask, format, 4 * i + 3);
+        value = (olat__sample(frame->pixels, frame->format, 4 * i + 3) * value + one / 2) / one;
+        if (frame->format == SSDGS_PIXELS_RGBA16) ((uint16_t *)frame->pixels)[4 * i + 3] = (uint16_t)value;
+        else ((unsigned char *)frame->pixels)[4 * i + 3] = (unsigned char)value;
+    }
+    free(mask);
+    return failed;
+}
+
+/* The frame's photograph as training takes it; gamma: what its file had, 0 = like sRGB. */
+static int olat__read_photo(olat_frame *frame, uint32_t *gamma, char *error) {
+    ssdgs_camera *camera = &frame->camera;
+    frame->has_image = 1;
+    return olat__png_file(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, gamma, error) ||
+           (*gamma && olat__to_srgb(frame, *gamma, error)) || (frame->mask && olat__apply_mask(frame, error));
+}
+
+/* Adds a line to the notes. */
+OLAT__PRINTF(2, 3) static void olat__note(olat_dataset *set, const char *format, ...) {
+    const size_t used = strlen(set->notes), more = used > 0 && used + 1 < sizeof set->notes;
+    va_list list;
+    if (more) set->notes[used] = '\n';
+    va_start(list, format);
+    vsnprintf(set->notes + used + more, sizeof set->notes - used - more, format, list);
+    va_end(list);
 }
 
 /* A side of an image not read: twice its middle, 0 = not given. */
 static int olat__side(double middle) { return middle >= 0.5 && middle <= 16384 ? (int)(2 * middle + 0.5) : 256; }
 
-static void olat__read_frames(olat__json *j, const char *folder, int flags, olat_dataset *out) {
+static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin, olat_dataset *out) {
     const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames"), *node;
+    int i, masked = 0, curved = 0, oblong = 0;
+    uint32_t gamma = 0, first_gamma = 0;
     olat__lens top, lens;
-    int i;
     memset(&top, 0, sizeof top);
     olat__read_lens(j, root, &top);
     if (root->type != OLAT__OBJECT || !frames) olat__json_fail(j, root, "frames is missing");
@@ -1280,24 +1465,41 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, olat
     else if (frames->size < 1 || frames->size > OLAT__MAX_FRAMES) olat__json_fail(j, frames, "there must be 1 to 2^20 frames");
     if (j->failed) return;
     out->frames = (olat_frame *)calloc((size_t)frames->size, sizeof *out->frames);
-    if (!out->frames) olat__json_fail(j, frames, "out of memory");
-    else out->count = frames->size;
+    if (!out->frames) {
+        olat__json_fail(j, frames, "out of memory");
+        return;
+    }
+    out->count = frames->size;
+    if (origin) memcpy(out->origin, origin, sizeof out->origin);
+    else olat__find_origin(j, frames, out->origin);
     for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed; i++, node = &j->nodes[node->next]) {
         olat_frame *frame = &out->frames[i];
         ssdgs_camera *camera = &frame->camera;
         if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
         lens = top;
         olat__read_lens(j, node, &lens);
-        olat__read_light(j, node, &frame->light);
-        olat__read_path(j, node, folder, flags, &frame->file);
+        olat__read_light(j, node, out->origin, &frame->light);
+        olat__read_paths(j, node, folder, flags, &frame->file, &frame->mask);
         camera->width = lens.w ? lens.w : olat__side(lens.centre[0]);
         camera->height = lens.h ? lens.h : olat__side(lens.centre[1]);
         if (!(flags & OLAT_NO_IMAGES) && !j->failed) {
-            j->failed = olat_read_png(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, j->error);
-            frame->has_image = 1;
+            j->failed = olat__read_photo(frame, &gamma, j->error);
+            masked += frame->mask != NULL;
+            curved += gamma != 0;
+            if (!first_gamma) first_gamma = gamma;
         }
-        olat__read_camera(j, node, &lens, camera);
+        olat__read_camera(j, node, &lens, out->origin, camera);
+        oblong += !(lens.focal[0] + lens.focal[1] > 0) && fabs((double)(camera->fx / camera->fy) - 1) > 0.01;
     }
+    if (olat__dot(out->origin, out->origin) > 0) {
+        olat__note(out, "coordinates are taken relative to %g, %g, %g", out->origin[0], out->origin[1], out->origin[2]);
+    }
+    if (masked) olat__note(out, "masks of %d of the %d photographs are used", masked, out->count);
+    if (curved) {
+        olat__note(out, "%d of the %d photographs %s %s (gAMA %g): converted to the sRGB curve", curved, out->count,
+                   curved == 1 ? "is" : "are", first_gamma == 100000 ? "linear" : "not sRGB", first_gamma / 1e5);
+    }
+    if (oblong) olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y", oblong, out->count);
 }
 
 /* Frees what olat_load made. */
@@ -1305,34 +1507,53 @@ OLAT__API void olat_free(olat_dataset *set) {
     int i;
     for (i = 0; i < set->count; i++) {
         free(set->frames[i].file);
+        free(set->frames[i].mask);
         free(set->frames[i].pixels);
     }
     free(set->frames);
     memset(set, 0, sizeof *set);
 }
 
-/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure. */
-OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out, char error[512]) {
-    olat__json j;
+/* Reads and parses folder/split_json; whatever came of it, olat__json_close frees it. */
+static void olat__json_open(olat__json *j, const char *folder, const char *split_json, char *error) {
+    const size_t room = strlen(folder) + strlen(split_json) + 2;
     unsigned char *text = NULL;
-    size_t size = 0, room = strlen(folder) + strlen(split_json) + 2;
-    memset(out, 0, sizeof *out);
-    memset(&j, 0, sizeof j);
-    j.error = error;
-    if ((j.path = (char *)malloc(room)) == NULL) return olat__fail(error, "%s: out of memory", olat__tail(split_json));
-    snprintf(j.path, room, "%s%s%s", folder, folder[0] ? "/" : "", split_json);
-    j.failed = olat__read_file(j.path, &text, &size, error);
-    if (!j.failed) {
-        j.text = (char *)text;
-        j.end = j.text + size;
-        olat__json_parse(&j);
+    size_t size = 0;
+    memset(j, 0, sizeof *j);
+    j->error = error;
+    if ((j->path = (char *)malloc(room)) == NULL) {
+        j->failed = olat__fail(error, "%s: out of memory", olat__tail(split_json));
+        return;
     }
-    if (!j.failed) olat__read_frames(&j, folder, flags, out);
+    snprintf(j->path, room, "%s%s%s", folder, folder[0] ? "/" : "", split_json);
+    j->failed = olat__read_file(j->path, &text, &size, error);
+    if (j->failed) return;
+    j->text = (char *)text;
+    j->end = j->text + size;
+    olat__json_parse(j);
+}
+
+static void olat__json_close(olat__json *j) {
+    free(j->nodes);
+    free(j->text);
+    free(j->path);
+}
+
+/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure. Positions
+   become relative to origin; NULL chooses one, 0 unless they lie far away. */
+OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin, olat_dataset *out,
+                           char error[512]) {
+    olat__json j;
+    memset(out, 0, sizeof *out);
+    olat__json_open(&j, folder, split_json, error);
+    if (!j.failed) olat__read_frames(&j, folder, flags, origin, out);
     if (j.failed) olat_free(out);
-    free(j.nodes);
-    free(text);
-    free(j.path);
+    olat__json_close(&j);
     return j.failed;
+}
+
+OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out, char error[512]) {
+    return olat_load_at(folder, split_json, flags, NULL, out, error);
 }
 
 /* A text file that grows in memory; text is NULL once out of it. */
@@ -1378,10 +1599,11 @@ static void olat__write_numbers(olat__writer *w, const char *before, const doubl
     olat__write(w, after);
 }
 
-static void olat__write_frame(olat__writer *w, const olat_frame *frame, const char *folder) {
+static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3], const char *folder) {
     static const double last_row[4] = {0, 0, 0, 1};
     const ssdgs_camera *camera = &frame->camera;
     const size_t used = strlen(folder);
+    const int is_point = frame->light.kind == SSDGS_LIGHT_POINT;
     double v[4];
     int k, m;
     if (frame->file && !strncmp(frame->file, folder, used) && (!used || frame->file[used] == '/')) {
@@ -1395,16 +1617,17 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const ch
     v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx, v[3] = (double)camera->fy;
     olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, 9, "],\n  \"transform_matrix\": [");
     for (k = 0; k < 3; k++) { /* camera to world, y up and z backward */
-        for (m = 0, v[3] = 0; m < 3; m++) {
+        for (m = 0, v[3] = origin[k]; m < 3; m++) {
             v[m] = (double)camera->view[4 * m + k];
             v[3] -= v[m] * (double)camera->view[4 * m + 3];
             if (m) v[m] = -v[m];
         }
-        olat__write_numbers(w, "[", v, 4, 9, "], ");
+        olat__write_numbers(w, "[", v, 3, 9, ", ");
+        olat__write_numbers(w, "", v + 3, 1, 16, "], ");
     }
     olat__write_numbers(w, "[", last_row, 4, 9, "]],\n  ");
-    for (k = 0; k < 3; k++) v[k] = (double)frame->light.position[k];
-    olat__write_numbers(w, frame->light.kind == SSDGS_LIGHT_POINT ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, 9, "], ");
+    for (k = 0; k < 3; k++) v[k] = (double)frame->light.position[k] + (is_point ? origin[k] : 0);
+    olat__write_numbers(w, is_point ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, is_point ? 16 : 9, "], ");
     for (k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
     olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]}");
 }
@@ -1419,7 +1642,7 @@ OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset
     olat__write(&w, "{\"frames\": [");
     for (i = 0; i < set->count; i++) {
         olat__write(&w, i ? ",\n {" : "\n {");
-        olat__write_frame(&w, &set->frames[i], folder);
+        olat__write_frame(&w, &set->frames[i], set->origin, folder);
     }
     olat__write(&w, "\n]}\n");
     failed = w.text ? olat__write_file(path, (const unsigned char *)w.text, w.size, error)
@@ -1449,8 +1672,7 @@ OLAT__API void olat_compose(const olat_frame *frame, const ssdgs_real background
     for (i = 0; i < pixels; i++) {
         ssdgs_real v[4] = {0, 0, 0, 0};
         for (k = 0; frame->pixels && k < 4; k++)
-            v[k] = unit * (frame->format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)frame->pixels)[4 * i + k]
-                                                                : ((const unsigned char *)frame->pixels)[4 * i + k]);
+            v[k] = unit * (ssdgs_real)olat__sample(frame->pixels, frame->format, 4 * i + k);
         for (k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * background[k];
     }
 }
