@@ -30,12 +30,21 @@
 #include <string.h>
 #include <sys/stat.h>
 #ifdef _WIN32
+#ifndef WIN32_LEAN_AND_MEAN
+#define WIN32_LEAN_AND_MEAN
+#endif
+#ifndef NOMINMAX
+#define NOMINMAX
+#endif
 #include <io.h>
 #include <process.h>
+#include <windows.h>
+#define OLAT__SEPARATORS "/\\"
 #define OLAT__READ_FLAGS (O_RDONLY | O_BINARY)
 #define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
 #else
 #include <unistd.h>
+#define OLAT__SEPARATORS "/"
 #define OLAT__READ_FLAGS (O_RDONLY | O_NONBLOCK) /* opening a FIFO must not wait for its writer */
 #define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL)
 #endif
@@ -1554,6 +1563,166 @@ OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags
 
 OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out, char error[512]) {
     return olat_load_at(folder, split_json, flags, NULL, out, error);
+}
+
+/* ==== guarding files: by what they are, whatever they are called ==== */
+
+typedef struct olat__known {
+    char *path;        /* as it was given; NULL: nobody's slot */
+    const char *name;  /* behind it in memory: what lies below the folder of this id; "": the id is the file's own */
+    uint64_t id[2];
+    int is_output;
+} olat__known;
+
+typedef struct olat_guard { /* files that must stay as they are, and files to be written; zero it to start */
+    olat__known *slots;     /* a hash table, half empty */
+    size_t count, room;
+} olat_guard;
+
+/* What tells a file or folder from every other one, through links; 0 if there is none. */
+static int olat__identify(const char *path, uint64_t id[2]) {
+#ifdef _WIN32
+    BY_HANDLE_FILE_INFORMATION info;
+    const HANDLE file = CreateFileA(path, 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL, OPEN_EXISTING,
+                                    FILE_FLAG_BACKUP_SEMANTICS, NULL);
+    const int found = file != INVALID_HANDLE_VALUE && GetFileInformationByHandle(file, &info);
+    if (file != INVALID_HANDLE_VALUE) CloseHandle(file);
+    if (!found) return 0;
+    id[0] = info.dwVolumeSerialNumber;
+    id[1] = (uint64_t)info.nFileIndexHigh << 32 | info.nFileIndexLow;
+#else
+    struct stat info;
+    if (stat(path, &info) != 0) return 0;
+    id[0] = (uint64_t)info.st_dev;
+    id[1] = (uint64_t)info.st_ino;
+#endif
+    return 1;
+}
+
+static int olat__separates(char c) { return c && strchr(OLAT__SEPARATORS, c) != NULL; }
+
+/* The place that a file has or would have: the nearest folder that exists, and the letters below it, small ones, without
+   names that mean nothing. `name` holds the path, and then those letters. */
+static void olat__place(char *name, uint64_t id[2]) {
+    size_t cut = strlen(name), from;
+    char *to = name;
+    id[0] = id[1] = 0;
+    for (;;) {
+        char c;
+        int found;
+        while (cut > 0 && !olat__separates(name[cut - 1])) cut--;
+        c = name[cut];
+        name[cut] = 0;
+        found = olat__identify(cut ? name : ".", id);
+        name[cut] = c;
+        if (found || cut == 0) break;
+        while (cut > 0 && olat__separates(name[cut - 1])) cut--;
+    }
+    for (from = cut; name[from]; from++) {
+        const int starts = to == name || to[-1] == '/';
+        if (starts && name[from] == '.' && (olat__separates(name[from + 1]) || !name[from + 1])) continue;
+        if (!olat__separates(name[from])) *to++ = (char)(name[from] >= 'A' && name[from] <= 'Z' ? name[from] + 32 : name[from]);
+        else if (!starts) *to++ = '/';
+    }
+    *to = 0;
+}
+
+/* The slot that holds it, else the free one where it belongs. */
+static olat__known *olat__slot(const olat_guard *guard, const olat__known *file) {
+    uint64_t hash = (file->id[0] * 31 + file->id[1]) * UINT64_C(0x9E3779B97F4A7C15);
+    const char *c;
+    size_t at;
+    for (c = file->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001B3);
+    for (at = (size_t)(hash ^ hash >> 32) & (guard->room - 1); guard->slots[at].path; at = (at + 1) & (guard->room - 1)) {
+        const olat__known *other = &guard->slots[at];
+        if (other->id[0] == file->id[0] && other->id[1] == file->id[1] && !strcmp(other->name, file->name)) break;
+    }
+    return &guard->slots[at];
+}
+
+/* Notes the file by its own id, or by its place where that is NULL. 1 and a message: an output that is known, or no memory. */
+static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *id, int is_output, char *error) {
+    const size_t size = strlen(path) + 1;
+    olat__known file, *slot;
+    olat_guard grown;
+    char *name;
+    size_t i;
+    if (2 * (guard->count + 1) > guard->room) {
+        grown.count = guard->count;
+        grown.room = guard->room ? 2 * guard->room : 64;
+        if ((grown.slots = (olat__known *)calloc(grown.room, sizeof *grown.slots)) == NULL) {
+            return olat__fail(error, "%s: out of memory", olat__tail(path));
+        }
+        for (i = 0; i < guard->room; i++)
+            if (guard->slots[i].path) *olat__slot(&grown, &guard->slots[i]) = guard->slots[i];
+        free(guard->slots);
+        *guard = grown;
+    }
+    if ((file.path = (char *)malloc(2 * size)) == NULL) return olat__fail(error, "%s: out of memory", olat__tail(path));
+    memcpy(file.path, path, size);
+    file.name = name = file.path + size;
+    file.is_output = is_output;
+    memcpy(name, path, size);
+    if (id) memcpy(file.id, id, sizeof file.id), *name = 0;
+    else olat__place(name, file.id);
+    slot = olat__slot(guard, &file);
+    if (!slot->path) {
+        *slot = file;
+        guard->count++;
+        return 0;
+    }
+    free(file.path);
+    if (!is_output) return 0;
+    return slot->is_output ? olat__fail(error, "%s: would be written twice, also as %s: give the outputs different names",
+                                        olat__tail(path), olat__tail(slot->path))
+                           : olat__fail(error, "%s: would replace an input, %s: choose another output folder", olat__tail(path),
+                                        olat__tail(slot->path));
+}
+
+/* A file that must stay as it is; there need not be one. Inputs come before outputs. Fails only for want of memory. */
+OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[512]) {
+    uint64_t id[2];
+    return olat__guard_add(guard, path, olat__identify(path, id) ? id : NULL, 0, error);
+}
+
+/* A file to be written: fails where it is an input, or an output named before; also where only the case of letters differs. */
+OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
+    uint64_t id[2];
+    return (olat__identify(path, id) && olat__guard_add(guard, path, id, 1, error)) ||
+           olat__guard_add(guard, path, NULL, 1, error); /* the place too: by then it may have been written */
+}
+
+/* A dataset as input: the JSON, and the images and masks that it names as far as it can be read. */
+OLAT__API int olat_guard_folder(olat_guard *guard, const char *folder, const char *split_json, char error[512]) {
+    const olat__node *frames, *node;
+    char problem[512] = "";
+    olat__json j;
+    int i, failed;
+    olat__json_open(&j, folder, split_json, problem);
+    failed = j.path && olat_guard_input(guard, j.path, error);
+    frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
+    node = frames ? &j.nodes[frames->child] : NULL;
+    for (i = 0; frames && i < frames->size && !failed; i++, node = &j.nodes[node->next]) {
+        char *files[2] = {NULL, NULL};
+        int k;
+        j.failed = 0; /* what is wrong with one frame does not expose another's files */
+        olat__read_paths(&j, node, folder, OLAT_NO_IMAGES | OLAT_ALLOW_PARENT, &files[0], &files[1]);
+        for (k = 0; k < 2; k++) {
+            if (files[k] && !failed) failed = olat_guard_input(guard, files[k], error);
+            free(files[k]);
+        }
+        if (j.failed && strstr(problem, "out of memory")) break;
+    }
+    if (!failed && j.failed && strstr(problem, "out of memory")) failed = olat__fail(error, "%s", problem);
+    olat__json_close(&j);
+    return failed;
+}
+
+OLAT__API void olat_guard_free(olat_guard *guard) {
+    size_t i;
+    for (i = 0; i < guard->room; i++) free(guard->slots[i].path);
+    free(guard->slots);
+    memset(guard, 0, sizeof *guard);
 }
 
 /* A text file that grows in memory; text is NULL once out of it. */

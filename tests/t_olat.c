@@ -1069,7 +1069,7 @@ static int photo_is(const picture *p, double gamma) {
                 const double got = olat__sample(frame->pixels, frame->format, i), linear = pow(rgba[c] / top, 1e5 / gamma);
                 wrong |= olat__sample(stored, format, i) != rgba[c];
                 if (gamma <= 0) wrong |= (unsigned)got != rgba[c];
-                else if (c == 3) wrong |= fabs(got / 65535 - rgba[c] / top) > 0;
+                else if (c == 3) wrong |= fabs(got * top - 65535.0 * rgba[c]) > 0;
                 else wrong |= fabs(got - 65535 * (linear > 0.0031308 ? 1.055 * pow(linear, 1 / 2.4) - 0.055 : 12.92 * linear)) > 0.5001;
             }
         }
@@ -1399,6 +1399,105 @@ static void test_saving(void) {
     CHECK(live == 0);
 }
 
+/* ---- guarded files ---- */
+
+#define GUARD FOLDER "/guard"
+static olat_guard guard;
+
+/* The message of an output that is refused, "" of one that is not. */
+static const char *output(const char *path) {
+    memset(error, 0, sizeof error);
+    return olat_guard_output(&guard, path, error) ? error : "";
+}
+
+static int replaces(const char *path, const char *input) {
+    char wanted[600];
+    snprintf(wanted, sizeof wanted, "%s: would replace an input, %s: choose another output folder", path, input);
+    if (!strcmp(output(path), wanted)) return 1;
+    printf("%s: wanted \"%s\", got \"%s\"\n", path, wanted, error);
+    return 0;
+}
+
+static void drop_guard(void) {
+    olat_guard_free(&guard);
+    CHECK(live == 0 && !guard.slots);
+}
+
+static void test_guard(void) {
+    static const char *const names[] = {"in/a.png", "in/b.png", "in/c.png", "in/m.png", "out/old.png", "in/set.json", "in/bad.json"};
+    static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png", GUARD "/later/b/new.png"};
+    char path[600], other[200];
+    size_t i;
+    int k, done;
+    long n;
+    mkdir(GUARD, 0777), mkdir(GUARD "/in", 0777), mkdir(GUARD "/out", 0777);
+    for (i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, GUARD "/%s", names[i]);
+        write_text(path, names[i]);
+    }
+    remove(GUARD "/hard.png"), remove(GUARD "/soft.png"), remove(GUARD "/folder"), remove(GUARD "/loose.png");
+    CHECK(!link(GUARD "/in/a.png", GUARD "/hard.png") && !symlink("in/a.png", GUARD "/soft.png") &&
+          !symlink("in", GUARD "/folder") && !symlink("nothing", GUARD "/loose.png"));
+
+    CHECK(!olat_guard_input(&guard, GUARD "/in/a.png", error) && !olat_guard_input(&guard, GUARD "/in/none.png", error));
+    CHECK(!olat_guard_input(&guard, GUARD "/./in/a.png", error) && guard.count == 2); /* an input may be named twice */
+    CHECK(replaces(GUARD "/in/a.png", GUARD "/in/a.png") && replaces(GUARD "/./in//./a.png", GUARD "/in/a.png"));
+    CHECK(replaces(GUARD "/out/../in/a.png", GUARD "/in/a.png") && replaces(GUARD "/hard.png", GUARD "/in/a.png"));
+    CHECK(replaces(GUARD "/soft.png", GUARD "/in/a.png") && replaces(GUARD "/folder/a.png", GUARD "/in/a.png"));
+    CHECK(replaces(GUARD "/in/none.png", GUARD "/in/none.png") && replaces(GUARD "/folder/./NONE.png", GUARD "/in/none.png"));
+    CHECK(!*output(GUARD "/in/b.png") && !*output(GUARD "/in/other.png") && !*output(GUARD "/none.png") && !*output(GUARD "/out/a.png"));
+    drop_guard();
+
+    for (i = 0; i < sizeof outputs / sizeof *outputs; i++) { /* twice, in whatever letters */
+        CHECK(!*output(outputs[i]));
+        snprintf(other, sizeof other, "%.*s/./%s", (int)(strrchr(outputs[i], '/') - outputs[i]), outputs[i], strrchr(outputs[i], '/') + 1);
+        snprintf(path, sizeof path, "%s: would be written twice, also as %s: give the outputs different names", other, outputs[i]);
+        CHECK(!strcmp(output(other), path));
+        strcpy(strrchr(other, '/') + 1, i == 1 ? "OLD.PNG" : "New.Png");
+        CHECK(strstr(output(other), "twice"));
+    }
+    remove(GUARD "/out/new.png");
+    CHECK(strstr(output(outputs[0]), "twice"));
+    write_text(outputs[0], "written"); /* it is a file by now */
+    CHECK(strstr(output(outputs[0]), "twice"));
+    remove(outputs[0]);
+    CHECK(!*output(GUARD "/out/new2.png") && !*output("t_olat_new.png") && strstr(output("./t_olat_NEW.png"), "twice"));
+    CHECK(!*output(GUARD "/loose.png") && strstr(output(GUARD "/loose.png"), "twice"));
+    drop_guard();
+
+    /* a dataset: what it names is safe, whatever else is wrong with it */
+    write_text(GUARD "/in/set.json", "{\"frames\":[{\"file_path\":\"./a\",\"mask_path\":\"m\"},{\"file_path\":7},1,"
+               "{\"file_path\":\"b.png\"},{\"img_path\":\"..\\\\out\\\\old.png\",\"mask_path\":\"gone\"}]}");
+    write_text(GUARD "/in/bad.json", "{\"frames\":[{\"file_path\":\"c\"}]");
+    CHECK(!olat_guard_folder(&guard, GUARD "/in", "set.json", error) && !olat_guard_folder(&guard, GUARD "/in", "bad.json", error));
+    CHECK(!olat_guard_folder(&guard, GUARD "/in", "missing.json", error) && !olat_guard_folder(&guard, GUARD "/in", "a.png", error));
+    CHECK(replaces(GUARD "/folder/a.png", GUARD "/in/./a.png") && replaces(GUARD "/in/b.png", GUARD "/in/b.png"));
+    CHECK(replaces(GUARD "/in/m.png", GUARD "/in/m.png") && replaces(GUARD "/out/old.png", GUARD "/in/../out/old.png"));
+    CHECK(replaces(GUARD "/in/gone.png", GUARD "/in/gone.png") && replaces(GUARD "/in/set.json", GUARD "/in/set.json"));
+    CHECK(replaces(GUARD "/in/bad.json", GUARD "/in/bad.json") && replaces(GUARD "/in/missing.json", GUARD "/in/missing.json"));
+    CHECK(!*output(GUARD "/in/c.png"));
+    drop_guard();
+
+    for (n = 1, done = 0; !done && n < 100; n++) { /* memory fails at every place */
+        calls = 0, fail_at = n;
+        memset(error, 0, sizeof error);
+        done = !olat_guard_folder(&guard, GUARD "/in", "set.json", error) && !olat_guard_input(&guard, GUARD "/in/c.png", error) &&
+            !olat_guard_output(&guard, GUARD "/out/new.png", error) && !olat_guard_output(&guard, GUARD "/out/new2.png", error);
+        CHECK(done || strstr(error, "out of memory"));
+        drop_guard();
+    }
+    fail_at = 0;
+    CHECK(done && n > 15);
+
+    for (k = 0; k < 5000; k++) {
+        snprintf(path, sizeof path, GUARD "/in/many_%d.png", k);
+        snprintf(other, sizeof other, GUARD "/out/many_%d.png", k);
+        if (olat_guard_input(&guard, path, error) || *output(other)) CHECK(0);
+    }
+    CHECK(guard.count == 10000 && strstr(output(GUARD "/folder/MANY_77.png"), "replace"));
+    drop_guard();
+}
+
 static void test_memory(void) {
     static const unsigned char grey[4] = {1, 2, 3, 4};
     static const unsigned char linear[4] = {0, 1, 0x86, 0xA0};
@@ -1506,6 +1605,7 @@ int main(void) {
     test_kinds_of_image();
     test_far_places();
     test_saved_digits();
+    test_guard();
     test_saving();
     TEST_ROW("83", "allocations that fail", test_memory());
     test_views();
