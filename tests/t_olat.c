@@ -948,7 +948,8 @@ static void test_lenses(void) {
     static const char *const values[][2] = {
         {"0", "1"}, {"-0.0", "1"}, {"null", "1"}, {"false", "1"}, {"[]", "1"}, {"[0,0.0,[false,null]]", "1"}, {"{\"a\":0}", "1"},
         {"1e-9", "distorted"}, {"-0.1", "distorted"}, {"true", "true: distorted"}, {"[0,0,0,1e-300]", "distorted"},
-        {"{\"a\":[0,-1]}", "distorted"}, {"\"0.1\"", "0.1: distorted"}};
+        {"{\"a\":[0,-1]}", "distorted"}, {"\"0.1\"", "0.1: distorted"},
+        {"\"opencv\"", "opencv: distorted"}};
     static const char *const others[] = {"is_fisheye", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1", "ftheta_p2", "ftheta_p3",
         "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
     const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
@@ -1015,6 +1016,8 @@ static void test_rounding(void) {
         olat_free(&set);
     }
     CHECK(worst < 1e-6);
+    CHECK(loads(TOP "{" LIGHT "\"transform_matrix\":[[1,0.0045,0,0],[0,1.001,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES));
+    olat_free(&set);
     CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
     CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
     CHECK(loads(TOP "{\"pl_dir\":[0,0.6,0.792]," POSE "}]}", OLAT_NO_IMAGES));
@@ -1105,6 +1108,11 @@ static void test_curves(void) {
         CHECK(photo_is(&p, 100000));
         encode(&p), insert_chunk(33, "cICP", linear, 4, 0), insert_chunk(33, "sRGB", intent, 1, 0), insert_chunk(33, "gAMA", plain, 4, 0);
         CHECK(photo_is(&p, 100000)); /* cICP knows more */
+        for (g = 0; g < 20; g++) {
+            const unsigned char transfer[4] = {1, (unsigned char)g, 0, 1};
+            encode(&p), insert_chunk(33, "cICP", transfer, 4, 0);
+            CHECK(photo_is(&p, g == 8 ? 100000 : 0));
+        }
         encode(&p), insert_chunk(33, "cICP", linear, 3, 0);
         CHECK(photo_is(&p, 0));
         for (g = 0; g < 2; g++) { /* in either order */
