@@ -7,12 +7,12 @@
    if (olat_load("scene", "transforms_train.json", 0, &set, error)) { puts(error); return 1; }
    ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
 
-   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or in a
-             frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep); transform_matrix (camera to world,
-             OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's own key wins over the top's, one that
-             tells a focal length over all of them. Distorted lenses are refused.
-   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are not sRGB become
-             so, masks become alpha; the notes say what was done.
+   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or
+             in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep); transform_matrix (camera
+             to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's own key wins over the
+             top's, one that tells a focal length over all of those. Distorted lenses are refused.
+   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are not sRGB
+             become so, masks become alpha. The dataset's notes say what was done.
    ERRORS    Functions return 0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept.
    HOSTILE   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its links).
    SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
@@ -75,7 +75,7 @@ typedef struct olat_dataset {
     olat_frame *frames;
     int count;
     double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far away */
-    char notes[512];  /* what was done or may be wrong: a line each, without a newline at the end; "" if there is nothing */
+    char notes[512];  /* what was done or may be wrong: lines, the last one without its newline; "" if nothing */
 } olat_dataset;
 
 enum {
@@ -453,8 +453,9 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 /* ==== PNG ==== */
 
 enum {
-    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44, OLAT__TRNS = 0x74524E53,
-    OLAT__GAMA = 0x67414D41, OLAT__SRGB = 0x73524742, OLAT__ICCP = 0x69434350, OLAT__CICP = 0x63494350
+    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44,
+    OLAT__TRNS = 0x74524E53, OLAT__GAMA = 0x67414D41, OLAT__SRGB = 0x73524742, OLAT__ICCP = 0x69434350,
+    OLAT__CICP = 0x63494350
 };
 static const unsigned char olat__signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
 
@@ -463,8 +464,9 @@ static const unsigned char olat__passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0,
                                                  {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}, {0, 0, 1, 1}};
 
 typedef struct olat__png {
-    int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key, curve;
-    uint32_t gamma; /* samples are light to the power of gamma / 100000; 0: like sRGB. By the highest chunk, see `curve` */
+    int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key;
+    int curve;      /* how much the chunk knows that told the gamma; 0: none did */
+    uint32_t gamma; /* samples are light to the power of gamma / 100000; 0: like sRGB */
     unsigned key[3]; /* the transparent colour */
     unsigned char palette[256][4];
     unsigned char *packed, *raw, *out;
@@ -548,8 +550,8 @@ static const char *olat__png_foreign(const unsigned char *bytes, size_t size) {
     return "this is not a PNG file";
 }
 
-/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word, of one kind the
-   first chunk; malformed ones say nothing. */
+/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word, of one kind
+   the first chunk; malformed ones say nothing. */
 static void olat__png_curve(olat__png *png, uint32_t type, const unsigned char *data, size_t length) {
     const uint32_t value = length == 4 ? olat__be32(data) : 0;
     int curve = 0;
@@ -728,8 +730,8 @@ static int olat__png_decode(const char *name, const unsigned char *bytes, size_t
     return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at, problem) : 0;
 }
 
-static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, uint32_t *gamma,
-                          char *error) {
+static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels,
+                          uint32_t *gamma, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
     int failed;
@@ -740,7 +742,7 @@ static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixel
     return failed;
 }
 
-/* Decodes a PNG of any kind into (h,w,4) straight RGBA as it is stored, 16 bits if the file has 16. free() the pixels. */
+/* Decodes a PNG of any kind into (h,w,4) straight RGBA as stored, 16 bits if the file has 16. free() the pixels. */
 OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height, ssdgs_pixels *format,
                               void **pixels, char error[512]) {
     uint32_t gamma;
@@ -748,7 +750,8 @@ OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *widt
 }
 
 /* The same from a file. */
-OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels, char error[512]) {
+OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels,
+                            char error[512]) {
     uint32_t gamma;
     return olat__png_file(path, width, height, format, pixels, &gamma, error);
 }
@@ -1064,7 +1067,7 @@ static void olat__json_parse(olat__json *j) {
     j->line = 1;
     j->at = j->text + (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
     olat__skip_space(j);
-    if (j->end - j->text > 1 && (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* its mark, or an ASCII letter */
+    if (j->end - j->text > 1 && (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* a mark, or a letter */
         problem = "the file is UTF-16: save it as UTF-8";
     } else if ((problem = olat__json_values(j)) == NULL) return;
     if (!j->nodes) j->failed = olat__fail(j->error, "%s: %s", olat__tail(j->path), problem);
@@ -1111,8 +1114,8 @@ static int olat__get(olat__json *j, const olat__node *object, const char *key, i
 
 static double olat__dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent. The axes must be
-   a rotation times a scale, up to three decimals, and become exactly a rotation: rounding then cannot shear the image. */
+/* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent. The axes
+   must be a rotation times a scale, to three decimals, and become exactly a rotation: rounding shears no image. */
 static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale, double axes[3][3],
                           double origin[3]) {
     const olat__node *node = olat__find(j, object, key), *row;
@@ -1153,28 +1156,34 @@ typedef struct olat__lens {
     int w, h, has_centre;
 } olat__lens;
 
+/* Is the string that word, given in small letters? */
+static int olat__is_word(const olat__node *node, const char *word) {
+    return node->text_length == strlen(word) && olat__same_letters(node->text, word, node->text_length);
+}
+
 /* Is there anything in it but 0, false, null and empty texts? */
 static int olat__nonzero(const olat__json *j, const olat__node *node) {
-    int i, found = node->type == OLAT__NUMBER ? fabs(node->number) > 0 : node->type == OLAT__TRUE || node->text_length > 0;
+    int i, found = node->type == OLAT__TRUE || node->text_length > 0 || fabs(node->number) > 0;
     for (i = node->child; i && !found; i = j->nodes[i].next) found = olat__nonzero(j, &j->nodes[i]);
     return found;
 }
 
 /* Refuses a lens that is no pinhole's by its model's name, and by any coefficient that is not 0. */
 static void olat__check_lens(olat__json *j, const olat__node *object) {
-    static const char *const models[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "full_opencv", "simple_radial",
-                                         "radial"};
+    static const char *const models[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "full_opencv",
+                                         "simple_radial", "radial"};
     static const char *const keys[] = {
-        "camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "p1", "p2", "p3", "p4", "p5", "p6",
-        "p7", "p8", "p9", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1",
-        "ftheta_p2", "ftheta_p3", "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
+        "camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "p1", "p2", "p3", "p4", "p5",
+        "p6", "p7", "p8", "p9", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "b1", "b2", "skew", "ftheta_p0",
+        "ftheta_p1", "ftheta_p2", "ftheta_p3", "ftheta_p4", "distortion", "distortion_params",
+        "distortion_coefficients", "rolling_shutter"};
     size_t i, m;
     for (i = 0; i < sizeof keys / sizeof *keys; i++) {
         const olat__node *node = olat__find(j, object, keys[i]);
         const char *value;
         int fine = !node || !olat__nonzero(j, node);
         for (m = 0; !fine && i == 0 && node->type == OLAT__STRING && m < sizeof models / sizeof *models; m++)
-            fine = node->text_length == strlen(models[m]) && olat__same_letters(node->text, models[m], node->text_length);
+            fine = olat__is_word(node, models[m]);
         if (fine) continue;
         value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
         olat__json_fail(j, node, "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
@@ -1192,7 +1201,8 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
         const char *key = i ? "h" : "w";
         double side;
         if (!olat__get(j, object, key, 1, &side)) continue;
-        if (!(side >= 1 && side <= 32768 && floor(side) >= side)) olat__json_fail(j, object, "%s is not 1 to 32768", key);
+        if (!(side >= 1 && side <= 32768 && floor(side) >= side))
+            olat__json_fail(j, object, "%s is not 1 to 32768", key);
         else if (i) lens->h = (int)side;
         else lens->w = (int)side;
     }
@@ -1236,9 +1246,9 @@ static void olat__read_pose(olat__json *j, const olat__node *node, const double 
     }
 }
 
-/* What the frames' positions had better be relative to: where cameras and point lights lie too far away to be told apart in
-   floats, their mean, of which a float holds each coordinate; else 0. Cameras in one place do not tell how large a scene is:
-   these stay unless they are further away than a scene in millimetres has them. What is wrong is told by those who read. */
+/* What the frames' positions had better be relative to: where cameras and point lights lie too far away for floats to
+   tell them apart, their mean, rounded so that floats hold it; else 0. Cameras in one place do not tell how large the
+   scene is: they must be further away than millimetres can explain. What is wrong with a frame is told when it is read. */
 static void olat__find_origin(olat__json *j, const olat__node *frames, double origin[3]) {
     double sum[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, radius = 0, length;
     int turn, i, k, light, places = 0;
@@ -1261,7 +1271,7 @@ static void olat__find_origin(olat__json *j, const olat__node *frames, double or
         for (k = 0; k < 3 && turn == 0; k++) mean[k] = sum[k] / (places ? places : 1);
     }
     length = sqrt(olat__dot(mean, mean));
-    for (k = 0; k < 3; k++) origin[k] = !j->failed && length > 64 * radius && length > 1000 ? (double)(float)mean[k] : 0;
+    for (k = 0; k < 3; k++) origin[k] = length > 64 * radius && length > 1000 && !j->failed ? (double)(float)mean[k] : 0;
     j->failed = 0;
 }
 
@@ -1335,23 +1345,26 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
 
 /* Refuses a name that ends as those of another kind of image do; 1 if it does. */
 static int olat__other_image(olat__json *j, const olat__node *name) {
-    static const char *const kinds[][2] = {{".jpg", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".webp", "WebP"},
-        {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".tiff", "TIFF"}, {".bmp", "BMP"}, {".gif", "GIF"},
+    static const char *const kinds[][2] = {
+        {".jpg", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".webp", "WebP"}, {".exr", "OpenEXR"},
+        {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".tiff", "TIFF"}, {".bmp", "BMP"}, {".gif", "GIF"},
         {".heic", "HEIC"}, {".avif", "AVIF"}, {".dng", "DNG"}, {".ppm", "PPM"}};
     const size_t size = name->text_length;
     size_t i;
     for (i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         const size_t length = strlen(kinds[i][0]);
         if (size < length || !olat__same_letters(name->text + size - length, kinds[i][0], length)) continue;
-        olat__json_fail(j, name, "%s: %s images cannot be read: convert them to PNG, for instance with: mogrify -format png *%s,"
-            " and name those here", name->text + (size > 60 ? size - 60 : 0), kinds[i][1], kinds[i][0]);
+        olat__json_fail(j, name, "%s: %s images cannot be read: convert them to PNG, for instance with: mogrify -format"
+            " png *%s, and name those here", name->text + (size > 60 ? size - 60 : 0), kinds[i][1], kinds[i][0]);
         return 1;
     }
     return 0;
 }
 
-/* Checks a path out of the file and joins it to the folder, with ext or ".png" where it has no ending; NULL after a failure. */
-static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext, int whole, int flags) {
+/* Checks a path out of the file and joins it to the folder, with ext, else ".png", where it is not whole and has no
+   ending; NULL after a failure. */
+static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext, int whole,
+                        int flags) {
     const char *problem, *suffix = ext ? ext->text : ".png";
     const size_t used = strlen(folder);
     size_t room, i;
@@ -1375,16 +1388,16 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
 }
 
 /* The paths of the frame's image and mask; NULL where it names none. */
-static void olat__read_paths(olat__json *j, const olat__node *node, const char *folder, int flags, char **file, char **mask) {
+static void olat__read_paths(olat__json *j, const olat__node *node, const char *folder, int flags, char **file,
+                             char **mask) {
     const olat__node *whole = olat__find(j, node, "img_path"), *path = whole ? whole : olat__find(j, node, "file_path");
-    const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"), *mask_path = olat__find(j, node, "mask_path");
+    const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"), *of_mask = olat__find(j, node, "mask_path");
     if (!path && !(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
-    if (path && ext && (ext->type != OLAT__STRING || (!olat__other_image(j, ext) &&
-        (ext->text_length != 4 || !olat__same_letters(ext->text, ".png", 4))))) {
+    if (path && ext && (ext->type != OLAT__STRING || (!olat__other_image(j, ext) && !olat__is_word(ext, ".png")))) {
         olat__json_fail(j, ext, "\".png\" was expected: other images cannot be read");
     }
     if (path) *file = olat__join(j, folder, path, ext, whole != NULL, flags);
-    if (mask_path && mask_path->type != OLAT__NULL) *mask = olat__join(j, folder, mask_path, NULL, 0, flags);
+    if (of_mask && of_mask->type != OLAT__NULL) *mask = olat__join(j, folder, of_mask, NULL, 0, flags);
 }
 
 static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
@@ -1399,8 +1412,8 @@ static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
     const int failed = !out || !curve;
     size_t i;
     for (i = 0; !failed && i <= top; i++) {
-        const double linear = pow((double)i / top, 1e5 / gamma);
-        curve[i] = (uint16_t)(65535 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055) + 0.5);
+        const double light = pow((double)i / top, 1e5 / gamma);
+        curve[i] = (uint16_t)(65535 * (light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055) + 0.5);
     }
     for (i = 0; !failed && i < count; i++) {
         const unsigned value = olat__sample(frame->pixels, frame->format, i);
@@ -1508,7 +1521,10 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
         olat__note(out, "%d of the %d photographs %s %s (gAMA %g): converted to the sRGB curve", curved, out->count,
                    curved == 1 ? "is" : "are", first_gamma == 100000 ? "linear" : "not sRGB", first_gamma / 1e5);
     }
-    if (oblong) olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y", oblong, out->count);
+    if (oblong) {
+        olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y", oblong,
+                   out->count);
+    }
 }
 
 /* Frees what olat_load made. */
@@ -1548,10 +1564,10 @@ static void olat__json_close(olat__json *j) {
     free(j->path);
 }
 
-/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure. Positions
-   become relative to origin; NULL chooses one, 0 unless they lie far away. */
-OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin, olat_dataset *out,
-                           char error[512]) {
+/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure.
+   Positions become relative to origin, of 3 numbers; NULL chooses one: 0 unless they lie far away. */
+OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin,
+                           olat_dataset *out, char error[512]) {
     olat__json j;
     memset(out, 0, sizeof *out);
     olat__json_open(&j, folder, split_json, error);
@@ -1583,8 +1599,8 @@ typedef struct olat_guard { /* files that must stay as they are, and files to be
 static int olat__identify(const char *path, uint64_t id[2]) {
 #ifdef _WIN32
     BY_HANDLE_FILE_INFORMATION info;
-    const HANDLE file = CreateFileA(path, 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL, OPEN_EXISTING,
-                                    FILE_FLAG_BACKUP_SEMANTICS, NULL);
+    const HANDLE file = CreateFileA(path, 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL,
+                                    OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, NULL);
     const int found = file != INVALID_HANDLE_VALUE && GetFileInformationByHandle(file, &info);
     if (file != INVALID_HANDLE_VALUE) CloseHandle(file);
     if (!found) return 0;
@@ -1601,8 +1617,8 @@ static int olat__identify(const char *path, uint64_t id[2]) {
 
 static int olat__separates(char c) { return c && strchr(OLAT__SEPARATORS, c) != NULL; }
 
-/* The place that a file has or would have: the nearest folder that exists, and the letters below it, small ones, without
-   names that mean nothing. `name` holds the path, and then those letters. */
+/* The place that a file has or would have: the nearest folder that exists, and what comes below it in small letters and
+   without names that mean nothing. `name` holds the path, and then the latter. */
 static void olat__place(char *name, uint64_t id[2]) {
     size_t cut = strlen(name), from;
     char *to = name;
@@ -1619,9 +1635,10 @@ static void olat__place(char *name, uint64_t id[2]) {
         while (cut > 0 && olat__separates(name[cut - 1])) cut--;
     }
     for (from = cut; name[from]; from++) {
+        const char c = name[from], next = name[from + 1];
         const int starts = to == name || to[-1] == '/';
-        if (starts && name[from] == '.' && (olat__separates(name[from + 1]) || !name[from + 1])) continue;
-        if (!olat__separates(name[from])) *to++ = (char)(name[from] >= 'A' && name[from] <= 'Z' ? name[from] + 32 : name[from]);
+        if (starts && c == '.' && (olat__separates(next) || !next)) continue;
+        if (!olat__separates(c)) *to++ = (char)(c >= 'A' && c <= 'Z' ? c + 32 : c);
         else if (!starts) *to++ = '/';
     }
     *to = 0;
@@ -1630,17 +1647,18 @@ static void olat__place(char *name, uint64_t id[2]) {
 /* The slot that holds it, else the free one where it belongs. */
 static olat__known *olat__slot(const olat_guard *guard, const olat__known *file) {
     uint64_t hash = (file->id[0] * 31 + file->id[1]) * UINT64_C(0x9E3779B97F4A7C15);
+    const size_t last = guard->room - 1;
     const char *c;
     size_t at;
     for (c = file->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001B3);
-    for (at = (size_t)(hash ^ hash >> 32) & (guard->room - 1); guard->slots[at].path; at = (at + 1) & (guard->room - 1)) {
+    for (at = (size_t)(hash ^ hash >> 32) & last; guard->slots[at].path; at = (at + 1) & last) {
         const olat__known *other = &guard->slots[at];
         if (other->id[0] == file->id[0] && other->id[1] == file->id[1] && !strcmp(other->name, file->name)) break;
     }
     return &guard->slots[at];
 }
 
-/* Notes the file by its own id, or by its place where that is NULL. 1 and a message: an output that is known, or no memory. */
+/* Notes the file by its own id, or by its place where that is NULL; fails where an output is known already. */
 static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *id, int is_output, char *error) {
     const size_t size = strlen(path) + 1;
     olat__known file, *slot;
@@ -1673,10 +1691,9 @@ static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *
     }
     free(file.path);
     if (!is_output) return 0;
-    return slot->is_output ? olat__fail(error, "%s: would be written twice, also as %s: give the outputs different names",
-                                        olat__tail(path), olat__tail(slot->path))
-                           : olat__fail(error, "%s: would replace an input, %s: choose another output folder", olat__tail(path),
-                                        olat__tail(slot->path));
+    return olat__fail(error, slot->is_output ? "%s: would be written twice, also as %s: give the outputs different names"
+                                             : "%s: would replace an input, %s: choose another output folder",
+                      olat__tail(path), olat__tail(slot->path));
 }
 
 /* A file that must stay as it is; there need not be one. Inputs come before outputs. Fails only for want of memory. */
@@ -1685,7 +1702,7 @@ OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[5
     return olat__guard_add(guard, path, olat__identify(path, id) ? id : NULL, 0, error);
 }
 
-/* A file to be written: fails where it is an input, or an output named before; also where only the case of letters differs. */
+/* A file to be written: fails where it is an input, or was named as an output before, if only in other case. */
 OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
     uint64_t id[2];
     return (olat__identify(path, id) && olat__guard_add(guard, path, id, 1, error)) ||

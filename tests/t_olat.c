@@ -624,7 +624,8 @@ static int has_value(const char *text, const char *want) {
 /* UTF-8 by its definition: how many bytes, and what leads them. */
 static size_t put_utf8(char *out, unsigned long code) {
     if (code < 0x80) return out[0] = (char)code, 1;
-    out[0] = (char)(unsigned char)(code < 0x800 ? 192 + code / 64 : code < 0x10000 ? 224 + code / 4096 : 240 + code / 262144);
+    out[0] = (char)(unsigned char)(code < 0x800 ? 192 + code / 64 : code < 0x10000 ? 224 + code / 4096 :
+        240 + code / 262144);
     if (code < 0x800) return out[1] = (char)(unsigned char)(128 + code % 64), 2;
     out[1] = (char)(unsigned char)(128 + code / (code < 0x10000 ? 64 : 4096) % 64);
     out[2] = (char)(unsigned char)(128 + code / (code < 0x10000 ? 1 : 64) % 64);
@@ -658,7 +659,8 @@ static void test_strings(void) {
                 size += put_utf8(want + size, code);
             }
             text[used++] = '"';
-            wrong += !parse_open(text, used) || json.nodes->text_length != size || memcmp(json.nodes->text, want, size) != 0;
+            wrong += !parse_open(text, used) || json.nodes->text_length != size ||
+                memcmp(json.nodes->text, want, size) != 0;
             parse_close();
         }
         for (code = 0xD800; code < 0xE000; code++) {
@@ -670,8 +672,9 @@ static void test_strings(void) {
         }
     }
     CHECK(!wrong);
-    CHECK(parse_open("{\"a\":1,\"b\":2,\"\\u0061\":3,\"aa\":4}", 31) && olat__find(&json, json.nodes, "a")->number > 2 &&
-          olat__find(&json, json.nodes, "b")->number < 3 && !olat__find(&json, json.nodes, "c")); /* the last one wins */
+    CHECK(parse_open("{\"a\":1,\"b\":2,\"\\u0061\":3,\"aa\":4}", 31)); /* the last one wins */
+    CHECK(olat__find(&json, json.nodes, "a")->number > 2 && olat__find(&json, json.nodes, "b")->number < 3);
+    CHECK(!olat__find(&json, json.nodes, "c"));
     parse_close();
     CHECK(live == 0);
 }
@@ -889,7 +892,8 @@ static void test_datasets(void) {
     CHECK(loads(TOP "{" LIGHT POSE ",\"w\":70,\"h\":50,\"camera_intrinsics\":[40,29.5,50,50]}]}", OLAT_NO_IMAGES) &&
         set.frames[0].camera.width == 70 && set.frames[0].camera.height == 50);
     olat_free(&set);
-    CHECK(loads(TOP "{\"pl_pos\":[4,5,6]," FILE_A LIGHT POSE "}]}", 0) && near_all(set.frames->light.position, light, 3));
+    CHECK(loads(TOP "{\"pl_pos\":[4,5,6]," FILE_A LIGHT POSE "}]}", 0) &&
+        near_all(set.frames->light.position, light, 3));
     olat_free(&set); /* of two such keys the last one */
     CHECK(loads(TOP "{\"file_path\":\"../t_olat_files/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
     olat_free(&set);
@@ -939,18 +943,23 @@ static int lens_loads(const char *key, const char *value) {
 
 static void test_lenses(void) {
     static const char *const models[][2] = { /* 1: a pinhole's, when no coefficient says otherwise */
-        {"\"PINHOLE\"", "1"}, {"\"pinhole\"", "1"}, {"\"Simple_Pinhole\"", "1"}, {"\"perspective\"", "1"}, {"\"OPENCV\"", "1"},
+        {"\"PINHOLE\"", "1"}, {"\"pinhole\"", "1"}, {"\"Simple_Pinhole\"", "1"}, {"\"perspective\"", "1"},
+        {"\"OPENCV\"", "1"},
         {"\"FULL_OPENCV\"", "1"}, {"\"SIMPLE_RADIAL\"", "1"}, {"\"RADIAL\"", "1"}, {"null", "1"}, {"\"\"", "1"},
         {"\"OPENCV_FISHEYE\"", "OPENCV_FISHEYE: distorted"}, {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: distorted"},
-        {"\"equirectangular\"", "equirectangular: distorted"}, {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
-        {"\"SPHERICAL\"", "SPHERICAL: distorted"}, {"\"pinhol\"", "pinhol: distorted"}, {"\"pinholes\"", "pinholes: distorted"},
+        {"\"equirectangular\"", "equirectangular: distorted"},
+        {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
+        {"\"SPHERICAL\"", "SPHERICAL: distorted"}, {"\"pinhol\"", "pinhol: distorted"},
+        {"\"pinholes\"", "pinholes: distorted"},
         {"7", "distorted"}, {"true", "true: distorted"}, {"{\"type\":\"a\"}", "distorted"}};
     static const char *const values[][2] = {
-        {"0", "1"}, {"-0.0", "1"}, {"null", "1"}, {"false", "1"}, {"[]", "1"}, {"[0,0.0,[false,null]]", "1"}, {"{\"a\":0}", "1"},
+        {"0", "1"}, {"-0.0", "1"}, {"null", "1"}, {"false", "1"}, {"[]", "1"}, {"[0,0.0,[false,null]]", "1"},
+        {"{\"a\":0}", "1"},
         {"1e-9", "distorted"}, {"-0.1", "distorted"}, {"true", "true: distorted"}, {"[0,0,0,1e-300]", "distorted"},
         {"{\"a\":[0,-1]}", "distorted"}, {"\"0.1\"", "0.1: distorted"},
         {"\"opencv\"", "opencv: distorted"}};
-    static const char *const others[] = {"is_fisheye", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1", "ftheta_p2", "ftheta_p3",
+    static const char *const others[] = {"is_fisheye", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1", "ftheta_p2",
+        "ftheta_p3",
         "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
     const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
     char key[8];
@@ -959,7 +968,8 @@ static void test_lenses(void) {
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "", of_x, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_y\":50,", "", of_x, 50));
-    CHECK(lens_is("\"fl_y\":51,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, 51) && lens_is("\"fl_x\":50,", "", 50, 50));
+    CHECK(lens_is("\"fl_y\":51,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, 51) &&
+        lens_is("\"fl_x\":50,", "", 50, 50));
     CHECK(lens_is("\"fl_y\":51,", "", 51, 51) && lens_is("\"camera_angle_x\":1,\"fl_y\":51,", "", of_x, 51));
     CHECK(lens_is("\"fl_x\":50,\"fl_y\":51,", "\"camera_angle_x\":1,", of_x, of_x));
     CHECK(lens_is("\"fl_x\":50,", "\"camera_angle_y\":0.8,", of_y, of_y));
@@ -967,7 +977,8 @@ static void test_lenses(void) {
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"camera_intrinsics\":[1,2,50,51],", 50, 51));
     CHECK(lens_is("\"camera_intrinsics\":[1,2,50,51],", "\"camera_angle_x\":1,\"camera_angle_y\":0.8,", of_x, of_y));
     CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"frames\":[" FRAME "]}", 0) && set.count == 1 &&
-          fabs((double)set.frames->camera.fx - 3 / tan(0.5)) < 1e-5 && fabs((double)set.frames->camera.fy - 2 / tan(0.4)) < 1e-5);
+          fabs((double)set.frames->camera.fx - 3 / tan(0.5)) < 1e-5 &&
+          fabs((double)set.frames->camera.fy - 2 / tan(0.4)) < 1e-5);
     CHECK(!strcmp(set.notes, "pixels of 1 of the 1 frames are not square, by camera_angle_x and camera_angle_y"));
     olat_free(&set);
     CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.7,\"fl_x\":5,\"frames\":[" FRAME "]}", 0) && !set.notes[0]);
@@ -1003,7 +1014,8 @@ static void test_rounding(void) {
             axes[i] = floor(axes[i] * 1000 + 0.5) / 1000;
         }
         snprintf(text, sizeof text, TOP "{\"pl_dir\":[0.267,-0.535,0.802],\"transform_matrix\":[[%.3f,%.3f,%.3f,0],"
-                 "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}", axes[0], axes[1], axes[2], axes[3], axes[4], axes[5], axes[6],
+                 "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}", axes[0], axes[1], axes[2], axes[3], axes[4], axes[5],
+                 axes[6],
                  axes[7], axes[8]);
         if (!CHECK(loads(text, OLAT_NO_IMAGES))) continue;
         for (i = 0; i < 3; i++)
@@ -1018,8 +1030,10 @@ static void test_rounding(void) {
     CHECK(worst < 1e-6);
     CHECK(loads(TOP "{" LIGHT "\"transform_matrix\":[[1,0.0045,0,0],[0,1.001,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES));
     olat_free(&set);
-    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
-    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}", OLAT_NO_IMAGES, "not a rotation"));
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES,
+        "not a rotation"));
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}", OLAT_NO_IMAGES,
+        "not a rotation"));
     CHECK(loads(TOP "{\"pl_dir\":[0,0.6,0.792]," POSE "}]}", OLAT_NO_IMAGES));
     CHECK(set.count == 1 && fabs((double)set.frames->light.position[2] - 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
     olat_free(&set);
@@ -1069,11 +1083,13 @@ static int photo_is(const picture *p, double gamma) {
             expected(p, x, y, rgba);
             for (c = 0; c < 4; c++) {
                 const size_t i = 4 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c;
-                const double got = olat__sample(frame->pixels, frame->format, i), linear = pow(rgba[c] / top, 1e5 / gamma);
+                const double got = olat__sample(frame->pixels, frame->format, i),
+                    linear = pow(rgba[c] / top, 1e5 / gamma);
                 wrong |= olat__sample(stored, format, i) != rgba[c];
                 if (gamma <= 0) wrong |= (unsigned)got != rgba[c];
                 else if (c == 3) wrong |= fabs(got * top - 65535.0 * rgba[c]) > 0;
-                else wrong |= fabs(got - 65535 * (linear > 0.0031308 ? 1.055 * pow(linear, 1 / 2.4) - 0.055 : 12.92 * linear)) > 0.5001;
+                else wrong |= fabs(got - 65535 * (linear > 0.0031308 ? 1.055 * pow(linear, 1 / 2.4) - 0.055 :
+                    12.92 * linear)) > 0.5001;
             }
         }
     meter_free(stored);
@@ -1083,7 +1099,8 @@ static int photo_is(const picture *p, double gamma) {
 }
 
 static void test_curves(void) {
-    static const int kinds[4][2] = {{6, 8}, {6, 16}, {3, 8}, {0, 2}}, gammas[8] = {100000, 55555, 220000, 16, 39999, 50001, 20000,
+    static const int kinds[4][2] = {{6, 8}, {6, 16}, {3, 8}, {0, 2}},
+        gammas[8] = {100000, 55555, 220000, 16, 39999, 50001, 20000,
         625000000};
     static const unsigned char linear[4] = {1, 8, 0, 1}, curved[4] = {1, 13, 0, 1}, intent[4] = {0, 0, 0, 0};
     static const picture rgba = {9, 7, 6, 8, 0, 0};
@@ -1106,7 +1123,8 @@ static void test_curves(void) {
         olat__put_be32(gama, 100000);
         encode(&p), insert_chunk(33, "cICP", linear, 4, 0);
         CHECK(photo_is(&p, 100000));
-        encode(&p), insert_chunk(33, "cICP", linear, 4, 0), insert_chunk(33, "sRGB", intent, 1, 0), insert_chunk(33, "gAMA", plain, 4, 0);
+        encode(&p), insert_chunk(33, "cICP", linear, 4, 0), insert_chunk(33, "sRGB", intent, 1, 0),
+            insert_chunk(33, "gAMA", plain, 4, 0);
         CHECK(photo_is(&p, 100000)); /* cICP knows more */
         for (g = 0; g < 20; g++) {
             const unsigned char transfer[4] = {1, (unsigned char)g, 0, 1};
@@ -1119,12 +1137,14 @@ static void test_curves(void) {
             encode(&p), insert_chunk(33, g ? "sRGB" : "gAMA", g ? intent : gama, g ? 1 : 4, 0);
             insert_chunk(33, g ? "gAMA" : "sRGB", g ? gama : intent, g ? 4 : 1, 0);
             CHECK(photo_is(&p, 0));
-            encode(&p), insert_chunk(33, g ? "iCCP" : "gAMA", gama, 4, 0), insert_chunk(33, g ? "gAMA" : "iCCP", gama, 4, 0);
+            encode(&p), insert_chunk(33, g ? "iCCP" : "gAMA", gama, 4, 0),
+                insert_chunk(33, g ? "gAMA" : "iCCP", gama, 4, 0);
             CHECK(photo_is(&p, 0));
             encode(&p), insert_chunk(33, g ? "cICP" : "gAMA", g ? curved : gama, 4, 0);
             insert_chunk(33, g ? "gAMA" : "cICP", g ? gama : curved, 4, 0);
             CHECK(photo_is(&p, 0));
-            encode(&p), insert_chunk(33, "gAMA", g ? plain : gama, 4, 0), insert_chunk(33, "gAMA", g ? gama : plain, 4, 0);
+            encode(&p), insert_chunk(33, "gAMA", g ? plain : gama, 4, 0),
+                insert_chunk(33, "gAMA", g ? gama : plain, 4, 0);
             CHECK(photo_is(&p, g ? 100000 : 0)); /* the first one */
         }
         encode(&p), insert_chunk(33, "gAMA", gama, 4, 0), insert_chunk(33, "sRGB", intent, 1, 1);
@@ -1149,7 +1169,8 @@ static void test_curves(void) {
     if (CHECK(loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}," FRAME "]}", 0)))
         CHECK(!strcmp(set.notes, "1 of the 2 photographs is linear (gAMA 1): converted to the sRGB curve"));
     olat_free(&set);
-    CHECK(loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}]}", OLAT_NO_IMAGES) && !set.notes[0]);
+    CHECK(loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
+        !set.notes[0]);
     olat_free(&set);
 }
 
@@ -1158,9 +1179,12 @@ static void test_masks(void) {
         {9, 7, 3, 8, 0, 1}, {9, 7, 0, 1, 0, 0}};
     static const picture photos[3] = {{9, 7, 6, 8, 0, 0}, {9, 7, 6, 16, 0, 0}, {9, 7, 2, 8, 0, 0}};
     static const char *const bad[][2] = {
-        {",\"mask_path\":\"none\"", "none.png: cannot be opened: "}, {",\"mask_path\":\"../m\"", "mask_path: the path leaves"},
-        {",\"mask_path\":7", "mask_path: a string"}, {",\"mask_path\":\"a\"", "a.png: the mask has 6 x 4 pixels, its photograph 9 x 7"},
-        {",\"mask_path\":\"m.jpg\"", "m.jpg: JPEG images cannot be read"}, {",\"mask_path\":\"broken.png\"", "broken.png: byte 0"},
+        {",\"mask_path\":\"none\"", "none.png: cannot be opened: "},
+        {",\"mask_path\":\"../m\"", "mask_path: the path leaves"},
+        {",\"mask_path\":7", "mask_path: a string"},
+        {",\"mask_path\":\"a\"", "a.png: the mask has 6 x 4 pixels, its photograph 9 x 7"},
+        {",\"mask_path\":\"m.jpg\"", "m.jpg: JPEG images cannot be read"},
+        {",\"mask_path\":\"broken.png\"", "broken.png: byte 0"},
         {",\"mask_path\":\"\"", "mask_path: the path is empty"}};
     char text[1200];
     size_t i;
@@ -1183,8 +1207,10 @@ static void test_masks(void) {
                     most = of_mask[0] > of_mask[1] ? of_mask[0] : of_mask[1];
                     if (of_mask[2] > most) most = of_mask[2];
                     for (c = 0; c < 4; c++) {
-                        const double got = olat__sample(set.frames->pixels, set.frames->format, (size_t)(4 * (9 * y + x) + c));
-                        wrong |= fabs(got - (c < 3 ? of_photo[c] : of_photo[3] * (most / top) * (of_mask[3] / top))) > (c < 3 ? 0 : 0.5001);
+                        const double got = olat__sample(set.frames->pixels, set.frames->format,
+                            (size_t)(4 * (9 * y + x) + c));
+                        wrong |= fabs(got - (c < 3 ? of_photo[c] :
+                            of_photo[3] * (most / top) * (of_mask[3] / top))) > (c < 3 ? 0 : 0.5001);
                     }
                 }
             olat_free(&set);
@@ -1205,15 +1231,19 @@ static void test_masks(void) {
 
 /* Other kinds of image, by their names and by their first bytes. */
 static void test_kinds_of_image(void) {
-    static const char *const names[][2] = {{".jpg", "JPEG"}, {".JPG", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".WebP", "WebP"},
-        {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".TIFF", "TIFF"}, {".bmp", "BMP"}, {".gif", "GIF"},
+    static const char *const names[][2] = {{".jpg", "JPEG"}, {".JPG", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"},
+        {".WebP", "WebP"},
+        {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".TIFF", "TIFF"}, {".bmp", "BMP"},
+        {".gif", "GIF"},
         {".heic", "HEIC"}, {".avif", "AVIF"}, {".dng", "DNG"}, {".ppm", "PPM"}};
     static const struct { const char *bytes; size_t size; const char *message; } files[] = {
         {"\xFF\xD8\xFF\xE0\0\x10JFIF", 10, "byte 0: this is a JPEG file"}, {"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
-        {"GIF89a\1\2", 8, "a GIF file"}, {"II*\0\1\2", 6, "a TIFF file"}, {"MM\0*\1\2", 6, "a TIFF file"}, {"BM\1\2", 4, "a BMP file"},
+        {"GIF89a\1\2", 8, "a GIF file"}, {"II*\0\1\2", 6, "a TIFF file"}, {"MM\0*\1\2", 6, "a TIFF file"},
+        {"BM\1\2", 4, "a BMP file"},
         {"\x76\x2F\x31\x01\2", 5, "an OpenEXR file"}, {"\0\0\0\x20" "ftypavif", 12, "a HEIC or AVIF file"},
         {"version https://git-lfs.github.com/spec/v1\n", 43, "Git LFS pointer, not the image itself: run git lfs pull"},
-        {"\xFF\xD8", 2, "this is not a PNG file"}, {"version https://git-lf", 22, "not a PNG file"}, {"", 0, "not a PNG file"},
+        {"\xFF\xD8", 2, "this is not a PNG file"}, {"version https://git-lf", 22, "not a PNG file"},
+        {"", 0, "not a PNG file"},
         {"B", 1, "not a PNG file"}, {"RIFF\1\2\3\4WEB", 11, "not a PNG file"}};
     static const picture converted = {6, 4, 2, 8, 0, 0};
     char text[1200], wanted[200];
@@ -1239,7 +1269,8 @@ static void test_kinds_of_image(void) {
         memcpy(file, files[i].bytes, file_size = files[i].size);
         CHECK(refused_with(files[i].message));
         write_bytes(FOLDER "/odd.png");
-        CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0, files[i].message) && strstr(error, "odd.png: byte 0: "));
+        CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0, files[i].message) &&
+            strstr(error, "odd.png: byte 0: "));
     }
     CHECK(live == 0);
 }
@@ -1254,14 +1285,17 @@ static void write_place(const char *name, const double place[3], int refined, do
     fprintf(stream, "{\"camera_angle_x\":1.0,\"frames\":[");
     for (i = 0; i < 12; i++) {
         const double a = 0.5 * i, z = 0.6, eye[3] = {2 * cos(a) * size, 2 * sin(a) * size, (0.1 * i - 0.3) * size};
-        const double axes[3][3] = {{-sin(a), cos(a), 0}, {-z * cos(a), -z * sin(a), 0.8}, {0.8 * cos(a), 0.8 * sin(a), z}};
+        const double axes[3][3] = {{-sin(a), cos(a), 0}, {-z * cos(a), -z * sin(a), 0.8},
+            {0.8 * cos(a), 0.8 * sin(a), z}};
         fprintf(stream, "%s{\"pl_intensity\":2,", i ? ",\n" : "");
         if (i == 5) fprintf(stream, "\"pl_dir\":[0,0.6,0.8]");
-        else fprintf(stream, "\"pl_pos\":[%.17g,%.17g,%.17g]", place[0] + eye[1], place[1] - eye[0], place[2] + 0.3 * size);
+        else fprintf(stream, "\"pl_pos\":[%.17g,%.17g,%.17g]", place[0] + eye[1], place[1] - eye[0],
+            place[2] + 0.3 * size);
         fprintf(stream, ",\"%s\":[", refined ? "R_opt" : "transform_matrix");
         for (k = 0; k < 3; k++) { /* a camera's axes are columns; R_opt has y down and z forward */
             fprintf(stream, "%s[", k ? "," : "");
-            for (m = 0; m < 3; m++) fprintf(stream, "%.17g%s", m && refined ? -axes[m][k] : axes[m][k], m < 2 ? "," : "");
+            for (m = 0; m < 3; m++)
+                fprintf(stream, "%.17g%s", m && refined ? -axes[m][k] : axes[m][k], m < 2 ? "," : "");
             if (!refined) fprintf(stream, ",%.17g", place[k] + eye[k]);
             fprintf(stream, "]");
         }
@@ -1292,7 +1326,8 @@ static double apart(const olat_dataset *a, const olat_dataset *b) {
 }
 
 static void test_far_places(void) {
-    static const double places[6][3] = {{5e5, 6.5e5, 5e4}, {5e6, -5e6, 5e6}, {0, 0, 2e4}, {-123456.789, 0.25, 7}, {0, 0, 0}, {90, 0, 0}};
+    static const double places[6][3] = {{5e5, 6.5e5, 5e4}, {5e6, -5e6, 5e6}, {0, 0, 2e4}, {-123456.789, 0.25, 7},
+        {0, 0, 0}, {90, 0, 0}};
     static const double zero[3] = {0, 0, 0};
     olat_dataset there, again, nearby;
     char wanted[200];
@@ -1310,8 +1345,10 @@ static void test_far_places(void) {
                 if (i >= 4) offset[k] = -places[i][k];
             }
             CHECK(!olat_load_at(FOLDER, "near.json", OLAT_NO_IMAGES, offset, &nearby, error));
-            if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4))) printf("    %d, %d: %g\n", i, refined, apart(&there, &nearby));
-            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %g, %g, %g", there.origin[0], there.origin[1],
+            if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4))) printf("    %d, %d: %g\n", i, refined,
+                apart(&there, &nearby));
+            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %g, %g, %g", there.origin[0],
+                there.origin[1],
                      there.origin[2]);
             CHECK(!strcmp(there.notes, i < 4 ? wanted : ""));
             CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &there, error));
@@ -1328,9 +1365,11 @@ static void test_far_places(void) {
     CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error) && there.origin[0] > 4e6);
     olat_free(&there);
     write_place(FOLDER "/there.json", places[1], 0, 1e5);
-    CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error) && fabs(there.origin[0]) <= 0 && !there.notes[0]);
+    CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error) && fabs(there.origin[0]) <= 0 &&
+        !there.notes[0]);
     olat_free(&there);
-    CHECK(loads(TOP "{\"pl_dir\":[0,0,1]," POSE "},{\"pl_dir\":[0,0,1]," POSE "}]}", OLAT_NO_IMAGES) && fabs(set.origin[2]) <= 0);
+    CHECK(loads(TOP "{\"pl_dir\":[0,0,1]," POSE "},{\"pl_dir\":[0,0,1]," POSE "}]}", OLAT_NO_IMAGES) &&
+        fabs(set.origin[2]) <= 0);
     olat_free(&set); /* a camera that stands still does not tell how large the scene is */
     CHECK(live == 0);
 }
@@ -1344,7 +1383,8 @@ static void test_saved_digits(void) {
     size_t size;
     int i, k;
     write_place(FOLDER "/there.json", place, 0, 1);
-    CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &set, error) && !olat_save(FOLDER "/saved.json", FOLDER, &set, error));
+    CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &set, error) &&
+        !olat_save(FOLDER "/saved.json", FOLDER, &set, error));
     if (!CHECK(!olat__read_file(FOLDER "/saved.json", &text, &size, error) && parse_open((char *)text, size))) return;
     frame = &json.nodes[olat__find(&json, json.nodes, "frames")->child];
     for (i = 0; i < set.count; i++, frame = &json.nodes[frame->next]) {
@@ -1432,8 +1472,10 @@ static void drop_guard(void) {
 }
 
 static void test_guard(void) {
-    static const char *const names[] = {"in/a.png", "in/b.png", "in/c.png", "in/m.png", "out/old.png", "in/set.json", "in/bad.json"};
-    static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png", GUARD "/later/b/new.png"};
+    static const char *const names[] = {"in/a.png", "in/b.png", "in/c.png", "in/m.png", "out/old.png", "in/set.json",
+        "in/bad.json"};
+    static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png",
+        GUARD "/later/b/new.png"};
     char path[600], other[200];
     size_t i;
     int k, done;
@@ -1447,19 +1489,24 @@ static void test_guard(void) {
     CHECK(!link(GUARD "/in/a.png", GUARD "/hard.png") && !symlink("in/a.png", GUARD "/soft.png") &&
           !symlink("in", GUARD "/folder") && !symlink("nothing", GUARD "/loose.png"));
 
-    CHECK(!olat_guard_input(&guard, GUARD "/in/a.png", error) && !olat_guard_input(&guard, GUARD "/in/none.png", error));
+    CHECK(!olat_guard_input(&guard, GUARD "/in/a.png", error) &&
+        !olat_guard_input(&guard, GUARD "/in/none.png", error));
     CHECK(!olat_guard_input(&guard, GUARD "/./in/a.png", error) && guard.count == 2); /* an input may be named twice */
     CHECK(replaces(GUARD "/in/a.png", GUARD "/in/a.png") && replaces(GUARD "/./in//./a.png", GUARD "/in/a.png"));
     CHECK(replaces(GUARD "/out/../in/a.png", GUARD "/in/a.png") && replaces(GUARD "/hard.png", GUARD "/in/a.png"));
     CHECK(replaces(GUARD "/soft.png", GUARD "/in/a.png") && replaces(GUARD "/folder/a.png", GUARD "/in/a.png"));
-    CHECK(replaces(GUARD "/in/none.png", GUARD "/in/none.png") && replaces(GUARD "/folder/./NONE.png", GUARD "/in/none.png"));
-    CHECK(!*output(GUARD "/in/b.png") && !*output(GUARD "/in/other.png") && !*output(GUARD "/none.png") && !*output(GUARD "/out/a.png"));
+    CHECK(replaces(GUARD "/in/none.png", GUARD "/in/none.png") &&
+        replaces(GUARD "/folder/./NONE.png", GUARD "/in/none.png"));
+    CHECK(!*output(GUARD "/in/b.png") && !*output(GUARD "/in/other.png") && !*output(GUARD "/none.png") &&
+        !*output(GUARD "/out/a.png"));
     drop_guard();
 
     for (i = 0; i < sizeof outputs / sizeof *outputs; i++) { /* twice, in whatever letters */
         CHECK(!*output(outputs[i]));
-        snprintf(other, sizeof other, "%.*s/./%s", (int)(strrchr(outputs[i], '/') - outputs[i]), outputs[i], strrchr(outputs[i], '/') + 1);
-        snprintf(path, sizeof path, "%s: would be written twice, also as %s: give the outputs different names", other, outputs[i]);
+        snprintf(other, sizeof other, "%.*s/./%s", (int)(strrchr(outputs[i], '/') - outputs[i]), outputs[i],
+            strrchr(outputs[i], '/') + 1);
+        snprintf(path, sizeof path, "%s: would be written twice, also as %s: give the outputs different names",
+            other, outputs[i]);
         CHECK(!strcmp(output(other), path));
         strcpy(strrchr(other, '/') + 1, i == 1 ? "OLD.PNG" : "New.Png");
         CHECK(strstr(output(other), "twice"));
@@ -1477,20 +1524,25 @@ static void test_guard(void) {
     write_text(GUARD "/in/set.json", "{\"frames\":[{\"file_path\":\"./a\",\"mask_path\":\"m\"},{\"file_path\":7},1,"
                "{\"file_path\":\"b.png\"},{\"img_path\":\"..\\\\out\\\\old.png\",\"mask_path\":\"gone\"}]}");
     write_text(GUARD "/in/bad.json", "{\"frames\":[{\"file_path\":\"c\"}]");
-    CHECK(!olat_guard_folder(&guard, GUARD "/in", "set.json", error) && !olat_guard_folder(&guard, GUARD "/in", "bad.json", error));
-    CHECK(!olat_guard_folder(&guard, GUARD "/in", "missing.json", error) && !olat_guard_folder(&guard, GUARD "/in", "a.png", error));
+    CHECK(!olat_guard_folder(&guard, GUARD "/in", "set.json", error) &&
+        !olat_guard_folder(&guard, GUARD "/in", "bad.json", error));
+    CHECK(!olat_guard_folder(&guard, GUARD "/in", "missing.json", error) &&
+        !olat_guard_folder(&guard, GUARD "/in", "a.png", error));
     CHECK(replaces(GUARD "/folder/a.png", GUARD "/in/./a.png") && replaces(GUARD "/in/b.png", GUARD "/in/b.png"));
     CHECK(replaces(GUARD "/in/m.png", GUARD "/in/m.png") && replaces(GUARD "/out/old.png", GUARD "/in/../out/old.png"));
     CHECK(replaces(GUARD "/in/gone.png", GUARD "/in/gone.png") && replaces(GUARD "/in/set.json", GUARD "/in/set.json"));
-    CHECK(replaces(GUARD "/in/bad.json", GUARD "/in/bad.json") && replaces(GUARD "/in/missing.json", GUARD "/in/missing.json"));
+    CHECK(replaces(GUARD "/in/bad.json", GUARD "/in/bad.json") &&
+        replaces(GUARD "/in/missing.json", GUARD "/in/missing.json"));
     CHECK(!*output(GUARD "/in/c.png"));
     drop_guard();
 
     for (n = 1, done = 0; !done && n < 100; n++) { /* memory fails at every place */
         calls = 0, fail_at = n;
         memset(error, 0, sizeof error);
-        done = !olat_guard_folder(&guard, GUARD "/in", "set.json", error) && !olat_guard_input(&guard, GUARD "/in/c.png", error) &&
-            !olat_guard_output(&guard, GUARD "/out/new.png", error) && !olat_guard_output(&guard, GUARD "/out/new2.png", error);
+        done = !olat_guard_folder(&guard, GUARD "/in", "set.json", error) &&
+            !olat_guard_input(&guard, GUARD "/in/c.png", error) &&
+            !olat_guard_output(&guard, GUARD "/out/new.png", error) &&
+            !olat_guard_output(&guard, GUARD "/out/new2.png", error);
         CHECK(done || strstr(error, "out of memory"));
         drop_guard();
     }

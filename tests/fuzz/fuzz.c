@@ -642,7 +642,8 @@ static void parse_string(const char *text, size_t size, const unsigned char *wan
     if (length >= 0) {
         const olat__node *value = j.nodes;
         long i, n;
-        HOLDS(value->type == OLAT__STRING && value->text_length == (size_t)length && !memcmp(value->text, want, (size_t)length));
+        HOLDS(value->type == OLAT__STRING && value->text_length == (size_t)length &&
+            !memcmp(value->text, want, (size_t)length));
         for (i = 0; i < length; i += n) HOLDS((n = olat__utf8_length(value->text + i)) > 0);
         if (strlen(value->text) == (size_t)length) {
             w.size = 0;
@@ -669,7 +670,8 @@ static void fuzz_json_string(const unsigned char *data, size_t size) {
     text[1 + size] = '"';
     parse_string(text, size + 2, want, string_value((unsigned char *)text, (unsigned char *)text + size + 2, want));
     for (at = 0; at + 3 <= size; at += 3) {
-        const unsigned bits = (unsigned)data[at] << 16 | (unsigned)data[at + 1] << 8 | data[at + 2], code = bits & 0x1FFFFF;
+        const unsigned bits = (unsigned)data[at] << 16 | (unsigned)data[at + 1] << 8 | data[at + 2],
+            code = bits & 0x1FFFFF;
         if (!(bits >> 22) && code < 0x80 && code > 31 && code != '"' && code != '\\') text[used++] = (char)code;
         else if (!(bits >> 22) && code >= 0x80 && code < 0x800) { /* raw, whatever it is */
             text[used++] = (char)(unsigned char)(192 + code / 64);
