@@ -1061,7 +1061,7 @@ static void test_datasets(void) {
         {HEAD "{\"file_path\":\"", "a", 65536, "\"," POSE "]}", "too long"},
         {HEAD "{\"file_path\":\"zero\",", "", 0, POSE "]}", "not a regular file"},
         {HEAD "{\"file_path\":\"self\",", "", 0, POSE "]}", "self.png"},
-        {"\377\376{", "", 1, "}", "value"}, {HEAD "\r\n{\"file_path\"\r\n:\"a\",", "\r\n", 1000, POSE "]}\r\n", NULL}
+        {"\377\376{", "", 1, "}", "UTF-16"}, {HEAD "\r\n{\"file_path\"\r\n:\"a\",", "\r\n", 1000, POSE "]}\r\n", NULL}
     };
     static const unsigned char empty[12] = {0, 0, 0, 0, 'I', 'D', 'A', 'T', 0x35, 0xAF, 0x06, 0x1E};
     enum { CHUNKS = 100000 };
