@@ -702,6 +702,9 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
    refused, but for the photos' pixels, which are not looked at. ERR_NONFINITE as on saving a model. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
+/* How far the run of a checkpoint had come, which tells whether it may be replaced. ERR_IO without a file, ERR_FORMAT where it is
+   no checkpoint or that of another version. */
+SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration);
 #endif
 
 /* Renders a photograph's camera and light, with the exact options, and compares. image (h,w,3, stored values) may be NULL.
@@ -1217,6 +1220,30 @@ static int ssdgs__finite(ssdgs_real x) {
 
 #define SSDGS__MESSAGE 512
 
+/* Values that several threads read and write. Compilers without atomic operations neither wait for a value nor exclude each other. */
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
+#define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
+#define SSDGS__EXCHANGE(p, value) __atomic_exchange_n(p, value, __ATOMIC_ACQ_REL)
+#if SSDGS__X86
+#define SSDGS__PAUSE() __builtin_ia32_pause()
+#else
+#define SSDGS__PAUSE() ((void)0)
+#endif
+#else
+#define SSDGS__GLANCE(p) (*(p))
+#define SSDGS__PUBLISH(p, value) (*(p) = (value))
+static int ssdgs__exchange(volatile int *p, int value) {
+    const int old = *p;
+    *p = value;
+    return old;
+}
+#define SSDGS__EXCHANGE(p, value) ssdgs__exchange(p, value)
+#if defined(_MSC_VER)
+#define SSDGS__PAUSE() YieldProcessor()
+#endif
+#endif
+
 struct ssdgs_context {
     ssdgs_allocator allocator;
     ssdgs_logger logger;
@@ -1226,6 +1253,10 @@ struct ssdgs_context {
     struct ssdgs__pool *pool;
     struct ssdgs__frame_memory *frame; /* reused by every render on this context */
     int isa, threads, bf16;
+    int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes frees it */
+    volatile int busy; /* 1 while a call is at work */
+    int telling;       /* 1 while the log hears a message */
+    long process;      /* the one that made the threads: a fork has none of them */
     uint64_t revisions; /* handed out to models */
     const char *subject; /* what is being checked, for messages: a file's name, or the one of several things with its number */
     int subject_number; /* -1: it has none */
@@ -1297,6 +1328,13 @@ static void ssdgs__append_format(char *text, size_t *at, const char *format, va_
     }
 }
 
+static void ssdgs__tell(ssdgs_context *context, ssdgs_result code, const char *message) {
+    if (!context->logger.write || context->telling) return;
+    context->telling = 1;
+    context->logger.write(context->logger.user, code, message);
+    context->telling = 0;
+}
+
 /* Records what went wrong, tells the log, returns the code; without a context, that alone. */
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
@@ -1312,8 +1350,51 @@ static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const
     va_start(arguments, format);
     ssdgs__append_format(context->message, &at, format, arguments);
     va_end(arguments);
-    if (context->logger.write) context->logger.write(context->logger.user, code, context->message);
+    ssdgs__tell(context, code, context->message);
     return code;
+}
+
+static ssdgs_result ssdgs__null(ssdgs_context *context, const char *function, const char *argument) {
+    return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%s: %s is NULL", function, argument);
+}
+
+/* What is no failure, for the log alone. */
+static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
+    char text[SSDGS__MESSAGE] = "";
+    size_t at = 0;
+    va_list arguments;
+    va_start(arguments, format);
+    ssdgs__append_format(text, &at, format, arguments);
+    va_end(arguments);
+    ssdgs__tell(context, SSDGS_OK, text);
+}
+
+static void ssdgs__pool_forked(ssdgs_context *context);
+
+/* A call begins. It is refused while another is at work: one from a hook, a callback or a task, or on another thread. The log does
+   not hear of it, as the log may be who calls. */
+static ssdgs_result ssdgs__enter(ssdgs_context *context, const char *function) {
+    size_t at = 0;
+    ssdgs__pool_forked(context);
+    if (context->telling) return SSDGS_ERR_ARGUMENT; /* the message being told stays */
+    if (!SSDGS__EXCHANGE(&context->busy, 1)) return SSDGS_OK;
+    ssdgs__append(context->message, &at, function);
+    ssdgs__append(context->message, &at, ": another call on this context is at work, and a hook, a callback or a task must not make this one");
+    return SSDGS_ERR_ARGUMENT;
+}
+
+/* And ends. */
+static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
+    SSDGS__PUBLISH(&context->busy, 0);
+    return result;
+}
+
+static void ssdgs__context_drop(ssdgs_context *context);
+
+/* Ends one that took a reference first, as it may free all others; the context is busy until it is gone. */
+static void ssdgs__leave_and_drop(ssdgs_context *context) {
+    if (context->references > 1) SSDGS__PUBLISH(&context->busy, 0);
+    ssdgs__context_drop(context);
 }
 
 static int ssdgs__product_fits(size_t a, size_t b, size_t *product) {
@@ -1426,22 +1507,8 @@ static int ssdgs__cpu_count(void) {
 }
 #endif
 
-/* Looks at a value that another thread changes under the lock, to wait a little while before going to sleep: waking up takes
-   longer than many a stage. Without such a look there is no such wait. */
-#if defined(__GNUC__) && !defined(__TINYC__)
-#define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
-#define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
-#if SSDGS__X86
-#define SSDGS__PAUSE() __builtin_ia32_pause()
-#else
-#define SSDGS__PAUSE() ((void)0)
-#endif
-#elif defined(_MSC_VER)
-#define SSDGS__GLANCE(p) (*(p))
-#define SSDGS__PUBLISH(p, value) (*(p) = (value))
-#define SSDGS__PAUSE() YieldProcessor()
-#endif
-#ifdef SSDGS__GLANCE
+/* A thread waits a little while before it goes to sleep: waking up takes longer than many a stage. */
+#if defined(SSDGS__PAUSE)
 #define SSDGS__LINGER(pool, condition)                                        \
     do {                                                                      \
         int glances_ = (pool)->glances;                                       \
@@ -1450,8 +1517,6 @@ static int ssdgs__cpu_count(void) {
         ssdgs__lock(&(pool)->mutex);                                          \
     } while (0)
 #else
-#define SSDGS__GLANCE(p) (*(p))
-#define SSDGS__PUBLISH(p, value) (*(p) = (value))
 #define SSDGS__LINGER(pool, condition) ((void)0)
 #endif
 
@@ -1512,7 +1577,6 @@ static void ssdgs__pool_run(void *user, int count, ssdgs__task task, void *data)
 
 static void ssdgs__pool_destroy(const ssdgs_allocator *allocator, ssdgs__pool *pool) {
     int i;
-    if (!pool) return;
     ssdgs__lock(&pool->mutex);
     pool->stop = 1;
     SSDGS__PUBLISH(&pool->generation, pool->generation + 1); /* no worker lingers on */
@@ -1536,7 +1600,6 @@ static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int thr
         ssdgs__release_to(allocator, pool);
         return NULL;
     }
-    /* never seen to fail: leak nothing but the lock */
     if (!ssdgs__condition_create(&pool->start) || !ssdgs__condition_create(&pool->done)) {
         ssdgs__mutex_destroy(&pool->mutex);
         ssdgs__release_to(allocator, pool->threads);
@@ -1556,6 +1619,25 @@ static void ssdgs__serial_run(void *user, int count, ssdgs__task task, void *dat
     int i;
     (void)user;
     for (i = 0; i < count; i++) task(data, i);
+}
+
+static void ssdgs__context_serial(ssdgs_context *context) {
+    context->parallel.run = ssdgs__serial_run;
+    context->pool = NULL;
+    context->threads = 1;
+}
+
+/* In a process forked from the one that made the threads there are none, and locks may be held for ever: goes on without. */
+static void ssdgs__pool_forked(ssdgs_context *context) {
+#if !defined(SSDGS_NO_THREADS) && !defined(_WIN32)
+    if (!context->pool || context->process == (long)getpid()) return;
+    ssdgs__release_to(&context->allocator, context->pool->threads);
+    ssdgs__release_to(&context->allocator, context->pool);
+    ssdgs__context_serial(context);
+    SSDGS__PUBLISH(&context->busy, 0);
+#else
+    (void)context;
+#endif
 }
 
 static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
@@ -1681,10 +1763,11 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
         if (ssdgs__table(isa)) context->isa = isa;
     context->k = ssdgs__table(context->isa);
     context->bf16 = ssdgs__has_bf16(context->isa);
-    context->threads = 1;
+    context->references = 1;
     context->parallel = zero.parallel;
+    context->threads = 1;
     if (!context->parallel.run) {
-        context->parallel.run = ssdgs__serial_run;
+        ssdgs__context_serial(context);
 #ifndef SSDGS_NO_THREADS
         context->threads = zero.threads ? zero.threads : ssdgs__cpu_count();
         if (context->threads < 1) context->threads = 1;
@@ -1696,6 +1779,9 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
             }
             context->parallel.run = ssdgs__pool_run;
             context->parallel.user = context->pool;
+#ifndef _WIN32
+            context->process = (long)getpid();
+#endif
         }
 #endif
     }
@@ -1703,15 +1789,26 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     return SSDGS_OK;
 }
 
-SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
-    ssdgs_allocator allocator;
-    if (!context) return;
-    allocator = context->allocator;
+/* One that used the context is gone. */
+static void ssdgs__context_drop(ssdgs_context *context) {
+    const ssdgs_allocator allocator = context->allocator;
+    if (--context->references) return;
     ssdgs__frame_memory_destroy(context, context->frame);
-#ifndef SSDGS_NO_THREADS
-    ssdgs__pool_destroy(&allocator, context->pool);
-#endif
     ssdgs__release_to(&allocator, context);
+}
+
+SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
+    if (!context || ssdgs__enter(context, "ssdgs_context_destroy")) return;
+#ifndef SSDGS_NO_THREADS
+    if (context->pool) {
+        ssdgs__pool_destroy(&context->allocator, context->pool);
+        ssdgs__context_serial(context);
+    }
+#endif
+    if (context->references > 1)
+        ssdgs__note(context, "ssdgs_context_destroy: %d models or trainers are still there: the context goes with the last of them",
+                    context->references - 1);
+    ssdgs__leave_and_drop(context);
 }
 
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) { return context ? context->message : "no context"; }
@@ -1725,6 +1822,7 @@ struct ssdgs_model {
     ssdgs_settings settings;
     uint64_t revision;    /* another one whenever the model may have changed */
     uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must follow */
+    int references;       /* itself and its trainers: the last that goes frees it */
     int count;
     size_t capacity;      /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -1907,16 +2005,23 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
     }
 }
 
-SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+static void ssdgs__model_drop(ssdgs_model *model) {
+    ssdgs_context *context;
+    if (!model || --model->references) return;
+    context = model->context;
+    ssdgs__release(context, model->gaussians);
+    ssdgs__release(context, model->globals);
+    ssdgs__release(context, model);
+    ssdgs__context_drop(context);
+}
+
+static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+    const ssdgs_settings s = settings ? *settings : ssdgs_settings_default();
     ssdgs_model *model;
-    ssdgs_settings s;
     ssdgs_result result;
     size_t first[SSDGS__GLOBAL_GROUPS + 1], bytes;
     int i;
-    if (!out) return SSDGS_ERR_ARGUMENT;
-    *out = NULL;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    s = settings ? *settings : ssdgs_settings_default();
+    if (!out) return ssdgs__null(context, "ssdgs_model_create", "out");
     result = ssdgs__settings_check(context, &s);
     if (result) return result;
     if (count < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians", count);
@@ -1924,6 +2029,8 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
     if (!model) return SSDGS_ERR_MEMORY;
     model->context = context;
+    context->references++;
+    model->references = 1;
     model->settings = s;
     model->revision = ++context->revisions;
     ssdgs__global_groups(&s, first);
@@ -1933,7 +2040,7 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     if (model->globals && ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
         model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!model->gaussians) {
-        ssdgs_model_destroy(model);
+        ssdgs__model_drop(model);
         return SSDGS_ERR_MEMORY;
     }
     model->count = count;
@@ -1943,11 +2050,35 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
     return SSDGS_OK;
 }
 
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+    ssdgs_result result;
+    if (out) *out = NULL;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(context, "ssdgs_model_create");
+    return result ? result : ssdgs__leave(context, ssdgs__model_create(context, settings, count, out));
+}
+
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
-    if (!model) return;
-    ssdgs__release(model->context, model->gaussians);
-    ssdgs__release(model->context, model->globals);
-    ssdgs__release(model->context, model);
+    ssdgs_context *context;
+    if (!model || ssdgs__enter(model->context, "ssdgs_model_destroy")) return;
+    context = model->context;
+    if (model->references > 1) ssdgs__note(context, "ssdgs_model_destroy: a trainer still has the model, which goes with it");
+    context->references++;
+    ssdgs__model_drop(model);
+    ssdgs__leave_and_drop(context);
+}
+
+/* No frame and no file may hold networks or ASG that are not finite: all Gaussians share them. */
+static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
+    static const char *const names[SSDGS__GLOBAL_GROUPS] = {
+        "asg_basis", "asg_sharpness", "asg_sigma", "the scattering network", "the shadow network"};
+    size_t first[SSDGS__GLOBAL_GROUPS + 1], i;
+    int group;
+    if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
+    ssdgs__global_groups(&model->settings, first);
+    for (i = 0; ssdgs__finite(model->globals[i]); i++) {}
+    for (group = 0; i >= first[group + 1]; group++) {}
+    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %z of %s is not finite", i - first[group], names[group]);
 }
 
 static void ssdgs__model_changed(ssdgs_model *model) { model->revision = ++model->context->revisions; }
@@ -2028,11 +2159,10 @@ static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *ke
     }
 }
 
-SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
-    size_t count, bytes, i;
+static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
+    const size_t count = (size_t)model->count;
+    size_t bytes, i;
     uint64_t *keys;
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    count = (size_t)model->count;
     if (!ssdgs__product_fits(count + 1, sizeof *keys + sizeof(ssdgs_real), &bytes)) return SSDGS_ERR_MEMORY;
     keys = (uint64_t *)ssdgs__allocate(model->context, bytes);
     if (!keys) return SSDGS_ERR_MEMORY;
@@ -2043,6 +2173,13 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     ssdgs__model_changed(model);
     model->arrangement++;
     return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_model_sort");
+    return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
 }
 
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in no order, seldom in
@@ -2176,6 +2313,7 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     double e[3], f[3], u[3];
     int i;
     memset(&camera, 0, sizeof camera);
+    if (!eye || !target || !up) return camera;
     for (i = 0; i < 3; i++) {
         e[i] = (double)eye[i];
         f[i] = (double)target[i] - (double)eye[i];
@@ -2502,6 +2640,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     for (i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                 "the background is not finite");
+    if (m->kept.revision != model->revision) {
+        result = ssdgs__globals_check(model);
+        if (result) return result;
+    }
     frame->context = context;
     frame->model = model;
     frame->memory = m;
@@ -4519,18 +4661,16 @@ static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, s
     }
 }
 
-SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
-    ssdgs_context *context;
+static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                  const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
+    ssdgs_context *context = model->context;
     ssdgs_frame frame;
     ssdgs_result result;
     ssdgs_real *planes;
     size_t pixels, i;
     double done = 0, all = 0;
     int stride, c, x, y, finite = 1;
-    if (stats) memset(stats, 0, sizeof *stats);
-    if (!model || !camera || !image) return SSDGS_ERR_ARGUMENT;
-    context = model->context;
+    if (!camera || !image) return ssdgs__null(context, "ssdgs_render", camera ? "image" : "camera");
     result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
                                 image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
                                     image->depth, 0);
@@ -4589,6 +4729,15 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
                 }
     }
     return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
+    ssdgs_result result;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_render");
+    return result ? result : ssdgs__leave(model->context, ssdgs__render(model, camera, lights, light_count, options, image, stats));
 }
 
 SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
@@ -4919,15 +5068,15 @@ static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image,
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
-                                     int width, int height, ssdgs_metrics *metrics) {
+static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                   int width, int height, ssdgs_metrics *metrics) {
     ssdgs__buffer planes = {0, 0}, memory = {0, 0};
     ssdgs__loss_values values;
     ssdgs_result result;
     size_t pixels, i, c;
-    if (!context || !metrics) return SSDGS_ERR_ARGUMENT;
+    if (!metrics) return ssdgs__null(context, "ssdgs_compare", "metrics");
     memset(metrics, 0, sizeof *metrics);
-    if (!image || !reference) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: an image is NULL");
+    if (!image || !reference) return ssdgs__null(context, "ssdgs_compare", image ? "reference" : "image");
     if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
     pixels = (size_t)width * (size_t)height;
@@ -4950,6 +5099,15 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
     ssdgs__release(context, memory.memory);
     return result;
 }
+
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                     int width, int height, ssdgs_metrics *metrics) {
+    ssdgs_result result;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(context, "ssdgs_compare");
+    return result ? result : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
+}
+
 /* ==== >>ply  model files, files at large ==== */
 
 /* A model is one PLY file: element vertex with the Gaussians, then the settings, the ASG bases and the weights. One table of
@@ -5519,7 +5677,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
                                ssdgs__ply_kinds[kind], rows, expected);
         if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
     }
-    if (!result) result = ssdgs_model_create(ply->context, &settings, (int)vertex->count, out);
+    if (!result) result = ssdgs__model_create(ply->context, &settings, (int)vertex->count, out);
     for (kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind]) result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     return result;
@@ -5540,11 +5698,11 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
         ssdgs__release(context, ply);
     }
     if (!result && !(*out)->settings.baked && ssdgs__in_no_order(*out)) {
-        result = ssdgs_model_sort(*out);
+        result = ssdgs__model_sort(*out);
         own.sorted = 1;
     }
     if (result) {
-        ssdgs_model_destroy(*out);
+        ssdgs__model_drop(*out);
         *out = NULL;
         memset(&own, 0, sizeof own);
     }
@@ -5554,10 +5712,15 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
 
 SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out,
                                                ssdgs_load_stats *stats) {
+    ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
-    if (!context || !bytes || !out) return SSDGS_ERR_ARGUMENT;
-    return ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(context, "ssdgs_model_load_memory");
+    if (result) return result;
+    if (!bytes || !out) result = ssdgs__null(context, "ssdgs_model_load_memory", bytes ? "out" : "bytes");
+    else result = ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
+    return ssdgs__leave(context, result);
 }
 
 #ifndef SSDGS_NO_STDIO
@@ -5615,16 +5778,19 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
 }
 
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats) {
-    unsigned char *bytes;
+    unsigned char *bytes = NULL;
     size_t size;
     ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
-    if (!context || !path || !out) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__read_file(context, path, &bytes, &size);
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(context, "ssdgs_model_load");
+    if (result) return result;
+    if (!path || !out) result = ssdgs__null(context, "ssdgs_model_load", path ? "out" : "path");
+    else result = ssdgs__read_file(context, path, &bytes, &size);
     if (!result) result = ssdgs__ply_load(context, path, bytes, size, out, stats);
     ssdgs__release(context, bytes);
-    return result;
+    return ssdgs__leave(context, result);
 }
 
 /* ---- writing ---- */
@@ -5786,20 +5952,22 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
     }
 }
 
-/* No file may hold networks or ASG that loading would refuse. */
 static ssdgs_result ssdgs__savable(const ssdgs_model *model, const char *path) {
-    if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
-    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
-                       "%s: not written, a parameter of the networks or the ASG is not finite", path);
+    ssdgs_result result;
+    model->context->subject = path;
+    model->context->subject_number = -1;
+    result = ssdgs__globals_check(model);
+    model->context->subject = NULL;
+    return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
+static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path) {
     size_t rows[SSDGS__PLY_KINDS], row;
     char line[128];
     ssdgs__writer writer;
     ssdgs__ply_cursor cursor;
     int kind;
-    if (!model || !path) return SSDGS_ERR_ARGUMENT;
+    if (!path) return ssdgs__null(model->context, "ssdgs_model_save", "path");
     if (ssdgs__savable(model, path)) return SSDGS_ERR_NONFINITE;
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
@@ -5817,6 +5985,13 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
         for (row = 0; row < rows[kind] && !writer.result; row++) ssdgs__ply_write_row(model, kind, row, &writer);
     return ssdgs__writer_close(&writer);
 }
+
+SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_model_save");
+    return result ? result : ssdgs__leave(model->context, ssdgs__model_save(model, path));
+}
 #endif /* SSDGS_NO_STDIO */
 
 #ifndef SSDGS_NO_TRAINER
@@ -5828,18 +6003,6 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotat
     "specular colour",
     "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma",
         "scattering network", "shadow network"};
-
-/* What is no failure, for the log alone. */
-static void ssdgs__note(const ssdgs_context *context, const char *format, ...) {
-    char text[SSDGS__MESSAGE] = "";
-    size_t at = 0;
-    va_list arguments;
-    if (!context->logger.write) return;
-    va_start(arguments, format);
-    ssdgs__append_format(text, &at, format, arguments);
-    va_end(arguments);
-    context->logger.write(context->logger.user, SSDGS_OK, text);
-}
 
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
 typedef struct ssdgs__correction {
@@ -5871,6 +6034,7 @@ struct ssdgs_trainer {
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
+    int running;              /* in ssdgs_trainer_run() */
 };
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
@@ -6886,10 +7050,9 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     return result;
 }
 
-SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
-    ssdgs_context *context;
-    if (!trainer) return;
-    context = trainer->context;
+static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
+    ssdgs_context *context = trainer->context;
+    ssdgs__model_drop(trainer->model);
     ssdgs__release(context, trainer->photos);
     ssdgs__release(context, trainer->corrections);
     ssdgs__release(context, trainer->transparent);
@@ -6901,6 +7064,17 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
     ssdgs__release(context, trainer->global_square);
     ssdgs__release(context, trainer->screen_gradient);
     ssdgs__release(context, trainer);
+    ssdgs__context_drop(context);
+}
+
+SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
+    ssdgs_context *context;
+    if (!trainer || ssdgs__enter(trainer->context, "ssdgs_trainer_destroy")) return;
+    context = trainer->context;
+    context->references++;
+    if (!trainer->running) ssdgs__trainer_drop(trainer);
+    else ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_trainer_destroy: the trainer runs, its progress callback must not destroy it");
+    ssdgs__leave_and_drop(context);
 }
 
 static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
@@ -7187,24 +7361,27 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
 
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out) {
+    ssdgs_context *context;
     ssdgs_trainer *trainer;
     ssdgs_result result;
-    if (!out) return SSDGS_ERR_ARGUMENT;
-    *out = NULL;
+    if (out) *out = NULL;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    trainer = (ssdgs_trainer *)ssdgs__allocate(model->context, sizeof *trainer);
-    if (!trainer) return SSDGS_ERR_MEMORY;
-    trainer->context = model->context;
+    context = model->context;
+    result = ssdgs__enter(context, "ssdgs_trainer_create");
+    if (result) return result;
+    if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_trainer_create", "out"));
+    trainer = (ssdgs_trainer *)ssdgs__allocate(context, sizeof *trainer);
+    if (!trainer) return ssdgs__leave(context, SSDGS_ERR_MEMORY);
+    trainer->context = context;
     trainer->model = model;
+    context->references++;
+    model->references++;
     ssdgs__model_changed(model);
     trainer->options = options ? *options : ssdgs_train_options_default();
     result = ssdgs__trainer_setup(trainer, photos, photo_count);
-    if (result) {
-        ssdgs_trainer_destroy(trainer);
-        return result;
-    }
-    *out = trainer;
-    return SSDGS_OK;
+    if (result) ssdgs__trainer_drop(trainer);
+    else *out = trainer;
+    return ssdgs__leave(context, result);
 }
 
 /* The photograph of an iteration: every pass visits each once, in an order drawn for the pass. */
@@ -7243,8 +7420,8 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
             "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
 }
 
-SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
-    const ssdgs_train_options *o;
+static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
+    const ssdgs_train_options *o = &trainer->options;
     ssdgs__loss_values values;
     ssdgs_frame frame;
     ssdgs_camera camera;
@@ -7254,11 +7431,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     ssdgs_real background[3];
     double t, gradient[9], until;
     int learns[SSDGS__GROUPS], frozen[2], moves[2], terms, photo, j;
-    if (stats) memset(stats, 0, sizeof *stats);
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__trainer_check(trainer);
     if (result) return result;
-    o = &trainer->options;
     t = ssdgs__schedule_time(o, trainer->iteration);
     terms = ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
     photo = ssdgs__next_photo(trainer);
@@ -7317,23 +7491,41 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     return result;
 }
 
+SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
+    ssdgs_result result;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
+    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_step(trainer, stats));
+}
+
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
     ssdgs_train_stats stats;
+    ssdgs_result result = SSDGS_OK;
     int bad = 0;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(trainer->context, "ssdgs_trainer_run");
+    if (result) return result;
+    ssdgs__leave(trainer->context, SSDGS_OK);
+    trainer->running++;
     while (trainer->iteration < trainer->options.iterations) {
-        const ssdgs_result result = ssdgs_trainer_step(trainer, &stats);
-        if (result && result != SSDGS_ERR_NONFINITE) return result;
+        result = ssdgs_trainer_step(trainer, &stats);
         bad = result ? bad + 1 : 0;
-        if (bad == 10) return result;
-        if (progress && !progress(user, &stats)) return ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED,
-                "cancelled at iteration %d", trainer->iteration);
+        if ((result && result != SSDGS_ERR_NONFINITE) || bad == 10) break;
+        result = SSDGS_OK;
+        if (!progress || progress(user, &stats)) continue;
+        result = ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d", trainer->iteration);
+        break;
     }
-    return SSDGS_OK;
+    trainer->running--;
+    return result;
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light) {
-    if (!trainer || index < 0 || index >= trainer->photo_count || !camera || !light) return SSDGS_ERR_ARGUMENT;
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    if (!camera || !light) return ssdgs__null(trainer->context, "ssdgs_trainer_refined", camera ? "light" : "camera");
+    if (index < 0 || index >= trainer->photo_count)
+        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "ssdgs_trainer_refined: photograph %d of %d", index, trainer->photo_count);
     ssdgs__correct(trainer->photos + index, trainer->corrections[index].value, camera, light);
     return SSDGS_OK;
 }
@@ -7372,18 +7564,18 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     return fixed + fixed / 8;
 }
 
-SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
-                                      ssdgs_real *image, ssdgs_metrics *metrics) {
-    ssdgs_context *context;
+static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
+                                    ssdgs_real *image, ssdgs_metrics *metrics) {
+    ssdgs_context *context = model->context;
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_image out;
     ssdgs_real *rendered, *target, *planes;
     ssdgs_result result;
     size_t pixels, i;
     int c;
-    if (!model || !photo || !background || !metrics) return SSDGS_ERR_ARGUMENT;
+    if (!metrics) return ssdgs__null(context, "ssdgs_evaluate", "metrics");
     memset(metrics, 0, sizeof *metrics);
-    context = model->context;
+    if (!photo || !background) return ssdgs__null(context, "ssdgs_evaluate", photo ? "background" : "photo");
     result = ssdgs__photo_check(context, photo, -1, background);
     if (result) return result;
     pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
@@ -7395,17 +7587,25 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
     memset(&out, 0, sizeof out);
     out.color = rendered;
     out.alpha = planes;
-    result = ssdgs_render_ex(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
+    result = ssdgs__render(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
         ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
         ssdgs__photo_planes(photo, background, 0, pixels, planes);
         for (i = 0; i < pixels; i++)
             for (c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
         if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);
-        result = ssdgs_compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
+        result = ssdgs__compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
     }
     ssdgs__release(context, rendered);
     return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
+                                      ssdgs_real *image, ssdgs_metrics *metrics) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_evaluate");
+    return result ? result : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
 }
 
 /* As long as the longest side of a trainer's bounds; where settings have no such unit, of the Gaussians' box. */
@@ -7426,8 +7626,7 @@ static double ssdgs__model_unit(const ssdgs_model *model) {
     return unit;
 }
 
-SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3],
-                                          int iterations) {
+static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
     static const int frozen[2] = {1, 1};
     ssdgs__correction correction;
     ssdgs__loss_values values;
@@ -7437,7 +7636,8 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     ssdgs_result result;
     double unit, angle;
     int i, j;
-    if (!model || !photo || !background || iterations < 0) return SSDGS_ERR_ARGUMENT;
+    if (!photo || !background) return ssdgs__null(model->context, "ssdgs_refine_photo", photo ? "background" : "photo");
+    if (iterations < 0) return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_refine_photo: %d iterations", iterations);
     result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
     memset(&correction, 0, sizeof correction);
@@ -7463,8 +7663,18 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
     return SSDGS_OK;
 }
 
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_refine_photo");
+    return result ? result : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
+}
+
 #ifndef SSDGS_NO_STDIO
 /* ==== >>checkpoint  a run's whole state; native byte order, refused elsewhere ==== */
+
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK2" /* the last letter changes with the layout */
+#define SSDGS__BYTE_ORDER 0x01020304u
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
     const unsigned char *bytes = (const unsigned char *)data;
@@ -7518,8 +7728,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     const ssdgs_settings *s = &trainer->model->settings;
     int i;
     memset(head, 0, sizeof *head);
-    memcpy(head->magic, "SSDGSCKP", 8);
-    head->byte_order = 0x01020304u;
+    memcpy(head->magic, SSDGS__CHECKPOINT_MAGIC, 8);
+    head->byte_order = SSDGS__BYTE_ORDER;
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
@@ -7549,6 +7759,17 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->settings = *s;
 }
 
+/* Copies what a checkpoint begins with; what is wrong, or NULL. */
+static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t size, ssdgs__checkpoint_head *head) {
+    memset(head, 0, sizeof *head);
+    memcpy(head, bytes, size < sizeof *head ? size : sizeof *head);
+    if (memcmp(head->magic, SSDGS__CHECKPOINT_MAGIC, 7)) return "it is not a checkpoint";
+    if (memcmp(head->magic, SSDGS__CHECKPOINT_MAGIC, 8) || head->byte_order != SSDGS__BYTE_ORDER ||
+        head->real_size != sizeof(ssdgs_real) || head->version != SSDGS_VERSION)
+        return "it was written by another version or machine";
+    return size < sizeof *head + 8 ? "it is cut short" : NULL;
+}
+
 typedef struct ssdgs__checkpoint_io { ssdgs__writer *writer; const unsigned char *bytes; uint64_t hash; } ssdgs__checkpoint_io;
 
 static ssdgs_result ssdgs__checkpoint_write(void *user, void *data, size_t size) {
@@ -7564,11 +7785,11 @@ static ssdgs_result ssdgs__checkpoint_read(void *user, void *data, size_t size) 
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
+static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char *path) {
     ssdgs__checkpoint_head head;
     ssdgs__checkpoint_io io;
     ssdgs__writer writer;
-    if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
+    if (!path) return ssdgs__null(trainer->context, "ssdgs_trainer_save", "path");
     if (ssdgs__trainer_check(trainer)) return SSDGS_ERR_ARGUMENT;
     if (ssdgs__savable(trainer->model, path)) return SSDGS_ERR_NONFINITE;
     ssdgs__writer_open(&writer, trainer->context, path);
@@ -7579,6 +7800,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
     ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
     ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
     return ssdgs__writer_close(&writer);
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
+    ssdgs_result result;
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(trainer->context, "ssdgs_trainer_save");
+    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_save(trainer, path));
 }
 
 /* Whether what Adam and the density control rely on makes sense; Gaussians may be anything, as in a model. */
@@ -7610,8 +7838,8 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
     return 1;
 }
 
-SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
-    ssdgs_context *context;
+static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path) {
+    ssdgs_context *context = trainer->context;
     ssdgs__checkpoint_head head, own;
     ssdgs__checkpoint_io io;
     ssdgs_result result;
@@ -7620,17 +7848,14 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     uint64_t hash;
     const char *reason = NULL;
     int i;
-    if (!trainer || !path) return SSDGS_ERR_ARGUMENT;
-    context = trainer->context;
+    if (!path) return ssdgs__null(context, "ssdgs_trainer_load", "path");
     result = ssdgs__trainer_check(trainer);
     if (!result) result = ssdgs__read_file(context, path, &bytes, &size);
     if (result) return result;
     ssdgs__checkpoint_describe(trainer, &own);
-    if (size >= sizeof head + 8) memcpy(&head, bytes, sizeof head);
-    if (size < sizeof head + 8 || memcmp(head.magic, own.magic, 8)) reason = "it is not a checkpoint";
-    else if (head.byte_order != own.byte_order || head.real_size != own.real_size ||
-             head.version != own.version) reason = "it was written by another version or machine";
-    else if (head.global_count != own.global_count || head.photo_count != own.photo_count ||
+    reason = ssdgs__checkpoint_head_of(bytes, size, &head);
+    if (reason) {
+    } else if (head.global_count != own.global_count || head.photo_count != own.photo_count ||
              head.inputs != own.inputs || memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS))
         reason = "it belongs to other options, settings or photographs";
     else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
@@ -7670,6 +7895,34 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     }
     ssdgs__release(context, bytes);
     return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
+    ssdgs_result result;
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(trainer->context, "ssdgs_trainer_load");
+    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_load(trainer, path));
+}
+
+SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration) {
+    ssdgs__checkpoint_head head;
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    ssdgs_result result;
+    const char *reason;
+    if (iteration) *iteration = 0;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(context, "ssdgs_checkpoint_iteration");
+    if (result) return result;
+    if (!path || !iteration) result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
+    else result = ssdgs__read_file(context, path, &bytes, &size);
+    if (!result) {
+        reason = ssdgs__checkpoint_head_of(bytes, size, &head);
+        if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
+        else *iteration = head.iteration;
+    }
+    ssdgs__release(context, bytes);
+    return ssdgs__leave(context, result);
 }
 #endif /* SSDGS_NO_STDIO */
 #endif /* SSDGS_NO_TRAINER */
