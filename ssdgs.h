@@ -581,8 +581,16 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
 /* sRGB transfer curve and its inverse (IEC 61966-2-1). */
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear);
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
-/* Clamps, encodes by the model's transfer and rounds (count) values to bytes. */
+/* Clamps, encodes by the model's transfer and rounds (count) values to bytes, at most one level off. Like the next two it does
+   nothing where an array is NULL. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
+
+typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8 } ssdgs_format; /* 4 bytes a pixel */
+
+/* color and alpha of a rendering without background as pixels of straight alpha: encode(color / alpha). Without image->alpha they are
+   opaque. pitch: bytes from one row to the next; negative where `pixels` is the first row of an image stored bottom row first. */
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
+                               ptrdiff_t pitch);
 /* Stored values (pixels,3) of a rendering without background, color (pixels,3) and alpha (pixels), laid over one of stored
    values: alpha encode(color / alpha) + (1 - alpha) background. stored may be color. */
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
@@ -4747,6 +4755,14 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, image metrics ==== */
 
+#if SSDGS__X86 && (defined(__x86_64__) || defined(_M_X64))
+#define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_sse2 /* the widest that needs no look at the CPU */
+#elif SSDGS__NEON
+#define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_neon
+#else
+#define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_scalar
+#endif
+
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear) {
     ssdgs_real out = linear;
     if (ssdgs__finite(linear)) ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
@@ -4759,26 +4775,106 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     return out;
 }
 
-SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
-    size_t i;
-    for (i = 0; i < count; i++) {
-        ssdgs_real x = values[i] > 0 ? values[i] : 0; /* NaN too becomes 0 */
-        x = x < 1 ? x : 1;
-        if (transfer == SSDGS_TRANSFER_SRGB) x = ssdgs_srgb_encode(x);
-        bytes[i] = (unsigned char)(x * 255 + (ssdgs_real)0.5);
+/* The bytes of 8192 equal parts of 0 .. 1, made for each call. Where a byte begins within a part, which may be 0.4 of a byte wide,
+   the part belongs to the byte before. */
+enum { SSDGS__PARTS = 8192 };
+
+static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS], int transfer) {
+    ssdgs_real begin[256], linear[256];
+    int byte, at = 0;
+    for (byte = 0; byte < 256; byte++) begin[byte] = linear[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
+    if (transfer == SSDGS_TRANSFER_SRGB) ssdgs__srgb_decode_scalar(linear, begin, 256);
+    for (byte = 0; byte < 256; byte++) {
+        const int end = byte < 255 ? (int)(linear[byte] * SSDGS__PARTS) + 1 : SSDGS__PARTS;
+        memset(bytes + at, byte, (size_t)(end - at));
+        at = end;
     }
 }
 
+/* NaN's is 0. */
+static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *bytes, ssdgs_real value) {
+    value = value > 0 ? value : 0;
+    value = value < 1 ? value : 1;
+    return bytes[(int)(value * (ssdgs_real)(SSDGS__PARTS - 0.5))];
+}
+
+SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
+    unsigned char table[SSDGS__PARTS];
+    size_t i;
+    if (!values || !bytes) return;
+    ssdgs__bytes_make(table, transfer);
+    for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
+}
+
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
+                               ptrdiff_t pitch) {
+    const int red = format == SSDGS_BGRA8 ? 2 : 0;
+    unsigned char table[SSDGS__PARTS], alphas[SSDGS__PARTS];
+    int x, y;
+    if (!image || !image->color || !pixels) return;
+    ssdgs__bytes_make(table, transfer);
+    ssdgs__bytes_make(alphas, SSDGS_TRANSFER_NONE);
+    for (y = 0; y < height; y++) {
+        const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
+        const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
+        unsigned char *to = (unsigned char *)pixels + y * pitch;
+        for (x = 0; x < width; x++, color += 3, to += 4) {
+            const ssdgs_real a = alpha ? alpha[x] : 1, by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
+            to[red] = ssdgs__byte(table, color[0] * by);
+            to[1] = ssdgs__byte(table, color[1] * by);
+            to[2 - red] = ssdgs__byte(table, color[2] * by);
+            to[3] = ssdgs__byte(alphas, a);
+        }
+    }
+}
+
+/* The transfer curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most up to 1. */
+enum { SSDGS__LINES_FIRST = (127 - 13) << 6, SSDGS__LINES = 30 << 6 };
+typedef struct ssdgs__line { ssdgs_real at, slope; } ssdgs__line;
+
+static void ssdgs__lines_make(ssdgs__line *lines, int transfer) {
+    enum { OCTAVE = 64, POINTS = OCTAVE + 16 };
+    ssdgs_real from[POINTS], encoded[POINTS];
+    int begin, i;
+    for (begin = 0; begin < SSDGS__LINES; begin += OCTAVE) {
+        for (i = 0; i < POINTS; i++) {
+            const uint32_t bits = (uint32_t)(SSDGS__LINES_FIRST + begin + i) << 17;
+            float start;
+            memcpy(&start, &bits, sizeof start);
+            from[i] = encoded[i] = (ssdgs_real)start;
+        }
+        if (transfer == SSDGS_TRANSFER_SRGB) SSDGS__SRGB_ENCODE(encoded, NULL, from, POINTS);
+        for (i = 0; i < OCTAVE; i++) {
+            const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
+            /* the first octave belongs to the part that is straight from 0 on, as all of no curve is */
+            const int straight = !begin || transfer != SSDGS_TRANSFER_SRGB;
+            lines[begin + i].slope = slope;
+            lines[begin + i].at = straight ? 0 : encoded[i] - slope * from[i];
+        }
+    }
+}
+
+static SSDGS__INLINE ssdgs_real ssdgs__on_line(const ssdgs__line *lines, ssdgs_real linear) {
+    const float x = (float)linear;
+    int32_t line;
+    memcpy(&line, &x, sizeof line);
+    line = (line >> 17) - SSDGS__LINES_FIRST; /* below 0: of less than 2^-13, negative ones too */
+    line = line < 0 ? 0 : line;
+    line = line < SSDGS__LINES ? line : SSDGS__LINES - 1;
+    return lines[line].at + lines[line].slope * linear;
+}
 
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored) {
-    size_t i, c;
-    for (i = 0; i < pixels; i++)
-        for (c = 0; c < 3; c++) {
-            const ssdgs_real straight = color[3 * i + c] / (alpha[i] > SSDGS__THIN ? alpha[i] : SSDGS__THIN);
-            const ssdgs_real value = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_encode(straight) : straight;
-            stored[3 * i + c] = alpha[i] * value + (1 - alpha[i]) * background[c];
-        }
+    ssdgs__line lines[SSDGS__LINES];
+    size_t i;
+    int c;
+    if (!color || !alpha || !background || !stored) return;
+    ssdgs__lines_make(lines, transfer);
+    for (i = 0; i < pixels; i++, color += 3, stored += 3) {
+        const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
+        for (c = 0; c < 3; c++) stored[c] = a * ssdgs__on_line(lines, color[c] * by) + (1 - a) * background[c];
+    }
 }
 
 typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
@@ -7145,7 +7241,7 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
 /* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the middles of the silhouettes
    meet about where the object is; `within` cameras stand within the bounds. */
 static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
-    const ssdgs_context *context = trainer->context;
+    ssdgs_context *context = trainer->context;
     double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0}, m[9], cross[3], determinant;
     double shown = 0, outside = 0, half = 0, miss = 0, step;
     ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(trainer->context,
@@ -7854,14 +7950,13 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     if (result) return result;
     ssdgs__checkpoint_describe(trainer, &own);
     reason = ssdgs__checkpoint_head_of(bytes, size, &head);
-    if (reason) {
-    } else if (head.global_count != own.global_count || head.photo_count != own.photo_count ||
-             head.inputs != own.inputs || memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS))
+    if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
+                    head.inputs != own.inputs || memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS)))
         reason = "it belongs to other options, settings or photographs";
-    else if (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
+    if (!reason && (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
              (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
              head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 || head.skipped > head.iteration ||
-             !(head.start_size >= 0 && head.start_size < 1e30))
+             !(head.start_size >= 0 && head.start_size < 1e30)))
         reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
