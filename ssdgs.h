@@ -448,6 +448,9 @@ typedef struct ssdgs_settings {
     ssdgs_real centre[3];     /* origin of the networks' positions */
     ssdgs_real length_unit;   /* world units in one network unit */
     ssdgs_real light_scale;   /* factor from the dataset's intensities to the model's */
+    ssdgs_real origin[3];     /* where the model's 0 lies in the world of its dataset, exactly. Nothing is computed with it: it is for
+                                 scenes far from 0, whose cameras, lights and Gaussians are given less it, since floats would be too
+                                 coarse. Files hold positions with it added, as doubles */
 } ssdgs_settings;
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
@@ -477,6 +480,9 @@ SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
    code or put together. Their indices change. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
+/* Gives the model the settings, ASG and networks of another, of any context: back to one whose file lost them in an editor. Not while
+   the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
+SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 /* What reading a file had to mend. */
 typedef struct ssdgs_load_stats {
@@ -485,6 +491,8 @@ typedef struct ssdgs_load_stats {
     int clamped_scales;      /* beyond +-20 */
     int dropped;             /* Gaussians with other non-finite values */
     int plain;               /* 1: no SSD-GS properties, loaded as baked colours */
+    int untrained;           /* 1: ours, but without settings, ASG or a network, which other programs drop: has the published settings
+                                and networks at their start instead. ssdgs_model_adopt() gives it those of the original */
     int sorted;              /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
 } ssdgs_load_stats;
 
@@ -1966,6 +1974,9 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(origin[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(origin[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(origin[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
 #undef SSDGS__RANGE
     return SSDGS_OK;
 }
@@ -2188,6 +2199,38 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     if (!model) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(model->context, "ssdgs_model_sort");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
+}
+
+static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *original) {
+    ssdgs_real *globals;
+    size_t i;
+    int c;
+    if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
+    if (model->settings.baked || original->settings.baked)
+        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a baked model has no networks");
+    if (model->references > 1)
+        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a trainer has the model");
+    globals = (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
+    if (!globals) return SSDGS_ERR_MEMORY;
+    memcpy(globals, original->globals, original->global_count * sizeof *globals);
+    ssdgs__release(model->context, model->globals);
+    model->globals = globals;
+    model->global_count = original->global_count;
+    for (c = 0; c < 3; c++) {
+        const double move = (double)model->settings.origin[c] - (double)original->settings.origin[c];
+        ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
+        for (i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++) x[i] = (ssdgs_real)((double)x[i] + move);
+    }
+    model->settings = original->settings;
+    ssdgs__model_changed(model);
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_model_adopt");
+    return result ? result : ssdgs__leave(model->context, ssdgs__model_adopt(model, original));
 }
 
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in no order, seldom in
@@ -5266,6 +5309,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the fil
     SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias)
     SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R("eta", 0, eta)
     SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
+    SSDGS__R("origin_", 3, origin)
     SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS) SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS)
     SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA)
     SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET) SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)
@@ -5347,9 +5391,9 @@ static int ssdgs__ply_finite(uint32_t bits) { return (bits & 0x7f800000u) != 0x7
 /* ---- reading ---- */
 
 enum { /* limits of a header */
-    SSDGS__PLY_MAX_HEADER = 65536, SSDGS__PLY_MAX_LINE = 4096, SSDGS__PLY_MAX_ELEMENTS = 64, SSDGS__PLY_MAX_PROPERTIES = 1024
+    SSDGS__PLY_MAX_HEADER = 1 << 20, SSDGS__PLY_MAX_ELEMENTS = 64, SSDGS__PLY_MAX_PROPERTIES = 1024
 };
-enum { SSDGS__PLY_UINT8 = 1, SSDGS__PLY_FLOAT32 = 6, SSDGS__PLY_FLOAT64 = 7, SSDGS__PLY_TYPES = 8 }; /* 0, 2, 4 are signed */
+enum { SSDGS__PLY_UINT8 = 1, SSDGS__PLY_UINT16 = 3, SSDGS__PLY_FLOAT32 = 6, SSDGS__PLY_FLOAT64 = 7, SSDGS__PLY_TYPES = 8 }; /* 0, 2, 4 are signed */
 static const char *const ssdgs__ply_types[SSDGS__PLY_TYPES][2] = {
     {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"}, {"ushort", "uint16"},
     {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}
@@ -5380,6 +5424,8 @@ typedef struct ssdgs__ply {
     ssdgs_context *context;
     const char *name; /* of the file, for messages */
     const unsigned char *begin, *at, *end;
+    double origin[3]; /* to be taken from positions */
+    double color_unit; /* of red, green and blue: by their type */
     ssdgs__ply_format format;
     int newline, line, element_count, property_count;
     ssdgs__ply_element elements[SSDGS__PLY_MAX_ELEMENTS], *known[SSDGS__PLY_KINDS];
@@ -5418,22 +5464,26 @@ static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
     return token.length > 0;
 }
 
-/* A decimal number, nan or inf, as the bits of a float, whatever the locale. Seventeen digits count; powers of ten are exact
-   doubles, so the error before rounding to float stays near 1e-16. */
-static int ssdgs__ply_number(ssdgs__ply_token token, uint32_t *bits) {
+/* A decimal number, nan or inf, whatever the locale. Seventeen digits count; powers of ten are exact, so the error stays near
+   1e-16. */
+static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
     static const char *const words[3] = {"nan", "inf", "infinity"};
     const unsigned char *p = token.text, *const end = p + token.length;
     int any = 0, point = 0, exponent = 0, i;
-    uint32_t sign = 0;
+    uint64_t bits;
+    int negative = 0;
     double value = 0;
 
     if (token.length == 0 || token.length > 1000) return 0;
-    if (*p == '-' || *p == '+') sign = *p++ == '-' ? 0x80000000u : 0;
-    for (i = 0; i < 3; i++) {
+    if (*p == '-' || *p == '+') negative = *p++ == '-';
+    for (i = 0; i < 3; i++) { /* by their bits: -ffast-math knows neither */
         const size_t length = strlen(words[i]);
         size_t k = 0;
         while (k < length && p + k < end && (p[k] | 32) == words[i][k]) k++;
-        if (k == length && p + k == end) return *bits = sign | (i ? 0x7f800000u : 0x7fc00000u), 1;
+        if (k < length || p + k != end) continue;
+        bits = (uint64_t)negative << 63 | (i ? UINT64_C(0x7ff0000000000000) : UINT64_C(0x7ff8000000000000));
+        memcpy(number, &bits, sizeof bits);
+        return 1;
     }
     for (; p < end && ((*p >= '0' && *p <= '9') || (*p == '.' && !point)); p++) {
         if (*p == '.') {
@@ -5446,11 +5496,11 @@ static int ssdgs__ply_number(ssdgs__ply_token token, uint32_t *bits) {
     }
     if (!any) return 0;
     if (p < end && (*p | 32) == 'e') {
-        int negative = 0, given = 0;
-        if (++p < end && (*p == '-' || *p == '+')) negative = *p++ == '-';
+        int minus = 0, given = 0;
+        if (++p < end && (*p == '-' || *p == '+')) minus = *p++ == '-';
         if (p == end) return 0;
         for (; p < end && *p >= '0' && *p <= '9'; p++) given = given < 9999 ? given * 10 + (*p - '0') : given;
-        exponent += negative ? -given : given;
+        exponent += minus ? -given : given;
     }
     while (exponent && value > 1e-60 && value < 1e60) {
         const int step = exponent < 0 ? 1 : -1;
@@ -5458,7 +5508,7 @@ static int ssdgs__ply_number(ssdgs__ply_token token, uint32_t *bits) {
         for (; exponent && power < 1e22; exponent += step) power *= 10;
         value = step > 0 ? value / power : value * power;
     }
-    *bits = sign | ssdgs__ply_bits(value);
+    *number = negative ? -value : value;
     return p == end;
 }
 
@@ -5466,9 +5516,9 @@ static int ssdgs__ply_number(ssdgs__ply_token token, uint32_t *bits) {
 static int ssdgs__ply_line(ssdgs__ply *ply, ssdgs__ply_token tokens[6]) {
     const unsigned char *p = ply->at, *line = p, *end = ply->end;
     int count = 0;
-    if (end - p > SSDGS__PLY_MAX_LINE) end = p + SSDGS__PLY_MAX_LINE;
+    if (end - ply->begin > SSDGS__PLY_MAX_HEADER) end = ply->begin + SSDGS__PLY_MAX_HEADER;
     while (p < end && *p != ply->newline && (ply->newline || (*p != '\r' && *p != '\n'))) p++;
-    if (p == end || p - ply->begin > SSDGS__PLY_MAX_HEADER) return -1;
+    if (p == end) return -1;
     if (!ply->newline) { /* the first line decides between CR, LF and CRLF: a CR must not swallow a data byte 10 */
         if (*p == '\r' && p + 1 < end && p[1] == '\n') p++;
         ply->newline = *p;
@@ -5523,7 +5573,10 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
         if (ssdgs__ply_same(ply->properties[i].name, property->name)) return ssdgs__ply_refuse(ply, "the second of its name");
     for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
         if (!ssdgs__ply_is(property->name, cursor.name)) continue;
-        if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB && property->type != SSDGS__PLY_UINT8) continue;
+        if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB) {
+            if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 && property->type != SSDGS__PLY_UINT16) continue;
+            ply->color_unit = property->type == SSDGS__PLY_UINT8 ? 255 : property->type == SSDGS__PLY_UINT16 ? 65535 : 1;
+        }
         property->word = cursor.word;
         element->present |= (uint64_t)1 << cursor.word;
     }
@@ -5540,7 +5593,8 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: not a PLY file", ply->name);
     while (result == SSDGS_OK) {
         const int count = ssdgs__ply_line(ply, tokens);
-        if (count < 0) return ssdgs__ply_refuse(ply, "the header does not go on after it");
+        if (count < 0) return ssdgs__ply_refuse(ply, ply->end - ply->begin > SSDGS__PLY_MAX_HEADER
+                                                         ? "the header's end does not follow within 1 MiB" : "the file ends within the header");
         if (count && (ssdgs__ply_is(tokens[0], "comment") || ssdgs__ply_is(tokens[0], "obj_info"))) continue;
         if (count == 3 && ssdgs__ply_is(tokens[0], "format") && ply->format == SSDGS__PLY_UNKNOWN) {
             if (ssdgs__ply_is(tokens[1], "ascii")) ply->format = SSDGS__PLY_ASCII;
@@ -5562,15 +5616,20 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
     return result;
 }
 
-/* One number as float bits, or the count of a list; neither = step over it. 0 when the file ends or holds something else. */
-static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, uint32_t *bits, size_t *count) {
-    const int size = ssdgs__ply_sizes[type];
+/* One number less an origin as float bits, or the count of a list; neither = step over it. 0 when the file ends or holds something
+   else. */
+static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t *bits, size_t *count) {
+    const int size = ssdgs__ply_sizes[type], moved = origin < 0 || origin > 0;
     uint64_t raw = 0, negative;
     double value;
+    float single;
     int i;
     if (ply->format == SSDGS__PLY_ASCII) {
         const ssdgs__ply_token token = ssdgs__ply_cut(&ply->at, ply->end);
-        return count ? ssdgs__ply_count(token, count) : bits ? ssdgs__ply_number(token, bits) : token.length > 0;
+        if (count || !bits) return count ? ssdgs__ply_count(token, count) : token.length > 0;
+        if (!ssdgs__ply_number(token, &value)) return 0;
+        *bits = ssdgs__ply_bits(moved ? value - origin : value);
+        return 1;
     }
     if (ply->end - ply->at < size) return 0;
     for (i = 0; i < size; i++) raw = raw << 8 | ply->at[ply->format == SSDGS__PLY_BIG ? i : size - 1 - i];
@@ -5580,7 +5639,13 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, uint32_t *bits, size_t *
     if (count || !bits) return !count || !negative;
     value = (double)raw - (negative ? (double)((uint64_t)1 << 8 * size) : 0);
     if (type == SSDGS__PLY_FLOAT64) memcpy(&value, &raw, sizeof value);
-    *bits = type == SSDGS__PLY_FLOAT32 ? (uint32_t)raw : ssdgs__ply_bits(value);
+    if (type == SSDGS__PLY_FLOAT32 && !moved) return *bits = (uint32_t)raw, 1;
+    if (type == SSDGS__PLY_FLOAT32) {
+        *bits = (uint32_t)raw;
+        memcpy(&single, bits, sizeof single);
+        value = (double)single;
+    }
+    *bits = ssdgs__ply_bits(moved ? value - origin : value);
     return 1;
 }
 
@@ -5591,11 +5656,13 @@ static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, ui
     for (i = 0; i < element->properties && good; i++, property++) {
         size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
         if (property->list < 0) {
-            good = ssdgs__ply_scalar(ply, property->type, words && property->word >= 0 ? &words[property->word] : NULL, NULL);
+            const int wanted = words && property->word >= 0, position = wanted && !element->kind && property->word < SSDGS_ROTATION;
+            good = ssdgs__ply_scalar(ply, property->type, position ? ply->origin[property->word] : 0,
+                                     wanted ? &words[property->word] : NULL, NULL);
             continue;
         }
-        good = ssdgs__ply_scalar(ply, property->list, NULL, &count) && count <= (size_t)(ply->end - ply->at) / size;
-        for (; good && count; count--) good = ssdgs__ply_scalar(ply, property->type, NULL, NULL);
+        good = ssdgs__ply_scalar(ply, property->list, 0, NULL, &count) && count <= (size_t)(ply->end - ply->at) / size;
+        for (; good && count; count--) good = ssdgs__ply_scalar(ply, property->type, 0, NULL, NULL);
     }
     return good;
 }
@@ -5628,8 +5695,9 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s", ply->name,
-                               ssdgs__ply_kinds[kind], cursor.name);
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s", ply->name,
+                               ssdgs__ply_kinds[kind], cursor.name, kind != SSDGS__PLY_VERTEX ? ""
+                               : ": these are no Gaussian splats, but a point cloud or a mesh");
     }
     return SSDGS_OK;
 }
@@ -5639,17 +5707,19 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     ssdgs__ply_cursor cursor;
     ssdgs_result result;
     uint32_t words[SSDGS__PLY_WORDS];
-    static const struct { size_t at; double before; } added[4] = { /* settings of later files, and what held before them */
-        {offsetof(ssdgs_settings, transport), 0}, {offsetof(ssdgs_settings, view_octaves), 4},
-        {offsetof(ssdgs_settings, light_octaves), 4}, {offsetof(ssdgs_settings, pixel_variance), 0.3}
+    enum { ADDED = 7 };
+    static const struct { size_t at; int index; double before; } added[ADDED] = { /* settings of later files, and what held before them */
+        {offsetof(ssdgs_settings, transport), 0, 0}, {offsetof(ssdgs_settings, view_octaves), 0, 4},
+        {offsetof(ssdgs_settings, light_octaves), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
+        {offsetof(ssdgs_settings, origin), 0, 0}, {offsetof(ssdgs_settings, origin), 1, 0}, {offsetof(ssdgs_settings, origin), 2, 0}
     };
     int i, next = 0;
     memset(words, 0, sizeof words);
-    for (i = 0; i < 5; i++) {
-        const int word = i < 4 ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
+    for (i = 0; i <= ADDED; i++) {
+        const int word = i < ADDED ? (int)(added[i].at / sizeof(int)) + added[i].index : SSDGS__PLY_WORDS;
         result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
-        if (i < 4) words[word] = ssdgs__ply_bits(added[i].before);
+        if (i < ADDED) words[word] = ssdgs__ply_bits(added[i].before);
         next = word + 1;
     }
     ply->at = element->data;
@@ -5676,10 +5746,10 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
 }
 
 /* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
-static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc) {
+static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
     double color;
     if (!ssdgs__ply_finite(bits)) return bits;
-    color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / 255;
+    color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / unit;
     color = color < 1e-6 ? 1e-6 : color;
     return ssdgs__ply_bits(color > 20 ? color : log(expm1(color)));
 }
@@ -5725,7 +5795,7 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
         if (!ssdgs__ply_row(ply, element, words))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row, "a number");
         for (i = 0; i < 3 && plain; i++)
-            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc);
+            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit);
         if (kind == SSDGS__PLY_VERTEX && !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats)) continue;
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
             if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
@@ -5737,6 +5807,12 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     }
     if (kind == SSDGS__PLY_VERTEX) model->count = (int)kept;
     return SSDGS_OK;
+}
+
+static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
+    int i;
+    for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name); i++) {}
+    return i < element->properties;
 }
 
 static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_load_stats *stats) {
@@ -5752,10 +5828,16 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     if (vertex->count > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name, vertex->count);
 
+    if (ssdgs__ply_has(ply, vertex, "packed_position"))
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: a compressed PLY (packed_position): convert it to a plain one, with "
+                           "splat-transform say", ply->name);
+
     ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
     stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
+    for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS; kind++) stats->untrained |= !stats->plain && !ours && !ply->known[kind];
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
+        for (kind = 0; kind < 3; kind++) ply->origin[kind] = (double)settings.origin[kind];
     } else if (stats->plain) {
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
@@ -5777,6 +5859,19 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     for (kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind]) result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     return result;
+}
+
+/* Notes what a model will not do that its user may expect. */
+static void ssdgs__ply_tell(const ssdgs_model *model, const char *name, const ssdgs_load_stats *stats) {
+    ssdgs_context *context = model->context;
+    if (stats->dropped) ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite", name,
+                                    stats->dropped, stats->dropped + model->count);
+    if (!model->count) ssdgs__note(context, "%s: holds no Gaussians: its pictures are empty", name);
+    else if (model->settings.baked)
+        ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing", name);
+    if (stats->untrained)
+        ssdgs__note(context, "%s: has no settings, ASG or networks, which editors of splats drop: what is drawn instead is untrained. "
+                    "ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the original file", name);
 }
 
 static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size, ssdgs_model **out,
@@ -5801,7 +5896,7 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
         ssdgs__model_drop(*out);
         *out = NULL;
         memset(&own, 0, sizeof own);
-    }
+    } else ssdgs__ply_tell(*out, name, &own);
     if (stats) *stats = own;
     return result;
 }
@@ -6000,6 +6095,12 @@ static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
     ssdgs__writer_put(writer, bytes, 4);
 }
 
+static int ssdgs__has_origin(const ssdgs_settings *s) {
+    int i;
+    for (i = 0; i < 3 && !(s->origin[i] < 0) && !(s->origin[i] > 0); i++) {}
+    return i < 3;
+}
+
 static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)raw : log1p(exp((double)raw)); }
 
 /* What other programs show: the normal, and as f_dc the look under a training set's average light. That light is 1 at the
@@ -6042,7 +6143,15 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
             memcpy(&real, ssdgs__ply_setting(&settings, &cursor), sizeof real);
             *word = ssdgs__ply_bits((double)real);
         } else if (cursor.word < SSDGS_CHANNELS) {
-            *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
+            real = *ssdgs__ply_cell(model, row, &cursor);
+            *word = ssdgs__ply_bits((double)real);
+            if (kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION && ssdgs__has_origin(&settings)) {
+                const double position = (double)settings.origin[cursor.word] + (double)real;
+                uint64_t bits;
+                memcpy(&bits, &position, sizeof bits);
+                ssdgs__writer_word(writer, (uint32_t)bits);
+                *word = (uint32_t)(bits >> 32);
+            }
         }
         ssdgs__writer_word(writer, *word);
     }
@@ -6072,7 +6181,9 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
-            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int" : "float", cursor.name);
+            const int position = kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION;
+            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int"
+                     : position && ssdgs__has_origin(&model->settings) ? "double" : "float", cursor.name);
             ssdgs__writer_text(&writer, line);
         }
     }

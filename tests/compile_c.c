@@ -17,7 +17,7 @@ static const any_function functions[] = {
     ADDRESS(ssdgs_trainer_refined), ADDRESS(ssdgs_train_memory), ADDRESS(ssdgs_trainer_save),
     ADDRESS(ssdgs_trainer_load), ADDRESS(ssdgs_compare), ADDRESS(ssdgs_evaluate), ADDRESS(ssdgs_refine_photo),
     ADDRESS(ssdgs_stage_cpu), ADDRESS(ssdgs_render_options_exact), ADDRESS(ssdgs_render_options_fast),
-    ADDRESS(ssdgs_compose)
+    ADDRESS(ssdgs_compose), ADDRESS(ssdgs_to_pixels), ADDRESS(ssdgs_model_adopt), ADDRESS(ssdgs_checkpoint_iteration)
 };
 
 int main(void)
