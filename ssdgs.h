@@ -37,7 +37,7 @@ DO THIS
     }
 --- end ---
 
-  color now holds linear RGB; ssdgs_to_bytes() makes bytes of it. Training, on photographs that the program has read:
+  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on photographs that the program has read:
 
 --- train example ---
     #define SSDGS_IMPLEMENTATION
@@ -109,6 +109,8 @@ CONVENTIONS
             centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy in px. No lens distortion.
   world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0 means 0.02
             of settings.length_unit (published: 0.01). Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
+            Floats hold seven digits: of a scene 1,000 times its size away from 0, give cameras, lights and bounds less a
+            nearby point, and that point as settings.origin.
   light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB irradiance. Any
             number of them in a rendering, one in a photograph. Intensities have the unit of the photographs':
             ssdgs_trainer_create() gives an empty model the light_scale that makes E's geometric mean 1 at the centre of
@@ -120,9 +122,11 @@ CONVENTIONS
             not clamped; render options give `background` likewise. ssdgs_to_bytes() encodes. Training options,
             ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value; ssdgs_evaluate() and
             ssdgs_compare() deal in stored values.
-  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels. Photographs: RGBA, 8 or 16 bit, straight
-            alpha, tightly packed. Those with transparency are fitted on a new random background each step;
-            random_background = 0 puts them on options.background.
+  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels, up to 32768 pixels a side. Photographs: RGBA, 8
+            or 16 bit, straight alpha, tightly packed. Those with transparency are fitted on a new random background each
+            step; random_background = 0 puts them on options.background. Where none is transparent around the object, their
+            borders decide: of the colour of options.background to two bytes, they show an empty background, and Gaussians of
+            its colour fade; else everything they show is opaque. A note says which.
   networks  per layer (out,in) weights, row-major, then (out) biases; ReLU between layers.
 
 OPTIONS, macros defined before the header; those with * the same way in every file that includes it
@@ -144,8 +148,9 @@ MEMORY
   either. What the C library needs itself (qsort, stdio, threads) is not in it.
   A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has
   been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on
-  screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer, the model its
-  trainer, the context both. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
+  screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer. Contexts, models
+  and trainers may be destroyed in any order: a model stays until its trainer is gone, a context until its models and
+  trainers are, and the log is told. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
   run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not
   counted.
 
@@ -153,8 +158,12 @@ THREADS
   A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each thread may
   have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller counted) and joins them
   when destroyed. desc.parallel, if set, replaces them: it gets batches of independent tasks and returns when all are
-  done. The progress callback runs on the caller's thread between two steps; it may save or render. Hooks and the log
-  run there too.
+  done. Hooks, the allocator, the log and the progress callback run on the caller's thread.
+  While a call is at work, any other on the same context returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
+  whether it comes from a hook (which may call ssdgs_stage_cpu()), a task, the allocator, the log or, where the compiler has
+  atomic operations, another thread. The progress callback runs between two steps: it may make any call but the one that
+  destroys its trainer.
+  After fork() the child may use and destroy its copies of contexts; they have no threads of their own there.
 
 SPEED
   ssdgs_render_options_exact()    the method as written; training and ssdgs_evaluate() use it
@@ -197,12 +206,11 @@ DETERMINISM
 
 ERRORS
   Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
-  ssdgs_error_message(context) says what it was about: the file, setting, parameter or byte. Codes that need no words, a
-  NULL argument for one, leave the message as it was; a failed ssdgs_context_create() has none. desc.logger hears every
-  message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
+  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter or byte. Without a
+  context there is none. desc.logger hears every message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
   Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused; Gaussians that are not finite are not drawn, those
-  whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in
+  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG are not; Gaussians
+  that are not finite are not drawn, those whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in
   skipped_steps and returns SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
 
 FILES
@@ -210,10 +218,10 @@ FILES
   splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
   raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders,
   skips what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats).
-  Limits: 8 GiB, 2^28 Gaussians.
+  Limits: 8 GiB, 2^28 Gaussians, a header of 1 MiB. With settings.origin x y z are doubles, in the dataset's coordinates.
   A plain 3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it
-  cannot be trained. One with kd_ but no ssdgs_settings gets the published settings, and networks at their start unless
-  it has them. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
+  cannot be trained. One with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and
+  networks at their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all this. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
   cameras or lights are refused. Both kinds of file are written under another name and renamed when
   complete: a link is replaced, not followed, and the file's mode is a new file's.
 
@@ -636,8 +644,8 @@ typedef struct ssdgs_train_options {
     int iterations;            /* 20000 */
     uint64_t seed;             /* 1 */
     int schedule;              /* ssdgs_schedule; merged */
-    int random_background;     /* 1: photographs with transparency are fitted on a new colour each time, so dark splats cannot
-                                  pass for a dark background; 0: on `background` */
+    int random_background;     /* 1: photographs are fitted on a new colour each time, so dark splats cannot pass for a dark background,
+                                  but for opaque ones that show `background`; 0: on `background` */
     int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops; where
                                   these are three in four or more others are drawn; 10000 */
     int max_gaussians;         /* cap of the density control; 100000 */
@@ -663,9 +671,10 @@ typedef struct ssdgs_train_options {
                                   the width around, or where none has it; 0.02; 0 = none. Photographs have outlines where more
                                   than a hundredth of the picture is wholly transparent, but not all of it; of eight or more those
                                   are left out that are transparent on a third of what the others show */
-    ssdgs_real opacity_fade;   /* px: where only a fiftieth of the photographs have outlines, or one of eight or more, an opaque
-                                  Gaussian costs as much as so many px wrong by 1, less and less up to iteration 30,000*, as those
-                                  of the background's colour have no other reason to go; 0.8; 0 = nothing */
+    ssdgs_real opacity_fade;   /* px: where opaque photographs show `background` around the object (see images), and at most a fiftieth
+                                  of all have outlines, an opaque Gaussian costs as much as so many px wrong by 1, less and less up
+                                  to iteration 30,000*, as those of the background's colour have no other reason to go; 0.8; 0 =
+                                  nothing */
     ssdgs_real adam_epsilon;   /* Adam's epsilon, in what 1 / 255 in one colour of one pixel of the photograph costs (positions: by a
                                   move of the bounds' longest side). What no photograph shows hardly moves; with the published
                                   1e-15 rounding noise takes full steps without end; 0.1; 0 = 1e-15 */
@@ -5656,7 +5665,8 @@ static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, ui
     for (i = 0; i < element->properties && good; i++, property++) {
         size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
         if (property->list < 0) {
-            const int wanted = words && property->word >= 0, position = wanted && !element->kind && property->word < SSDGS_ROTATION;
+            const int wanted = words && property->word >= 0;
+            const int position = wanted && element->kind == SSDGS__PLY_VERTEX && property->word < SSDGS_ROTATION;
             good = ssdgs__ply_scalar(ply, property->type, position ? ply->origin[property->word] : 0,
                                      wanted ? &words[property->word] : NULL, NULL);
             continue;
@@ -5696,8 +5706,8 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s", ply->name,
-                               ssdgs__ply_kinds[kind], cursor.name, kind != SSDGS__PLY_VERTEX ? ""
-                               : ": these are no Gaussian splats, but a point cloud or a mesh");
+                               ssdgs__ply_kinds[kind], cursor.name, kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
+                               cursor.word <= SSDGS_OPACITY ? ": these are no Gaussian splats, but a point cloud or a mesh" : "");
     }
     return SSDGS_OK;
 }
@@ -6237,6 +6247,7 @@ struct ssdgs_trainer {
     ssdgs_real *half_shadow;
     double extent;            /* 1.1 x the cameras' radius */
     int outlines;             /* photographs show where the object ends */
+    int backdrop, filled;     /* they do not, but show options.background around it; or surfaces, everywhere */
     double unit;              /* the bounds' longest side */
     double start_size;        /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -7423,42 +7434,311 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
                     (int)(100 * outside / shown));
     if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return SSDGS_OK;
     step = pow(10, floor(log10(half)) - 1);
+    for (j = 0; j < 3; j++) x[j] += (double)trainer->model->settings.origin[j];
     ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g", step * floor((x[0] - half) / step),
                 step * floor((x[1] - half) / step), step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
                 step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));
     return SSDGS_OK;
 }
 
+/* Of one photograph, for whether its shading agrees with its light. In camera axes. */
+typedef struct ssdgs__shading {
+    double rotation[9]; /* world to camera */
+    double eye[3];      /* from the bounds' centre, world */
+    double position[3]; /* as given: of the light, or towards it */
+    double shift[2];    /* of the brightness' middle from the silhouette's, in the silhouette's standard deviations */
+    double brightness;  /* mean, over the light's intensity */
+    int directional;
+} ssdgs__shading;
+
+/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture, less what has the colour of
+   its border. */
+static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], ssdgs__shading *s) {
+    static const ssdgs_real black[3] = {0, 0, 0};
+    const ssdgs_camera *camera = &photo->camera;
+    const int w = camera->width, h = camera->height, step = 1 + (w > h ? w : h) / 128; /* some pixels tell */
+    double area = 0, light = 0, middle[2] = {0, 0}, square[2] = {0, 0}, bright[2] = {0, 0}, intensity = 0;
+    ssdgs_real corner[3];
+    int x, y, c, l;
+    ssdgs__photo_pixel(photo, black, 0, corner);
+    for (y = step / 2; y < h; y += step)
+        for (x = step / 2; x < w; x += step) {
+            const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
+            const double alpha = ssdgs__photo_alpha(photo, pixel) / 65535.0;
+            const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx, (y + 0.5 - (double)camera->cy) / (double)camera->fy};
+            double value = 0, apart = 0;
+            ssdgs_real stored[3];
+            ssdgs__photo_pixel(photo, black, pixel, stored);
+            for (c = 0; c < 3; c++) {
+                value += (double)stored[c] * (double)stored[c]; /* about linear */
+                apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c])) : apart;
+            }
+            if (apart < 0.02) value = 0;
+            area += alpha;
+            light += value;
+            for (c = 0; c < 2; c++) {
+                middle[c] += alpha * at[c];
+                square[c] += alpha * at[c] * at[c];
+                bright[c] += value * at[c];
+            }
+        }
+    for (c = 0; c < 3; c++) intensity += (double)photo->light.intensity[c] / 3;
+    if (!(area > 0) || !(light > 0) || !(intensity > 0)) return 0;
+    for (c = 0; c < 2; c++) {
+        const double variance = square[c] / area - middle[c] / area * (middle[c] / area);
+        s->shift[c] = (bright[c] / light - middle[c] / area) / sqrt(variance > 1e-12 ? variance : 1e-12);
+    }
+    s->brightness = light / area / intensity;
+    s->directional = photo->light.kind == SSDGS_LIGHT_DIRECTIONAL;
+    ssdgs__camera_centre(camera, s->eye);
+    for (c = 0; c < 3; c++) {
+        s->eye[c] -= centre[c];
+        s->position[c] = (double)photo->light.position[c];
+        for (l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
+    }
+    return 1;
+}
+
+/* A way to read three numbers as a light's position: axis[c] and sign[c] tell which is the c-th coordinate, then in world or camera
+   axes, from the world's origin or the camera. */
+typedef struct ssdgs__reading { int axis[3], in_camera, from_camera; double sign[3]; } ssdgs__reading;
+
+/* Where the light stands from the bounds' centre: its direction in world axes, and its squared distance. */
+static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r, const double centre[3], double direction[3]) {
+    double p[3], distance2 = 0;
+    int c, l;
+    for (c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
+    for (c = 0; c < 3; c++) {
+        direction[c] = r->in_camera ? 0 : p[c];
+        for (l = 0; l < 3 && r->in_camera; l++) direction[c] += s->rotation[3 * l + c] * p[l];
+        if (!s->directional) direction[c] += r->from_camera ? s->eye[c] : -centre[c];
+        distance2 += direction[c] * direction[c];
+    }
+    for (c = 0; c < 3; c++) direction[c] /= sqrt(distance2) + 1e-12;
+    return s->directional ? 1 : distance2;
+}
+
+/* The correlation of (n, width) numbers with others, each less their means; *spread: the first ones' standard deviation. */
+static double ssdgs__correlation(const double *a, const double *b, int n, int width, double *spread) {
+    double ab = 0, aa = 0, bb = 0;
+    int i, c;
+    for (c = 0; c < width; c++) {
+        double a_mean = 0, b_mean = 0;
+        for (i = 0; i < n; i++) a_mean += a[i * width + c] / n, b_mean += b[i * width + c] / n;
+        for (i = 0; i < n; i++) {
+            const double x = a[i * width + c] - a_mean, y = b[i * width + c] - b_mean;
+            ab += x * y, aa += x * x, bb += y * y;
+        }
+    }
+    *spread = sqrt(aa / n);
+    return ab / sqrt(aa * bb + 1e-30);
+}
+
+/* How well shading follows the lights, 1 at most: a picture is brightest on the light's side, and as a whole where the light is on the
+   camera's side. *facing: how far on that side lights are, on average, with twice its error added; of what lies on the ground only
+   two axes tell. scratch: (n, 6). */
+static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading, const double centre[3], double *scratch,
+                               double *facing) {
+    double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
+    double best = -1, spread, mean = 0, brightness = 0, front_mean = 0;
+    int flat, i, c, l;
+    for (flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
+        double lights = 0, shown = 0, r;
+        int above = 0;
+        for (i = 0; i < n; i++) {
+            double d[3], eye2 = 0, towards_eye = 0;
+            const double distance2 = ssdgs__read_light(s + i, reading, centre, d);
+            for (c = 0; c < 3; c++) {
+                towards_eye += d[c] * s[i].eye[c];
+                eye2 += s[i].eye[c] * s[i].eye[c];
+            }
+            front[i] = towards_eye / (sqrt(eye2) + 1e-12);
+            bright[i] = s[i].brightness * distance2;
+            if (flat < 3) {
+                lights += d[flat];
+                above += s[i].eye[flat] > 0;
+                d[flat] = 0;
+            }
+            for (c = 0; c < 2; c++) {
+                shift[2 * i + c] = s[i].shift[c];
+                for (l = 0, toward[2 * i + c] = 0; l < 3; l++) toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
+            }
+        }
+        if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0)) continue; /* neither a floor nor a ceiling */
+        r = ssdgs__correlation(toward, shift, n, 2, &shown);
+        best = shown > 0.1 && r > best ? r : best;
+    }
+    for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
+    for (i = 0; i < n; i++) bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
+    mean = ssdgs__correlation(front, bright, n, 1, &spread);
+    *facing = front_mean + 2 * spread / sqrt((double)n);
+    return spread > 0.2 ? 0.5 * (best + mean) : best; /* where lights hardly change sides brightness tells nothing */
+}
+
+/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. */
+static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const double centre[3]) {
+    enum { FEW = 6, ENOUGH = 12 };
+    static const ssdgs__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
+    static const char *const axes[2][3] = {{"x", "y", "z"}, {"-x", "-y", "-z"}};
+    ssdgs_context *context = trainer->context;
+    const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
+    ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
+    double *scratch = (double *)(s + trainer->photo_count), agrees, facing, other, best = 0;
+    ssdgs__reading reading, found = as_given;
+    int n = 0, i, order, signs, way;
+    if (!s) return SSDGS_ERR_MEMORY;
+    for (i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
+    agrees = n < FEW ? 1 : ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
+    if (agrees > -1 && (agrees < 0.6 || (n >= FEW && facing < -0.1))) {
+        for (way = 0; way < 4 && n >= ENOUGH; way++)
+            for (order = 0; order < 6; order++)
+                for (signs = 0; signs < 8; signs++) {
+                    for (i = 0; i < 3; i++) {
+                        reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
+                        reading.sign[i] = signs >> i & 1 ? -1 : 1;
+                    }
+                    reading.in_camera = way & 1;
+                    reading.from_camera = way >> 1;
+                    other = ssdgs__agreement(s, n, &reading, centre, scratch, &facing);
+                    if (facing < -0.1 || other < best + (reading.from_camera != found.from_camera ? 0.03 : 0)) continue;
+                    best = other;
+                    found = reading;
+                }
+        if (agrees < 0.6)
+            ssdgs__note(context, "the photographs' shading contradicts their lights: its correlation with their directions is %g, and "
+                        "near 1 where these are right", floor(100 * agrees + 0.5) / 100);
+        else
+            ssdgs__note(context, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
+        if (best > 0.75 && best > agrees + 0.05)
+            ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights' positions would agree with the shading (%g)",
+                        axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
+                        axes[found.sign[2] < 0][found.axis[2]], found.in_camera ? "each camera's (right, down, forward)" : "the world's",
+                        found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
+    }
+    ssdgs__release(context, s);
+    return SSDGS_OK;
+}
+
+/* Notes where the lights do not tell what other lights do. */
+static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
+    ssdgs_context *context = trainer->context;
+    const ssdgs_train_options *o = &trainer->options;
+    const int n = trainer->photo_count;
+    double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0;
+    int pass, i, j, within = 0, points = 0;
+    for (j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0; i < n; i++) {
+            const ssdgs_photo *photo = trainer->photos + i;
+            const int point = photo->light.kind == SSDGS_LIGHT_POINT;
+            double p[3], seen[3], eye[3], from_mean = 0, from_held = 0, to_eye = 0;
+            ssdgs__camera_centre(&photo->camera, eye);
+            for (j = 0; j < 3; j++) p[j] = (double)photo->light.position[j];
+            ssdgs__to_camera(&photo->camera, p, point, seen);
+            for (j = 0; j < 3; j++) {
+                from_mean += (p[j] - mean[j]) * (p[j] - mean[j]);
+                from_held += (seen[j] - held[j]) * (seen[j] - held[j]);
+                to_eye += (eye[j] - centre[j]) * (eye[j] - centre[j]);
+            }
+            if (pass) {
+                spread = from_mean > spread ? from_mean : spread;
+                apart = from_held > apart ? from_held : apart;
+                away += (points ? sqrt(to_eye) : 1) / n;
+                continue;
+            }
+            for (j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
+            for (j = 0; j < 3 && p[j] > (double)o->bounds_min[j] && p[j] < (double)o->bounds_max[j]; j++) {}
+            within += point && j == 3;
+            points += point;
+        }
+    if (within) ssdgs__note(context, "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone", within, n);
+    if (n < 2 || (points && points < n)) return SSDGS_OK;
+    if (sqrt(spread) < 1e-3 * (points ? trainer->unit : 1))
+        ssdgs__note(context, "all photographs are lit from one place: they do not tell how the object looks in other light");
+    else if (sqrt(apart) < 0.03 * away)
+        ssdgs__note(context, "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in all photographs: they do "
+                    "not tell how the object looks in other light", floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
+                    floor(1e3 * held[2] + 0.5) / 1e3);
+    else return ssdgs__note_shading(trainer, centre);
+    return SSDGS_OK;
+}
+
+/* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that the opaque ones beside it
+   lead to, but that times alpha, as stored or as linear light. */
+static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
+    double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
+    int i, x, y, c, side;
+    for (i = 0; i < trainer->photo_count; i++) {
+        const ssdgs_photo *photo = trainer->photos + i;
+        const int w = photo->camera.width, h = photo->camera.height;
+        for (y = 0; y < h && trainer->transparent[i]; y++)
+            for (x = 3; x < w - 3; x++) {
+                const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
+                const int alpha = ssdgs__photo_alpha(photo, pixel);
+                const double a = alpha / 65535.0;
+                if (alpha < 6554 || alpha > 45875) continue; /* 0.1 .. 0.7 */
+                for (side = 0; side < 4; side++) { /* right and left, next to it and one further */
+                    const int step = 1 + side / 2;
+                    const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step, further = side & 1 ? next - 1 : next + 1;
+                    if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880) continue; /* 0.99 */
+                    for (c = 0; c < 3; c++) {
+                        const double v = (double)ssdgs__photo_value(photo, pixel, c), beside = (double)ssdgs__photo_value(photo, next, c);
+                        double n = beside + step * (beside - (double)ssdgs__photo_value(photo, further, c));
+                        n = n < 0 ? 0 : n > 1 ? 1 : n;
+                        straight += fabs(v - n);
+                        times_alpha += fabs(v - a * n);
+                        times_linear += fabs(v - pow(a, 1 / 2.2) * n);
+                    }
+                    count++;
+                    break;
+                }
+            }
+    }
+    if (count >= 50 && (times_alpha < 0.5 * straight || times_linear < 0.5 * straight))
+        ssdgs__note(trainer->context, "the photographs' colours look multiplied by alpha, which darkens outlines: they must be straight "
+                    "(divide by alpha, or export without premultiplication)");
+}
+
 /* ---- a trainer and its steps ---- */
 
-/* Opaque photographs have their own background: whether their borders are of one colour, and not options.background. */
-static void ssdgs__note_background(const ssdgs_trainer *trainer) {
+/* Decides what opaque photographs show around the object: options.background, where nearly all of their borders have its colour to two
+   bytes, else surfaces, which fill the pictures. */
+static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     const ssdgs_real *background = trainer->options.background;
-    double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, spread = 0, off = 0;
+    double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, same = 0, spread = 0;
     int i, x, y, c;
     for (i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
-        const size_t w = (size_t)photo->camera.width, h = (size_t)photo->camera.height;
-        for (y = 0; y < (int)h; y++)
-            for (x = 0; x < (int)w; x += y == 0 || y == (int)h - 1 || w == 1 ? 1 : (int)w - 1) {
-                ssdgs_real plane[3];
-                ssdgs__photo_pixel(photo, background, (size_t)y * w + (size_t)x, plane);
+        const int w = photo->camera.width, h = photo->camera.height;
+        if (trainer->transparent[i] == 2) continue;
+        for (y = 0; y < h; y++)
+            for (x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
+                ssdgs_real value[3], apart = 0;
+                ssdgs__photo_pixel(photo, background, (size_t)y * (size_t)w + (size_t)x, value);
                 for (c = 0; c < 3; c++) {
-                    mean[c] += (double)plane[c];
-                    square[c] += (double)plane[c] * (double)plane[c];
+                    const ssdgs_real d = value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
+                    apart = d > apart ? d : apart;
+                    mean[c] += (double)value[c];
+                    square[c] += (double)value[c] * (double)value[c];
                 }
+                same += apart < (ssdgs_real)(2.5 / 255);
                 count++;
             }
     }
     for (c = 0; c < 3; c++) {
-        const double apart = fabs((mean[c] /= count) - (double)background[c]), v = square[c] / count - mean[c] * mean[c];
-        off = apart > off ? apart : off;
-        spread = v > spread ? v : spread;
+        const double variance = square[c] / count - mean[c] / count * (mean[c] / count);
+        spread = variance > spread ? variance : spread;
     }
-    if (off > 0.1 && spread < 0.01)
-        ssdgs__note(trainer->context, "the photographs' borders are about %g,%g,%g: is that the background, and not "
-                    "options.background, %g,%g,%g?", floor(100 * mean[0] + 0.5) / 100, floor(100 * mean[1] + 0.5) / 100,
-                    floor(100 * mean[2] + 0.5) / 100, (double)background[0], (double)background[1], (double)background[2]);
+    trainer->backdrop = same >= 0.9 * count;
+    trainer->filled = !trainer->backdrop;
+    if (trainer->backdrop)
+        ssdgs__note(trainer->context, "too few photographs are transparent around the object, but their borders have the colour of "
+                    "`background`: it is taken for empty, and Gaussians of its colour fade (opacity_fade=0 keeps them)");
+    else
+        ssdgs__note(trainer->context, "too few photographs are transparent around the object, and their borders, %g,%g,%g on average%s, "
+                    "are not of the colour of `background`: all that they show is taken for opaque. Where there is a background set "
+                    "`background` to its colour", floor(100 * mean[0] / count + 0.5) / 100, floor(100 * mean[1] / count + 0.5) / 100,
+                    floor(100 * mean[2] / count + 0.5) / 100, spread < 0.001 ? " and all alike" : "");
 }
 
 static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_photo *photos, int photo_count) {
@@ -7510,11 +7790,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     for (i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
     trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
     if (empty) ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty, photo_count);
-    if (!trainer->outlines && empty < photo_count) {
-        ssdgs__note(context, "too few photographs are transparent around the object: its outlines are not known, and Gaussians of "
-                    "the background's colour may stay around it");
-        ssdgs__note_background(trainer);
-    }
+    if (!trainer->outlines && empty < photo_count) ssdgs__judge_background(trainer);
     for (i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -7535,6 +7811,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (radius < 1e-3 * trainer->unit)
         ssdgs__note(context, "all photographs are taken from one place: other views cannot be right");
     else result = ssdgs__note_bounds(trainer, within);
+    if (!result) result = ssdgs__note_lights(trainer);
+    ssdgs__note_alpha(trainer);
     if (result) return result;
     trainer->extent = 1.1 * (radius > trainer->unit ? radius : trainer->unit); /* one camera has no radius */
     result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
@@ -7613,7 +7891,7 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
 static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, ssdgs_real *gradient) {
     const size_t n = (size_t)trainer->model->count;
     const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
-    const double fade = trainer->outlines || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
+    const double fade = !trainer->backdrop || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
     size_t i;
     for (i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
@@ -7645,7 +7923,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     photo = ssdgs__next_photo(trainer);
     correction = trainer->corrections + photo;
     for (j = 0; j < 3; j++)
-        background[j] = o->random_background && trainer->transparent[photo]
+        background[j] = o->random_background && (trainer->transparent[photo] || trainer->filled)
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
                                                          3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);

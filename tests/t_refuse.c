@@ -156,7 +156,7 @@ static void test_messages(void) {
     SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
     memcpy(&light.kind, &numbers[1], sizeof numbers[1]);
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
-    SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "an image is NULL");
+    SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "ssdgs_compare: reference is NULL");
     options.prune_opacity = 0;
     SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "prune_opacity = 0 is not within 1e-30 .. 0.999");
     options = train_options;
