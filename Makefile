@@ -19,7 +19,7 @@ SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual $(BUILD)/fuzz
-BUILDS = builds
+BUILDS = builds examples
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 
@@ -64,6 +64,8 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(BUILD)/multi_a.o
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
+$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight
+	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-asan: ## tests under the address sanitizer
 	$(MAKE) test BUILD=$(BUILD)/asan CFLAGS="-O1 -g -fsanitize=address -fno-omit-frame-pointer"

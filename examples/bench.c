@@ -1009,13 +1009,18 @@ static void write_svg(const bench *b, FILE *file) {
 
 /* ---- the program ---- */
 
-/* Calls write on a file beside the program. */
-static void write_beside(const bench *b, const char *program, const char *ending, void (*write)(const bench *, FILE *)) {
+/* The path of a file beside the program. To be freed. */
+static char *path_beside(const char *program, const char *ending) {
     const size_t length = strlen(program), stem = length > 4 && !strcmp(program + length - 4, ".exe") ? length - 4 : length;
     char *path = (char *)make(length + 16, 1);
-    FILE *file;
     snprintf(path, length + 16, "%.*s%s", (int)stem, program, ending);
-    file = fopen(path, "wb");
+    return path;
+}
+
+/* Calls write on a file beside the program. */
+static void write_beside(const bench *b, const char *program, const char *ending, void (*write)(const bench *, FILE *)) {
+    char *path = path_beside(program, ending);
+    FILE *file = fopen(path, "wb");
     if (!file) die(path, "cannot be written");
     write(b, file);
     if (ferror(file) | fclose(file)) die(path, "cannot be written");
@@ -1041,12 +1046,48 @@ static void scale_photo(const ssdgs_photo *from, ssdgs_photo *to) {
     to->pixels = pixels;
 }
 
+static void hear(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    if (code == SSDGS_OK) fprintf(stderr, "bench: note: %s\n", message);
+}
+
+/* What is wrong with the models is better known now; where they lie the dataset must be read. No output may be one of these files. */
+static void look_at_models(const char *dataset, char paths[2][1024], const char *program, double origin[3]) {
+    static const char *const endings[2] = {".json", ".svg"};
+    ssdgs_context *context;
+    ssdgs_context_desc desc;
+    ssdgs_model *model;
+    olat_guard guard;
+    char error[512] = "";
+    int i, c, failed;
+    memset(&guard, 0, sizeof guard);
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    check(NULL, ssdgs_context_create(&desc, &context));
+    failed = olat_guard_folder(&guard, dataset, "transforms_test.json", error);
+    for (i = 1; i >= 0; i--) {
+        check(context, ssdgs_model_load(context, paths[i], &model, NULL));
+        for (c = 0; c < 3; c++) origin[c] = (double)ssdgs_model_settings(model)->origin[c];
+        ssdgs_model_destroy(model);
+        failed = failed || olat_guard_input(&guard, paths[i], error);
+    }
+    for (i = 0; i < 2 && !failed; i++) {
+        char *path = path_beside(program, endings[i]);
+        failed = olat_guard_output(&guard, path, error);
+        free(path);
+    }
+    if (failed) die("files", error);
+    olat_guard_free(&guard);
+    ssdgs_context_destroy(context);
+}
+
 /* The test split, and how much of it is used. */
-static void load_photos(bench *b) {
+static void load_photos(bench *b, const double origin[3]) {
     char error[512] = "";
     ssdgs_photo *all;
     int i;
-    if (olat_load(b->dataset, "transforms_test.json", 0, &b->data, error)) die(b->dataset, error);
+    if (olat_load_at(b->dataset, "transforms_test.json", 0, origin, &b->data, error)) die(b->dataset, error);
+    olat_print_notes(&b->data, "bench");
     all = olat_photos(&b->data);
     if (!all || b->data.count < 2) die(b->dataset, "needs two test photographs");
     b->photo_count = b->quick ? 4 : MAX_PHOTOS;
@@ -1087,7 +1128,7 @@ int main(int argc, char **argv) {
     const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
     char paths[2][1024];
     int i, files = 0;
-    double start = now();
+    double start = now(), origin[3];
     for (i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--quick")) b.quick = 1;
         else if (!strcmp(argv[i], "--models") && i + 1 < argc) folder = argv[++i];
@@ -1106,7 +1147,8 @@ int main(int argc, char **argv) {
     b.model = paths[0];
     b.color = (ssdgs_real *)make(4 * MAX_PIXELS, sizeof *b.color);
     b.alpha = b.color + 3 * MAX_PIXELS;
-    load_photos(&b);
+    look_at_models(b.dataset, paths, argv[0], origin);
+    load_photos(&b, origin);
     look_at_machine(&b);
     printf("%s, %s, %d threads, %s; %s, %d test views\n", b.cpu, ssdgs_isa_string((ssdgs_isa)b.best_isa),
            b.threads[b.thread_count - 1], COMPILER, b.dataset, b.photo_count);

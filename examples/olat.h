@@ -1745,6 +1745,12 @@ OLAT__API void olat_guard_free(olat_guard *guard) {
 /* A text file that grows in memory; text is NULL once out of it. */
 typedef struct olat__writer { char *text; size_t size, room; } olat__writer;
 
+static void olat__writer_start(olat__writer *w) {
+    w->size = 0;
+    w->room = 256;
+    w->text = (char *)malloc(w->room);
+}
+
 static void olat__write(olat__writer *w, const char *text) {
     const size_t size = strlen(text);
     if (w->text && w->room - w->size < size) {
@@ -1757,8 +1763,16 @@ static void olat__write(olat__writer *w, const char *text) {
     w->size += size;
 }
 
+/* Puts the text where it belongs, and frees it. */
+static int olat__writer_end(olat__writer *w, const char *path, char *error) {
+    const int failed = w->text ? olat__write_file(path, (const unsigned char *)w->text, w->size, error)
+                               : olat__fail(error, "%s: out of memory", olat__tail(path));
+    free(w->text);
+    return failed;
+}
+
 /* A JSON string, with its quotes. */
-OLAT__API void olat__write_string(olat__writer *w, const char *text) {
+static void olat__write_string(olat__writer *w, const char *text) {
     char escape[8];
     olat__write(w, "\"");
     for (; *text; text++) {
@@ -1785,18 +1799,23 @@ static void olat__write_numbers(olat__writer *w, const char *before, const doubl
     olat__write(w, after);
 }
 
+/* A file below the folder, relative to it. */
+static void olat__write_path(olat__writer *w, const char *key, const char *file, const char *folder) {
+    const size_t used = strlen(folder);
+    if (!file || strncmp(file, folder, used) || (used && file[used] != '/')) return;
+    olat__write(w, key);
+    olat__write_string(w, file + used + (used > 0));
+    olat__write(w, ", ");
+}
+
 static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3], const char *folder) {
     static const double last_row[4] = {0, 0, 0, 1};
     const ssdgs_camera *camera = &frame->camera;
-    const size_t used = strlen(folder);
     const int is_point = frame->light.kind == SSDGS_LIGHT_POINT;
     double v[4];
     int k, m;
-    if (frame->file && !strncmp(frame->file, folder, used) && (!used || frame->file[used] == '/')) {
-        olat__write(w, "\"file_path\": ");
-        olat__write_string(w, frame->file + used + (used > 0));
-        olat__write(w, ", ");
-    }
+    olat__write_path(w, "\"file_path\": ", frame->file, folder);
+    olat__write_path(w, "\"mask_path\": ", frame->mask, folder);
     v[0] = camera->width, v[1] = camera->height;
     olat__write_numbers(w, "\"w\": ", v, 1, 9, ", ");
     olat__write_numbers(w, "\"h\": ", v + 1, 1, 9, ",\n  ");
@@ -1821,20 +1840,25 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
 /* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined poses, say. */
 OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset *set, char error[512]) {
     olat__writer w;
-    int i, failed;
-    w.size = 0;
-    w.room = 256;
-    w.text = (char *)malloc(w.room);
+    int i;
+    olat__writer_start(&w);
     olat__write(&w, "{\"frames\": [");
     for (i = 0; i < set->count; i++) {
         olat__write(&w, i ? ",\n {" : "\n {");
         olat__write_frame(&w, &set->frames[i], set->origin, folder);
     }
     olat__write(&w, "\n]}\n");
-    failed = w.text ? olat__write_file(path, (const unsigned char *)w.text, w.size, error)
-        : olat__fail(error, "%s: out of memory", olat__tail(path));
-    free(w.text);
-    return failed;
+    return olat__writer_end(&w, path, error);
+}
+
+/* Prints a dataset's notes as the program's. */
+OLAT__API void olat_print_notes(const olat_dataset *set, const char *program) {
+    const char *line = set->notes;
+    while (*line) {
+        const int length = (int)strcspn(line, "\n");
+        fprintf(stderr, "%s: note: %.*s\n", program, length, line);
+        line += length + (line[length] == '\n');
+    }
 }
 
 /* The frames as ssdgs_photo structs that share the dataset's pixels: (count), to be freed; NULL if out of memory. */

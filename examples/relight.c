@@ -2,6 +2,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include <ctype.h>
 #include <errno.h>
 #include <sys/stat.h>
 #ifdef _WIN32
@@ -12,16 +13,17 @@
 #endif
 
 #define PI 3.14159265358979323846
-enum { SPLIT, OUT_FOLDER, BACKGROUND, SHEET, THREADS, ISA, TRAJECTORY, COMPONENTS, OPTION_COUNT };
+enum { SPLIT, OUT_FOLDER, BACKGROUND, SHEET, THREADS, ISA, NETWORKS, TRAJECTORY, COMPONENTS, OPTION_COUNT };
 static const char *const option_names[OPTION_COUNT] = {
-    "--split", "--out", "--background", "--sheet", "--threads", "--isa", "--trajectory", "--components"
+    "--split", "--out", "--background", "--sheet", "--threads", "--isa", "--networks", "--trajectory", "--components"
 };
 
 static int usage(const char *problem, const char *what)
 {
     fprintf(stderr, "relight: %s %s\n"
             "usage: relight MODEL.ply DATASET --out DIR [--split test|train|valid] [--trajectory] [--components]\n"
-            "               [--sheet FILE.png] [--background black|white] [--threads N] [--isa NAME]\n", problem, what);
+            "               [--sheet FILE.png] [--background black|white] [--threads N] [--isa NAME]\n"
+            "               [--networks ORIGINAL.ply]: settings and networks of the model before an editor dropped them\n", problem, what);
     return 2;
 }
 
@@ -29,6 +31,12 @@ static int fail(const char *message)
 {
     fprintf(stderr, "relight: %s\n", message);
     return 1;
+}
+
+static void hear(void *user, ssdgs_result code, const char *message)
+{
+    (void)user;
+    if (code == SSDGS_OK) fprintf(stderr, "relight: note: %s\n", message);
 }
 
 /* What is written for a view; the first columns of the sheet come first. */
@@ -46,9 +54,11 @@ typedef struct job {
     ssdgs_context *context;
     ssdgs_model *model;
     olat_dataset data;
+    olat_guard guard;
     ssdgs_metrics *metrics;          /* of each frame that has an image */
     ssdgs_image planes;              /* of the view at hand; color is scratch once image is made */
-    ssdgs_real *memory, *image;      /* what planes point into; (h,w,3) stored values */
+    ssdgs_real *memory, *image, *photo; /* what planes point into; (h,w,3) stored values of the rendering and the photograph */
+    int black;                       /* pictures so far */
     unsigned char *bytes, *sheet;    /* (h,w,3) */
     int sheet_rows, cell_width, cell_height, shrink; /* so many pixels each way become one of the sheet */
 } job;
@@ -89,6 +99,7 @@ static int parse(job *j, int argc, char **argv)
     while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
     j->desc.isa = (ssdgs_isa)isa;
+    j->desc.logger.write = hear;
     return 0;
 }
 
@@ -117,63 +128,90 @@ static const char *base_name(const olat_frame *frame)
     return slash ? slash + 1 : frame->file;
 }
 
-/* Writes OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension. */
+/* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; OUT/metrics.json without a frame. To be freed. */
+static char *output_path(const job *j, const olat_frame *frame, const char *suffix)
+{
+    const char *name = frame ? base_name(frame) : "metrics.json", *dot = frame ? strrchr(name, '.') : NULL;
+    const size_t length = dot ? (size_t)(dot - name) : strlen(name);
+    char *path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
+    if (path) sprintf(path, "%s/%.*s%s%s", j->out, (int)length, name, suffix, frame ? ".png" : "");
+    else fail("out of memory");
+    return path;
+}
+
 static int write_image(const job *j, const olat_frame *frame, const char *suffix)
 {
-    const char *name = base_name(frame), *dot = strrchr(name, '.');
-    size_t length = dot ? (size_t)(dot - name) : strlen(name);
-    char *path, error[512] = "";
-    int ok;
-    path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
-    if (!path) return !fail("out of memory");
-    sprintf(path, "%s/%.*s%s.png", j->out, (int)length, name, suffix);
-    ok = !olat_write_png(path, frame->camera.width, frame->camera.height, 3, j->bytes, error);
-    if (!ok) fail(error);
+    char *path = output_path(j, frame, suffix), error[512] = "";
+    int ok = path && !olat_write_png(path, frame->camera.width, frame->camera.height, 3, j->bytes, error);
+    if (path && !ok) fail(error);
     free(path);
     return ok;
 }
 
-static void write_escaped(FILE *file, const char *text)
+/* Whether a path may be written. */
+static int check_output(job *j, const char *path)
 {
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\') fprintf(file, "\\%c", c);
-        else if (c < 32) fprintf(file, "\\u%04x", (unsigned)c);
-        else fputc(c, file);
-    }
+    char error[512] = "";
+    return path && (!olat_guard_output(&j->guard, path, error) || !fail(error));
 }
 
-/* No setlocale is called, so that numbers have a point. */
-static void write_numbers(FILE *file, const ssdgs_metrics *m)
+/* Nothing that will be written may be one of the files read, or of the dataset's, or be written twice. */
+static int check_outputs(job *j)
 {
-    fprintf(file, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", m->psnr, m->ssim, m->flip);
+    static const char *const splits[3] = {"transforms_train.json", "transforms_test.json", "transforms_valid.json"};
+    char error[512] = "";
+    const char *const models[2] = {j->model_path, j->given[NETWORKS]};
+    int i, output, ok = 1;
+    for (i = 0; i < 3; i++)
+        if ((i < 2 && models[i] && olat_guard_input(&j->guard, models[i], error)) ||
+            olat_guard_folder(&j->guard, j->dataset, splits[i], error))
+            return !fail(error);
+    for (i = 0; i < j->data.count && ok; i++)
+        for (output = IMAGE; output < (j->given[COMPONENTS] ? OUTPUT_COUNT : IMAGE + 1) && ok; output++) {
+            char *path = output_path(j, &j->data.frames[i], suffixes[output]);
+            ok = check_output(j, path);
+            free(path);
+        }
+    if (ok) {
+        char *path = output_path(j, NULL, "");
+        ok = check_output(j, path);
+        free(path);
+    }
+    return ok && (!j->given[SHEET] || check_output(j, j->given[SHEET]));
+}
+
+static void write_numbers(olat__writer *w, const ssdgs_metrics *m)
+{
+    char text[128]; /* no setlocale is called, so that numbers have a point */
+    snprintf(text, sizeof text, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", m->psnr, m->ssim, m->flip);
+    olat__write(w, text);
 }
 
 static int write_metrics(const job *j, const ssdgs_metrics *mean)
 {
-    char *path = (char *)malloc(strlen(j->out) + 16);
+    char *path = output_path(j, NULL, ""), error[512] = "";
+    olat__writer w;
     const char *separator = "";
-    FILE *file;
     int i, failed;
-    if (!path) return !fail("out of memory");
-    sprintf(path, "%s/metrics.json", j->out);
-    file = fopen(path, "wb");
-    free(path);
-    if (!file) return !fail("cannot write metrics.json");
-    fprintf(file, "{\n \"mean\": {");
-    write_numbers(file, mean);
-    fprintf(file, ",\n \"views\": [");
+    if (!path) return 0;
+    olat__writer_start(&w);
+    olat__write(&w, "{\n \"mean\": {");
+    write_numbers(&w, mean);
+    olat__write(&w, ",\n \"views\": [");
     for (i = 0; i < j->data.count; i++) {
         if (!j->data.frames[i].has_image) continue;
-        fprintf(file, "%s\n  {\"file\": \"", separator);
-        write_escaped(file, base_name(&j->data.frames[i]));
-        fprintf(file, "\", ");
-        write_numbers(file, &j->metrics[i]);
+        olat__write(&w, separator);
+        olat__write(&w, "\n  {\"file\": ");
+        olat__write_string(&w, base_name(&j->data.frames[i]));
+        olat__write(&w, ", ");
+        write_numbers(&w, &j->metrics[i]);
         separator = ",";
     }
-    fprintf(file, "\n ]\n}\n");
-    failed = ferror(file);
-    return (!fclose(file) && !failed) || !fail("cannot write metrics.json");
+    olat__write(&w, "\n ]\n}\n");
+    failed = olat__writer_end(&w, path, error);
+    if (failed) fail(error);
+    free(path);
+    return !failed;
 }
 
 /* ---- the path of the paper's Appendix D ---- */
@@ -288,7 +326,7 @@ static int make_planes(job *j)
         if (pixels > most) most = pixels;
     }
     j->metrics = (ssdgs_metrics *)calloc((size_t)j->data.count + 1, sizeof *j->metrics);
-    j->memory = next = (ssdgs_real *)malloc(most * 21 * sizeof *next + 1);
+    j->memory = next = (ssdgs_real *)malloc(most * 24 * sizeof *next + 1);
     j->bytes = (unsigned char *)malloc(most * 3 + 1);
     if (j->given[SHEET] && j->data.count > 0) {
         j->sheet_rows = j->data.count < SHEET_ROWS ? j->data.count : SHEET_ROWS;
@@ -299,6 +337,7 @@ static int make_planes(job *j)
     }
     if (!j->metrics || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet)) return !fail("out of memory");
     j->image = next;
+    j->photo = next += 3 * most;
     j->planes.color = next += 3 * most;
     j->planes.diffuse = next += 3 * most;
     j->planes.specular = next += 3 * most;
@@ -310,31 +349,44 @@ static int make_planes(job *j)
     return 1;
 }
 
+/* Says why a picture is black. */
+static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats *stats)
+{
+    const ssdgs_real *light = frame->light.intensity;
+    const int baked = ssdgs_model_settings(j->model)->baked;
+    const char *why = !stats->gaussians ? "the model holds no Gaussians"
+        : stats->rejected == stats->gaussians ? "no Gaussian of the model can be drawn: their values are not finite"
+        : !stats->visible ? "no Gaussian is in the picture: is this the model's dataset?"
+        : !stats->shaded ? "the Gaussians in the picture are too faint or too small to show"
+        : stats->blackened == stats->shaded ? "the Gaussians' colours are not finite"
+        : !baked && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0) ? "the light's intensity is 0"
+        : "no light reaches what the camera sees: is the light where it should be, and its intensity in the model's unit?";
+    if (!j->black++) fprintf(stderr, "relight: note: %s is black: %s\n", base_name(frame), why);
+}
+
 /* The image, and its metrics when there is a photograph, into job; with the components when they are asked for. */
 static ssdgs_result render(job *j, int index, int components)
 {
     const olat_frame *frame = &j->data.frames[index];
-    size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    int transfer = ssdgs_model_settings(j->model)->transfer;
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    const ssdgs_render_options options = frame->has_image ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     ssdgs_image planes = j->planes;
+    ssdgs_render_stats stats;
     ssdgs_result result;
-    if (frame->has_image) {
-        ssdgs_photo photo;
-        photo.camera = frame->camera;
-        photo.light = frame->light;
-        photo.pixels = frame->pixels;
-        photo.format = frame->format;
-        result = ssdgs_evaluate(j->model, &photo, j->background, j->image, &j->metrics[index]);
-        if (result || !components) return result;
-    }
+    size_t i;
     if (!components) {
         memset(&planes, 0, sizeof planes);
         planes.color = j->planes.color;
         planes.alpha = j->planes.alpha;
     }
-    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, NULL, &planes, NULL);
-    if (!result && !frame->has_image) ssdgs_compose(planes.color, planes.alpha, pixels, transfer, j->background, j->image);
-    return result;
+    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, &stats);
+    if (result) return result;
+    for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
+    if (i == 3 * pixels) tell_black(j, frame, &stats);
+    ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background, j->image);
+    if (!frame->has_image) return SSDGS_OK;
+    olat_compose(frame, j->background, j->photo);
+    return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height, &j->metrics[index]);
 }
 
 /* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as they are. */
@@ -348,7 +400,7 @@ static void show(job *j, const olat_frame *frame, int output)
         out = output == DIFFUSE ? p->diffuse : output == SPECULAR ? p->specular : p->scattering;
         transfer = ssdgs_model_settings(j->model)->transfer;
     } else if (output == PHOTO) {
-        olat_compose(frame, j->background, out);
+        out = j->photo;
     } else if (output == IMAGE) {
         out = j->image;
     } else if (output == NORMAL) { /* -1 .. 1 to 0 .. 1, nothing to black */
@@ -385,12 +437,32 @@ static void paste(job *j, const olat_frame *frame, int row, int column)
             }
 }
 
+/* Regardless of case, as some file systems are. */
 static int compare_names(const void *a, const void *b)
 {
-    return strcmp(*(const char *const *)a, *(const char *const *)b);
+    const char *x = *(const char *const *)a, *y = *(const char *const *)b;
+    while (*x && tolower((unsigned char)*x) == tolower((unsigned char)*y)) x++, y++;
+    return tolower((unsigned char)*x) - tolower((unsigned char)*y);
 }
 
-/* Frames of a path may have no file, those of several folders the same names: they are numbered. */
+/* Whether one frame's name is another's with the suffix of an output. */
+static int names_overlap(const char *const *names, int count)
+{
+    int i, output, overlap = 0;
+    for (i = 0; i < count; i++)
+        for (output = DIFFUSE; output < OUTPUT_COUNT; output++) {
+            const char *end = strstr(names[i], suffixes[output]);
+            char other[256];
+            const char *key = other;
+            if (!end || end[strlen(suffixes[output])] != '.') continue;
+            snprintf(other, sizeof other, "%.*s%.16s", (int)(end - names[i] < 200 ? end - names[i] : 200), names[i],
+                     end + strlen(suffixes[output]));
+            overlap |= bsearch(&key, names, (size_t)count, sizeof *names, compare_names) != NULL;
+        }
+    return overlap;
+}
+
+/* Frames of a path may have no file, those of several folders the same names, or one that is an output of another: they are numbered. */
 static int name_frames(olat_dataset *data)
 {
     const char **names = (const char **)malloc((size_t)data->count * sizeof *names + 1);
@@ -399,7 +471,8 @@ static int name_frames(olat_dataset *data)
     for (i = 0; i < data->count; i++)
         if (data->frames[i].file) names[named++] = base_name(&data->frames[i]);
     qsort(names, (size_t)named, sizeof *names, compare_names);
-    for (i = 1; i < named; i++) repeated |= !strcmp(names[i - 1], names[i]);
+    for (i = 1; i < named; i++) repeated |= !compare_names(&names[i - 1], &names[i]);
+    repeated |= names_overlap(names, named);
     free(names);
     for (i = 0; i < data->count; i++) {
         olat_frame *frame = &data->frames[i];
@@ -414,6 +487,8 @@ static int name_frames(olat_dataset *data)
 
 static int load_frames(job *j)
 {
+    const ssdgs_real *from = ssdgs_model_settings(j->model)->origin;
+    const double origin[3] = {(double)from[0], (double)from[1], (double)from[2]};
     char error[512] = "", name[64], *path = (char *)malloc(strlen(j->dataset) + 64);
     const char *split = j->given[SPLIT];
     int valid = !strcmp(split, "valid"), path_wanted = j->given[TRAJECTORY] != NULL;
@@ -427,7 +502,8 @@ static int load_frames(job *j)
     }
     free(path);
     snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
-    if (olat_load(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, &j->data, error)) return !fail(error);
+    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &j->data, error)) return !fail(error);
+    olat_print_notes(&j->data, "relight");
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
 }
 
@@ -439,7 +515,15 @@ static int relight(job *j)
     char error[512] = "";
     if (result) return fail(ssdgs_result_string(result));
     if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL)) return fail(ssdgs_error_message(j->context));
-    if (!load_frames(j) || !make_planes(j)) return 1;
+    if (j->given[NETWORKS]) {
+        ssdgs_model *original;
+        if (ssdgs_model_load(j->context, j->given[NETWORKS], &original, NULL)) return fail(ssdgs_error_message(j->context));
+        result = ssdgs_model_adopt(j->model, original);
+        ssdgs_model_destroy(original);
+        if (result) return fail(ssdgs_error_message(j->context));
+        fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", j->given[NETWORKS]);
+    }
+    if (!load_frames(j) || !check_outputs(j) || !make_planes(j)) return 1;
     make_folders(j->out);
     for (i = 0; i < j->data.count; i++) {
         const olat_frame *frame = &j->data.frames[i];
@@ -470,6 +554,7 @@ static int relight(job *j)
         if (!write_metrics(j, &mean)) return 1;
         printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT], mean.psnr, mean.ssim, mean.flip, scored);
     }
+    if (j->black > 1) fprintf(stderr, "relight: note: %d pictures of %d are black\n", j->black, j->data.count);
     printf("%d images in %s\n", j->data.count, j->out);
     return 0;
 }
@@ -484,6 +569,7 @@ int main(int argc, char **argv)
     ssdgs_model_destroy(j.model);
     ssdgs_context_destroy(j.context);
     olat_free(&j.data);
+    olat_guard_free(&j.guard);
     free(j.metrics);
     free(j.memory);
     free(j.bytes);

@@ -37,10 +37,15 @@ static int usage(const char *problem, const char *what)
     return 2;
 }
 
-/* What --set can set, by the names of ssdgs.h: so many ints or reals. */
-typedef struct field { const char *name; int in_options, reals, count; size_t at; } field;
-#define SETTING(reals, count, name) {#name, 0, reals, count, offsetof(ssdgs_settings, name)}
-#define OPTION(reals, count, name) {#name, 1, reals, count, offsetof(ssdgs_train_options, name)}
+/* The bounds in the dataset's coordinates, which may be too large for floats. */
+typedef struct corners { double bounds_min[3], bounds_max[3]; } corners;
+
+/* What --set can set, by the names of ssdgs.h: so many ints, reals or, of corners, doubles. */
+typedef enum place { IN_SETTINGS, IN_OPTIONS, IN_CORNERS } place;
+typedef struct field { const char *name; place in; int reals, count; size_t at; } field;
+#define SETTING(reals, count, name) {#name, IN_SETTINGS, reals, count, offsetof(ssdgs_settings, name)}
+#define OPTION(reals, count, name) {#name, IN_OPTIONS, reals, count, offsetof(ssdgs_train_options, name)}
+#define CORNER(name) {#name, IN_CORNERS, 1, 3, offsetof(corners, name)}
 static const field fields[] = {
     SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue), SETTING(0, 1, transport),
     SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
@@ -48,7 +53,7 @@ static const field fields[] = {
     SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, pixel_variance), SETTING(1, 1, eta),
     OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
     OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim), OPTION(1, 1, normal_weight),
-    OPTION(1, 3, bounds_min), OPTION(1, 3, bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size), OPTION(1, 1, densify_shadow),
+    CORNER(bounds_min), CORNER(bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size), OPTION(1, 1, densify_shadow),
     OPTION(1, 1, prune_opacity), OPTION(1, 1, prune_weight), OPTION(1, 1, prune_outside), OPTION(1, 1, opacity_fade), OPTION(1, 1, adam_epsilon),
     OPTION(1, 2, position), OPTION(1, 2, opacity), OPTION(1, 2, scale), OPTION(1, 2, rotation),
     OPTION(1, 2, color), OPTION(1, 2, asg), OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
@@ -56,15 +61,16 @@ static const field fields[] = {
 };
 
 /* NAME=VALUE[,VALUE...], the name and the number of values telling the field; what is wrong, or NULL. */
-static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, const char *text)
+static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, corners *bounds, const char *text)
 {
+    unsigned char *const places[3] = {(unsigned char *)settings, (unsigned char *)options, (unsigned char *)bounds};
     size_t length = strcspn(text, "="), i;
     const char *p = text + length, *problem = "--set knows no such number:";
     int count = 0, n;
     for (i = length; text[i]; i++) count += text[i] == '=' || text[i] == ',';
     for (i = 0; i < sizeof fields / sizeof *fields; i++) {
         const field *f = fields + i;
-        unsigned char *to = (f->in_options ? (unsigned char *)options : (unsigned char *)settings) + f->at;
+        unsigned char *to = places[f->in] + f->at;
         if (strlen(f->name) != length || strncmp(text, f->name, length)) continue;
         problem = "cannot set (rates take START,END, corners X,Y,Z)";
         if (f->count != count) continue;
@@ -75,7 +81,8 @@ static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *opti
             int whole = value > -2e9 && value < 2e9 ? (int)value : 0;
             if (end == p + 1 || (*end && *end != ',')) return problem;
             if (!f->reals && !(value >= whole && value <= whole)) return problem;
-            if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
+            if (f->in == IN_CORNERS) memcpy(to + (size_t)n * sizeof value, &value, sizeof value);
+            else if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
             else memcpy(to, &whole, sizeof whole);
             p = end;
         }
@@ -191,9 +198,11 @@ typedef struct job {
     const char *given[OPTION_COUNT], *dataset;
     ssdgs_settings settings;
     ssdgs_train_options options;
+    corners bounds;
     ssdgs_context_desc desc;
     run progress;
-    char *checkpoint;
+    char *checkpoint, *refined; /* paths, and NULL where none is written */
+    olat_guard guard;
     olat_dataset train_set, test_set;
     ssdgs_photo *photos, *test_photos;
     ssdgs_context *context;
@@ -254,8 +263,12 @@ static int parse(job *j, int argc, char **argv)
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
     j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
+    for (i = 0; i < 3; i++) {
+        j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
+        j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
+    }
     for (i = 0; i < sets; i++)
-        if ((problem = set_field(&j->settings, &j->options, argv[i])) != NULL) return usage(problem, argv[i]);
+        if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL) return usage(problem, argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
     j->desc.logger.write = hear;
     return 0;
@@ -298,22 +311,56 @@ static void print_peak_memory(void)
 #endif
 }
 
+/* No output may be one of the dataset's files, and all must be writable: better known now than after hours of training. */
+static int check_outputs(job *j, const char *train_json, char error[512])
+{
+    const char *const outputs[3] = {j->given[OUTPUT], j->checkpoint, j->refined};
+    int i;
+    if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
+        olat_guard_folder(&j->guard, j->dataset, "transforms_train.json", error) ||
+        olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error))
+        return 1;
+    for (i = 0; i < 3; i++) {
+        FILE *file;
+        if (!outputs[i]) continue;
+        if (olat_guard_output(&j->guard, outputs[i], error)) return 1;
+        file = fopen(outputs[i], "r+b"); /* what is there stays as it is */
+        if (!file && errno == ENOENT && (file = fopen(outputs[i], "ab")) != NULL) {
+            fclose(file);
+            remove(outputs[i]);
+        } else if (file) fclose(file);
+        if (!file) return sprintf(error, "%.480s: cannot be written", outputs[i]), 1;
+    }
+    return 0;
+}
+
+/* A run that is further than this one will get must not be lost for it. */
+static int check_checkpoint(job *j, char error[512])
+{
+    FILE *file = fopen(j->checkpoint, "rb");
+    int done;
+    if (!file) return 0;
+    fclose(file);
+    if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done))
+        return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o", ssdgs_error_message(j->context)), 1;
+    if (done > j->options.iterations)
+        return sprintf(error, "%.300s holds a run of %d iterations, and this one of %d would replace it: go on with --resume, give "
+                       "another name with -o, or remove it", j->checkpoint, done, j->options.iterations), 1;
+    return 0;
+}
+
 /* The training photographs' cameras and lights as refined, for what follows and in a file beside the model. */
 static int save_refined(job *j, char error[512])
 {
-    char *path = (char *)malloc(strlen(j->given[OUTPUT]) + 16);
     int i, failed;
-    if (!path) return sprintf(error, "out of memory"), 1;
-    sprintf(path, "%s.refined.json", j->given[OUTPUT]);
     for (i = 0; i < j->train_set.count; i++) {
         olat_frame *frame = &j->train_set.frames[i];
         ssdgs_trainer_refined(j->trainer, i, &frame->camera, &frame->light);
         j->photos[i].camera = frame->camera;
         j->photos[i].light = frame->light;
     }
-    failed = olat_save(path, j->dataset, &j->train_set, error);
-    if (!failed) printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n", path);
-    free(path);
+    failed = olat_save(j->refined, j->dataset, &j->train_set, error);
+    if (!failed) printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n", j->refined);
     return failed;
 }
 
@@ -328,25 +375,25 @@ static int train(job *j)
     FILE *file;
 
     j->checkpoint = (char *)malloc(strlen(output) + 8);
-    if (!j->checkpoint || !test_json) return free(test_json), fail("out of memory");
+    if (refines) j->refined = (char *)malloc(strlen(output) + 16);
+    if (!j->checkpoint || !test_json || (refines && !j->refined)) return free(test_json), fail("out of memory");
     sprintf(j->checkpoint, "%s.ckpt", output);
+    if (refines) sprintf(j->refined, "%s.refined.json", output);
     sprintf(test_json, "%s/transforms_test.json", j->dataset);
     file = fopen(test_json, "rb");
     has_test = file != NULL;
     if (file) fclose(file);
     free(test_json);
-    file = fopen(j->checkpoint, "ab"); /* better now than after hours of training */
-    if (!file) return sprintf(error, "%.480s: cannot be written", j->checkpoint), fail(error);
-    fseek(file, 0, SEEK_END);
-    i = ftell(file) == 0;
-    fclose(file);
-    if (i) remove(j->checkpoint);
-    file = fopen(output, "r+b");
-    if (!file && errno != ENOENT) return sprintf(error, "%.480s: cannot be written", output), fail(error);
-    if (file) fclose(file);
+    if (check_outputs(j, train_json, error)) return fail(error);
 
     if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
-    if (has_test && olat_load(j->dataset, "transforms_test.json", 0, &j->test_set, error)) return fail(error);
+    if (has_test && olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error)) return fail(error);
+    olat_print_notes(&j->train_set, "train");
+    for (i = 0; i < 3; i++) {
+        j->settings.origin[i] = (ssdgs_real)j->train_set.origin[i];
+        j->options.bounds_min[i] = (ssdgs_real)(j->bounds.bounds_min[i] - j->train_set.origin[i]);
+        j->options.bounds_max[i] = (ssdgs_real)(j->bounds.bounds_max[i] - j->train_set.origin[i]);
+    }
     j->photos = olat_photos(&j->train_set);
     if (!j->photos) return fail("out of memory");
     for (i = 0; i < j->train_set.count; i++) {
@@ -355,6 +402,7 @@ static int train(job *j)
     }
     result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
+    if (!j->given[RESUME] && check_checkpoint(j, error)) return fail(error);
     if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
         ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
         return fail(ssdgs_error_message(j->context));
@@ -416,6 +464,8 @@ int main(int argc, char **argv)
     free(j.test_photos);
     olat_free(&j.train_set);
     olat_free(&j.test_set);
+    olat_guard_free(&j.guard);
     free(j.checkpoint);
+    free(j.refined);
     return status;
 }

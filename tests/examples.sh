@@ -1,0 +1,139 @@
+#!/bin/sh
+# usage: examples.sh BUILD_DIR: what train and relight do with files of their users, and what they tell them. Closes with "N passed, N failed".
+build=$1 out=$1/examples_files
+passed=0 failed=0
+check() { # check NAME COMMAND...
+    name=$1; shift
+    if "$@"; then passed=$((passed + 1)); else failed=$((failed + 1)); echo "failed: $name"; sed 's/^/    /' "$out/log"; fi
+}
+says() { # says CODE TEXT COMMAND...: ends with that code and says that
+    code=$1 text=$2; shift 2
+    "$@" >"$out/log" 2>&1
+    [ $? -eq "$code" ] && grep -q -- "$text" "$out/log"
+}
+hash_of() { find "$@" -type f -exec cksum {} + | sort; }
+unchanged() { [ "$(hash_of "$set")" = "$before" ]; }
+psnr() { sed -n 's/.*"mean": {"psnr": \([-0-9.]*\).*/\1/p' "$1/metrics.json"; }
+near() { awk -v a="$1" -v b="$2" -v by="$3" 'BEGIN { exit !(a > b - by && a < b + by) }'; } # near A B BY
+
+rm -rf "$out"
+mkdir -p "$out/tiny/train" "$out/tiny/test"
+set=$out/tiny
+# 12 + 4 photographs of the demo's scene: the lines of their frames
+first_frames() { # first_frames COUNT FILE
+    awk -v count="$1" '/"file_path"/ && ++n > count { exit } { line[++l] = $0 } END {
+        if (n <= count) { for (i = 1; i <= l; i++) print line[i]; exit }
+        while (line[l] !~ /^  },/) l--
+        for (i = 1; i < l; i++) print line[i]
+        print "  }\n ]\n}" }' "$2"
+}
+first_frames 12 examples/data/waxcow/transforms_train.json >"$set/transforms_train.json"
+first_frames 4 examples/data/waxcow/transforms_test.json >"$set/transforms_test.json"
+for split in train test; do
+    sed -n 's|.*"file_path": "\./\(.*\)",|\1.png|p' "$set/transforms_$split.json" | while read -r file; do cp "examples/data/waxcow/$file" "$set/$file"; done
+done
+before=$(hash_of "$set")
+model=$out/model.ply
+train() { "$build/train" "$set" -o "$model" --iterations 40 --points 400 --threads 1 "$@"; }
+relight() { "$build/relight" "$model" "$set" --threads 1 "$@"; }
+
+check "train" says 0 "^test: PSNR" train --checkpoint-every 30
+
+# no output may be an input
+ln -s tiny/test "$out/link"
+mkdir -p "$out/hard"
+ln "$set/train/r_000.png" "$out/hard/r_000.png"
+for folder in "$set/test" "$set/./test" "$set/train/../test" "$out/link" "$set/train" "$out/hard"; do
+    check "--out $folder" says 1 "would replace an input" relight --out "$folder"
+done
+for sheet in "$set/test/r_000.png" "$out/link/r_000.png" "$model" "$set/transforms_train.json"; do
+    check "--sheet $sheet" says 1 "would replace an input" relight --out "$out/relit" --sheet "$sheet"
+done
+check "--sheet twice" says 1 "would be written twice" relight --out "$out/relit" --sheet "$out/relit/./r_000.png"
+check "nothing was rendered" test ! -e "$out/relit/r_000.png"
+for file in transforms_train.json transforms_test.json train/r_000.png test/r_000.png; do
+    check "-o $file" says 1 "would replace an input" "$build/train" "$set" -o "$set/$file" --iterations 1
+done
+cp "$set/transforms_train.json" "$set/x.ply.refined.json"
+check "--refine over its input" says 1 "would replace an input" "$build/train" "$set" -o "$set/x.ply" --iterations 1 --refine \
+    --train-json x.ply.refined.json
+rm "$set/x.ply.refined.json"
+check "the dataset is as it was" unchanged
+check "relight" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
+check "relight again" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
+check "the dataset is as it was" unchanged
+
+# names that differ in case, or by what components add, are numbered
+sed -e 's|test/r_001|test/R_000|' -e 's|test/r_002|test/r_000_depth|' "$set/transforms_test.json" >"$out/names.json"
+cp "$set/test/r_001.png" "$set/test/R_000.png" 2>/dev/null
+cp "$set/test/r_002.png" "$set/test/r_000_depth.png"
+cp "$set/transforms_test.json" "$out/kept.json"
+cp "$out/names.json" "$set/transforms_test.json"
+check "names alike" says 0 "4 images" relight --out "$out/names" --components
+check "names alike are numbered" test -e "$out/names/0003_depth.png" -a ! -e "$out/names/r_000.png"
+cp "$out/kept.json" "$set/transforms_test.json"
+rm -f "$set/test/R_000.png" "$set/test/r_000_depth.png"
+check "the dataset is as it was" unchanged
+
+# a checkpoint that is further stays
+kept=$(hash_of "$model.ckpt")
+check "a shorter run" says 1 "holds a run of 30 iterations, and this one of 20 would replace it" train --iterations 20
+check "its checkpoint stays" test "$(hash_of "$model.ckpt")" = "$kept"
+check "as long a run" says 0 "^test: PSNR" train --iterations 30
+check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
+echo "somebody's notes" >"$out/notes.ply.ckpt"
+check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1
+check "it stays" grep -q somebody "$out/notes.ply.ckpt"
+
+# an edited model, and its networks back
+check "whole" says 0 "4 images" relight --out "$out/whole"
+LC_ALL=C sed '/^element ssdgs_settings 1$/,/^end_header$/{/^end_header$/!d;}' "$model" >"$out/edited.ply"
+check "edited" says 0 "note: .*edited.ply: has no settings, ASG or networks" "$build/relight" "$out/edited.ply" "$set" --out "$out/edited" --threads 1
+check "edited looks different" test "$(psnr "$out/edited")" != "$(psnr "$out/whole")"
+check "--networks" says 0 "are those of" "$build/relight" "$out/edited.ply" "$set" --out "$out/given" --threads 1 --networks "$model"
+check "and is whole again" test "$(psnr "$out/given")" = "$(psnr "$out/whole")"
+
+# models with nothing to see
+header() { printf 'ply\nformat ascii 1.0\nelement vertex %s\n' "$1"; printf 'property float %s\n' x y z opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 \
+    f_dc_0 f_dc_1 f_dc_2; echo end_header; }
+header 0 >"$out/none.ply"
+check "no Gaussians" says 0 "none.ply: holds no Gaussians" "$build/relight" "$out/none.ply" "$set" --out "$out/none"
+check "black" says 0 "is black: the model holds no Gaussians" "$build/relight" "$out/none.ply" "$set" --out "$out/none"
+{ header 2; echo "nan 0 0 3 -2 -2 -2 1 0 0 0 1 1 1"; echo "0 0 0 3 -2 -2 -2 1 0 0 0 1 1 1"; } >"$out/half.ply"
+check "half" says 0 "half.ply: 1 Gaussians of 2 are left out" "$build/relight" "$out/half.ply" "$set" --out "$out/half"
+check "baked" says 0 "half.ply: plain splats" "$build/relight" "$out/half.ply" "$set" --out "$out/half"
+{ header 1; echo "500 0 0 3 -2 -2 -2 1 0 0 0 1 1 1"; } >"$out/far.ply"
+check "elsewhere" says 0 "is black: no Gaussian is in the picture" "$build/relight" "$out/far.ply" "$set" --out "$out/far"
+sed 's/^    100.0/    0.0/' "$set/transforms_test.json" >"$out/dark.json"
+mkdir "$out/dark_set"
+cp -r "$set/test" "$out/dark_set/test"
+cp "$out/dark.json" "$out/dark_set/transforms_test.json"
+check "dark" says 0 "is black: the light's intensity is 0" "$build/relight" "$model" "$out/dark_set" --out "$out/dark"
+check "all of them" says 0 "4 pictures of 4 are black" "$build/relight" "$model" "$out/dark_set" --out "$out/dark"
+
+# the scene somewhere else, where floats are half a unit apart: trains as at 0, and comes back there
+shift_set() { # shift_set FROM TO: every position by (5e6, -4e6, 6e6)
+    awk 'BEGIN { by[1] = 5e6; by[2] = -4e6; by[3] = 6e6 }
+        /"pl_pos"/ { pos = 1; n = 0 } /"transform_matrix"/ { matrix = 1; n = 0 } /"pl_intensity"/ { pos = matrix = 0 }
+        /^ *-?[0-9.e+-]+,?$/ { n++; v = $1; comma = sub(/,/, "", v)
+            if (pos && n <= 3) $0 = sprintf("%.9f%s", v + by[n], comma ? "," : "")
+            if (matrix && n % 4 == 0 && n <= 12) $0 = sprintf("%.9f%s", v + by[n / 4], comma ? "," : "") }
+        /^   \]/ { pos = matrix = 0 } { print }' "$1" >"$2"
+}
+mkdir "$out/moved"
+cp -r "$set/train" "$set/test" "$out/moved"
+for split in train test; do shift_set "$set/transforms_$split.json" "$out/moved/transforms_$split.json"; done
+check "far away" says 0 "coordinates are taken relative to 5e+06, -4e+06, 6e+06\|coordinates are taken relative to 5000000" \
+    "$build/train" "$out/moved" -o "$out/moved.ply" --iterations 40 --points 400 --threads 1 --refine \
+    --set bounds_min=4999999.5,-4000000.5,5999999.5 --set bounds_max=5000000.5,-3999999.5,6000000.5
+check "near" says 0 "^test: PSNR" train --refine -o "$out/near.ply"
+check "relit far away" says 0 "4 images" "$build/relight" "$out/moved.ply" "$out/moved" --out "$out/moved_relit" --threads 1
+check "relit near" says 0 "4 images" "$build/relight" "$out/near.ply" "$set" --out "$out/near_relit" --threads 1
+check "as good as at 0: $(psnr "$out/moved_relit") and $(psnr "$out/near_relit") dB" near "$(psnr "$out/moved_relit")" "$(psnr "$out/near_relit")" 0.3
+check "its refined lights are there" awk '/"pl_pos"/ { n++; gsub(/[^-0-9.e+ ]/, " "); if ($1 < 4999990 || $1 > 5000010 || $3 < 5999990) bad = 1 }
+    END { exit bad || !n }' "$out/moved.ply.refined.json"
+check "its Gaussians are doubles" grep -aq "property double x" "$out/moved.ply"
+
+rm -rf "$out"
+echo "$passed passed, $failed failed"
+[ $failed -eq 0 ]
