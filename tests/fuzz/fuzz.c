@@ -713,6 +713,153 @@ static void fuzz_dataset(const unsigned char *data, size_t size) {
     ssdgs_context_destroy(context);
 }
 
+/* ---- calls in any order and from anywhere: hooks, tasks, the allocator, the log, the progress callback ---- */
+
+static struct {
+    input *in;
+    ssdgs_context *context; /* NULL once destroyed, as the next two */
+    ssdgs_model *model;
+    ssdgs_trainer *trainer;
+    ssdgs_photo photo;
+    int depth, runs; /* callbacks under way, all of them or progress callbacks alone */
+} play;
+
+static int play_progress(void *user, const ssdgs_train_stats *stats);
+
+/* One call, as a byte says. From within another it must be refused; from the progress callback it may be anything. */
+static void play_call(void) {
+    static ssdgs_real color[64 * 3];
+    const int what = draw_below(play.in, 14), within = play.depth > play.runs;
+    const ssdgs_real background[3] = {0, 0, 0};
+    ssdgs_train_options options = ssdgs_train_options_default();
+    ssdgs_result result = SSDGS_ERR_ARGUMENT;
+    ssdgs_photo photo = play.photo;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_metrics metrics;
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    options.iterations = 4;
+    options.densify_from = options.densify_every = 1;
+    options.initial_points = 20;
+    switch (what) {
+    case 0: case 1: if (play.model) result = ssdgs_render(play.model, &photo.camera, &photo.light, draw_below(play.in, 2), &image); break;
+    case 2: if (play.model) result = ssdgs_model_sort(play.model); break;
+    case 3: if (play.model) result = ssdgs_evaluate(play.model, &photo, background, NULL, &metrics); break;
+    case 4: if (play.model) result = ssdgs_refine_photo(play.model, &photo, background, 1); break;
+    case 5: if (play.context) result = ssdgs_compare(play.context, color, color, 8, 8, &metrics); break;
+    case 6: if (play.context) result = ssdgs_model_create(play.context, NULL, draw_below(play.in, 30), &model); break;
+    case 7: if (play.context) result = ssdgs_model_load_memory(play.context, "ply\nformat", 10, &model, NULL); break;
+    case 8: if (play.model) result = ssdgs_trainer_create(play.model, &photo, 1, &options, &trainer); break;
+    case 9: if (play.trainer) result = ssdgs_trainer_step(play.trainer, NULL); break;
+    case 10: if (play.trainer && play.runs < 3) result = ssdgs_trainer_run(play.trainer, play_progress, NULL); break;
+    case 11:
+        if (play.runs && !within) break; /* the run's own, which is refused and stays */
+        ssdgs_trainer_destroy(play.trainer);
+        if (!within) play.trainer = NULL;
+        break;
+    case 12:
+        ssdgs_model_destroy(play.model);
+        if (!within) play.model = NULL;
+        break;
+    default:
+        ssdgs_context_destroy(play.context);
+        if (!within) play.context = NULL;
+        break;
+    }
+    if (within) HOLDS(result == SSDGS_ERR_ARGUMENT && !model && !trainer);
+    if (model) {
+        if (play.model) ssdgs_model_destroy(model);
+        else play.model = model;
+    }
+    if (trainer) {
+        if (play.trainer) ssdgs_trainer_destroy(trainer);
+        else play.trainer = trainer;
+    }
+}
+
+static void play_within(void) {
+    if (!play.in || play.depth > play.runs || draw_below(play.in, 3) != 1) return;
+    play.depth++;
+    play_call();
+    play.depth--;
+}
+
+static int play_progress(void *user, const ssdgs_train_stats *stats) {
+    (void)user, (void)stats;
+    play.runs++;
+    play.depth++;
+    if (draw(play.in) & 1) play_call();
+    play.depth--;
+    play.runs--;
+    return play.trainer && !(draw(play.in) & 2);
+}
+
+#define PLAY_STAGE(name) static ssdgs_result play_##name(void *user, ssdgs_frame *frame) { \
+    (void)user; play_within(); return ssdgs_stage_cpu(frame, SSDGS_STAGE_##name); }
+PLAY_STAGE(PROJECT) PLAY_STAGE(SORT) PLAY_STAGE(BIN) PLAY_STAGE(WALK) PLAY_STAGE(SHADE) PLAY_STAGE(COMPOSITE)
+PLAY_STAGE(COMPOSITE_BACKWARD) PLAY_STAGE(SHADE_BACKWARD) PLAY_STAGE(PROJECT_BACKWARD)
+
+static void play_run(void *user, int count, void (*task)(void *data, int index), void *data) {
+    int i;
+    (void)user;
+    for (i = 0; i < count; i++) task(data, i);
+    play_within();
+}
+
+static void *play_allocate(void *user, size_t bytes) {
+    void *memory;
+    (void)user;
+    play_within();
+    memory = malloc(bytes);
+    return memory;
+}
+
+static void play_release(void *user, void *memory) {
+    (void)user;
+    play_within();
+    free(memory);
+}
+
+static void play_hear(void *user, ssdgs_result code, const char *message) {
+    (void)user, (void)code;
+    HOLDS(message[0]);
+    play_within();
+}
+
+static void fuzz_hooks(const unsigned char *data, size_t size) {
+    static ssdgs_result (*const stages[SSDGS_STAGE_COUNT])(void *, ssdgs_frame *) = {
+        play_PROJECT, play_SORT, play_BIN, play_WALK, play_SHADE, play_COMPOSITE, play_COMPOSITE_BACKWARD, play_SHADE_BACKWARD,
+        play_PROJECT_BACKWARD};
+    static unsigned char pixels[64 * 4];
+    input in = {data, data + size, 1}, defaults = defaults_only();
+    ssdgs_context_desc desc;
+    ssdgs_model *model = NULL;
+    int i, hooks = draw(&in), flags = draw(&in);
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 1 + (flags & 1);
+    for (i = 0; i < SSDGS_STAGE_COUNT; i++)
+        if ((hooks | (flags & 2) << 7) >> i & 1) desc.gpu.stage[i] = stages[i];
+    if (flags & 4) desc.parallel.run = play_run;
+    if (flags & 8) desc.allocator.allocate = play_allocate, desc.allocator.release = play_release;
+    if (flags & 16) desc.logger.write = play_hear;
+    memset(&play, 0, sizeof play);
+    play.photo.camera = draw_camera(&defaults, 1);
+    play.photo.camera.width = play.photo.camera.height = 8;
+    play.photo.light = draw_light(&defaults);
+    memset(pixels, 100, sizeof pixels);
+    play.photo.pixels = pixels;
+    HOLDS(!ssdgs_context_create(&desc, &play.context) && !ssdgs_model_create(play.context, NULL, 30, &model));
+    play.model = model;
+    play.in = &in;
+    for (i = 0; i < 40 && in.at < in.end && (play.model || play.context || play.trainer); i++) play_call();
+    play.in = NULL;
+    ssdgs_trainer_destroy(play.trainer);
+    ssdgs_model_destroy(play.model);
+    ssdgs_context_destroy(play.context);
+}
+
 /* ---- which target, and both ways to start ---- */
 
 typedef struct target {
@@ -721,7 +868,7 @@ typedef struct target {
 } target;
 static const target targets[] = {{"png", fuzz_png}, {"unfilter", fuzz_unfilter}, {"inflate", fuzz_inflate}, {"json", fuzz_json},
                                  {"json_string", fuzz_json_string}, {"dataset", fuzz_dataset}, {"ply", fuzz_ply},
-                                 {"checkpoint", fuzz_checkpoint}, {"render", fuzz_render}, {"train", fuzz_train}};
+                                 {"checkpoint", fuzz_checkpoint}, {"render", fuzz_render}, {"train", fuzz_train}, {"hooks", fuzz_hooks}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
