@@ -4827,45 +4827,46 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     return out;
 }
 
-/* The bytes of 8192 equal parts of 0 .. 1, made for each call. Where a byte begins within a part, which may be 0.4 of a byte wide,
-   the part belongs to the byte before. */
+/* The bytes of 8192 equal parts of 0 .. 1 by the sRGB curve, made for each call: where a byte begins within a part, which may be 0.4 of
+   a byte wide, the part belongs to the byte before. */
 enum { SSDGS__PARTS = 8192 };
 
-static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS], int transfer) {
-    ssdgs_real begin[256], linear[256];
+static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
+    ssdgs_real begin[256];
     int byte, at = 0;
-    for (byte = 0; byte < 256; byte++) begin[byte] = linear[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
-    if (transfer == SSDGS_TRANSFER_SRGB) ssdgs__srgb_decode_scalar(linear, begin, 256);
+    for (byte = 0; byte < 256; byte++) begin[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
+    ssdgs__srgb_decode_scalar(begin, begin, 256);
     for (byte = 0; byte < 256; byte++) {
-        const int end = byte < 255 ? (int)(linear[byte] * SSDGS__PARTS) + 1 : SSDGS__PARTS;
+        const int end = byte < 255 ? (int)(begin[byte] * SSDGS__PARTS) + 1 : SSDGS__PARTS;
         memset(bytes + at, byte, (size_t)(end - at));
         at = end;
     }
 }
 
-/* NaN's is 0. */
-static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *bytes, ssdgs_real value) {
+/* Of a value by the table, or as it is without one; NaN's is 0. */
+static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *table, ssdgs_real value) {
     value = value > 0 ? value : 0;
     value = value < 1 ? value : 1;
-    return bytes[(int)(value * (ssdgs_real)(SSDGS__PARTS - 0.5))];
+    return table ? table[(int)(value * (ssdgs_real)(SSDGS__PARTS - 0.5))] : (unsigned char)(value * 255 + (ssdgs_real)0.5);
 }
 
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
     unsigned char table[SSDGS__PARTS];
     size_t i;
     if (!values || !bytes) return;
-    ssdgs__bytes_make(table, transfer);
-    for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
+    ssdgs__bytes_make(table);
+    if (transfer == SSDGS_TRANSFER_SRGB) for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
+    else for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
 }
 
 SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
                                ptrdiff_t pitch) {
     const int red = format == SSDGS_BGRA8 ? 2 : 0;
-    unsigned char table[SSDGS__PARTS], alphas[SSDGS__PARTS];
+    unsigned char bytes[SSDGS__PARTS];
+    const unsigned char *table = transfer == SSDGS_TRANSFER_SRGB ? bytes : NULL;
     int x, y;
     if (!image || !image->color || !pixels) return;
-    ssdgs__bytes_make(table, transfer);
-    ssdgs__bytes_make(alphas, SSDGS_TRANSFER_NONE);
+    ssdgs__bytes_make(bytes);
     for (y = 0; y < height; y++) {
         const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
         const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
@@ -4875,16 +4876,16 @@ SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, 
             to[red] = ssdgs__byte(table, color[0] * by);
             to[1] = ssdgs__byte(table, color[1] * by);
             to[2 - red] = ssdgs__byte(table, color[2] * by);
-            to[3] = ssdgs__byte(alphas, a);
+            to[3] = ssdgs__byte(NULL, a);
         }
     }
 }
 
-/* The transfer curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most up to 1. */
+/* The sRGB curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most up to 1. */
 enum { SSDGS__LINES_FIRST = (127 - 13) << 6, SSDGS__LINES = 30 << 6 };
 typedef struct ssdgs__line { ssdgs_real at, slope; } ssdgs__line;
 
-static void ssdgs__lines_make(ssdgs__line *lines, int transfer) {
+static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
     enum { OCTAVE = 64, POINTS = OCTAVE + 16 };
     ssdgs_real from[POINTS], encoded[POINTS];
     int begin, i;
@@ -4893,39 +4894,43 @@ static void ssdgs__lines_make(ssdgs__line *lines, int transfer) {
             const uint32_t bits = (uint32_t)(SSDGS__LINES_FIRST + begin + i) << 17;
             float start;
             memcpy(&start, &bits, sizeof start);
-            from[i] = encoded[i] = (ssdgs_real)start;
+            from[i] = (ssdgs_real)start;
         }
-        if (transfer == SSDGS_TRANSFER_SRGB) SSDGS__SRGB_ENCODE(encoded, NULL, from, POINTS);
+        SSDGS__SRGB_ENCODE(encoded, NULL, from, POINTS);
         for (i = 0; i < OCTAVE; i++) {
             const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
-            /* the first octave belongs to the part that is straight from 0 on, as all of no curve is */
-            const int straight = !begin || transfer != SSDGS_TRANSFER_SRGB;
             lines[begin + i].slope = slope;
-            lines[begin + i].at = straight ? 0 : encoded[i] - slope * from[i];
+            lines[begin + i].at = begin ? encoded[i] - slope * from[i] : 0; /* the curve is straight from 0 on to beyond the first octave */
         }
     }
 }
 
-static SSDGS__INLINE ssdgs_real ssdgs__on_line(const ssdgs__line *lines, ssdgs_real linear) {
-    const float x = (float)linear;
+/* Of a value by the lines, or as it is without them. */
+static SSDGS__INLINE ssdgs_real ssdgs__on_curve(const ssdgs__line *lines, ssdgs_real linear) {
+#ifdef SSDGS_REAL64
+    return lines ? ssdgs_srgb_encode(linear) : linear; /* exact, for tests */
+#else
     int32_t line;
-    memcpy(&line, &x, sizeof line);
+    if (!lines) return linear;
+    memcpy(&line, &linear, sizeof line);
     line = (line >> 17) - SSDGS__LINES_FIRST; /* below 0: of less than 2^-13, negative ones too */
     line = line < 0 ? 0 : line;
     line = line < SSDGS__LINES ? line : SSDGS__LINES - 1;
     return lines[line].at + lines[line].slope * linear;
+#endif
 }
 
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored) {
-    ssdgs__line lines[SSDGS__LINES];
+    ssdgs__line curve[SSDGS__LINES];
+    const ssdgs__line *lines = transfer == SSDGS_TRANSFER_SRGB ? curve : NULL;
     size_t i;
     int c;
     if (!color || !alpha || !background || !stored) return;
-    ssdgs__lines_make(lines, transfer);
+    ssdgs__lines_make(curve);
     for (i = 0; i < pixels; i++, color += 3, stored += 3) {
         const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-        for (c = 0; c < 3; c++) stored[c] = a * ssdgs__on_line(lines, color[c] * by) + (1 - a) * background[c];
+        for (c = 0; c < 3; c++) stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];
     }
 }
 
