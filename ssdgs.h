@@ -4827,9 +4827,10 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     return out;
 }
 
-/* The bytes of 8192 equal parts of 0 .. 1 by the sRGB curve, made for each call: where a byte begins within a part, which may be 0.4 of
-   a byte wide, the part belongs to the byte before. */
+/* The bytes of 8192 equal parts of 0 .. 1, the last one half, by the sRGB curve, made for each call: each part has the byte of its
+   middle, 0.2 of a byte from its ends at most. */
 enum { SSDGS__PARTS = 8192 };
+#define SSDGS__PART_SCALE ((ssdgs_real)(SSDGS__PARTS - 0.5))
 
 static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
     ssdgs_real begin[256];
@@ -4837,7 +4838,7 @@ static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
     for (byte = 0; byte < 256; byte++) begin[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
     ssdgs__srgb_decode_scalar(begin, begin, 256);
     for (byte = 0; byte < 256; byte++) {
-        const int end = byte < 255 ? (int)(begin[byte] * SSDGS__PARTS) + 1 : SSDGS__PARTS;
+        const int end = byte < 255 ? (int)(begin[byte] * SSDGS__PART_SCALE + (ssdgs_real)0.5) : SSDGS__PARTS;
         memset(bytes + at, byte, (size_t)(end - at));
         at = end;
     }
@@ -4847,7 +4848,7 @@ static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
 static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *table, ssdgs_real value) {
     value = value > 0 ? value : 0;
     value = value < 1 ? value : 1;
-    return table ? table[(int)(value * (ssdgs_real)(SSDGS__PARTS - 0.5))] : (unsigned char)(value * 255 + (ssdgs_real)0.5);
+    return table ? table[(int)(value * SSDGS__PART_SCALE)] : (unsigned char)(value * 255 + (ssdgs_real)0.5);
 }
 
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
