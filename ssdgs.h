@@ -5825,6 +5825,32 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     return SSDGS_OK;
 }
 
+/* An origin for doubles of others that lie a thousand times their box away from 0, where floats of them would be coarse. */
+static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
+    ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    size_t row;
+    int i, doubles = 0, far_away = 0;
+    for (i = 0; i < vertex->properties; i++) {
+        const ssdgs__ply_property *p = ply->properties + vertex->first + i;
+        doubles += p->type == SSDGS__PLY_FLOAT64 && p->list < 0 && p->word >= 0 && p->word < SSDGS_ROTATION;
+    }
+    ply->at = vertex->data;
+    for (row = 0; doubles == 3 && row < vertex->count; row++) {
+        uint32_t words[SSDGS__PLY_WORDS];
+        if (!ssdgs__ply_row(ply, vertex, words)) return; /* which reading it will tell */
+        for (i = 0; i < 3; i++) {
+            const double x = ssdgs__ply_value(words[i]);
+            if (!ssdgs__ply_finite(words[i])) continue;
+            low[i] = x < low[i] ? x : low[i];
+            high[i] = x > high[i] ? x : high[i];
+        }
+    }
+    for (i = 0; i < 3 && row && doubles == 3; i++) far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
+    for (i = 0; i < 3 && far_away; i++)
+        ply->origin[i] = (double)(settings->origin[i] = (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
+}
+
 static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
     int i;
     for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name); i++) {}
@@ -5864,6 +5890,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         settings = ssdgs_settings_published();
     }
     if (!result) result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
+    if (!result && !ours) ssdgs__ply_find_origin(ply, &settings);
     for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
         const size_t expected = ssdgs__ply_rows(&settings, kind), rows = ply->known[kind] ? ply->known[kind]->count : 0;
         if (rows != expected && (ours || ply->known[kind]))
