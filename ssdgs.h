@@ -37,7 +37,8 @@ DO THIS
     }
 --- end ---
 
-  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on photographs that the program has read:
+  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on photographs that the
+  program has read:
 
 --- train example ---
     #define SSDGS_IMPLEMENTATION
@@ -65,9 +66,9 @@ DO THIS
     }
 --- end ---
 
-  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole, but
-  terms that the schedule had not reached (stats->terms; in the default's all join after a twelfth of a run) are untrained: render
-  without them.
+  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole,
+  but terms that the schedule had not reached (stats->terms; in the default's all join after a twelfth of a run) are
+  untrained: render without them.
 
 WHAT IT COMPUTES
   Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one colour C each:
@@ -146,13 +147,12 @@ MEMORY
   All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both or none),
   called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed inside, so it need not do
   either. What the C library needs itself (qsort, stdio, threads) is not in it.
-  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has
-  been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on
-  screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer. Contexts, models
-  and trainers may be destroyed in any order: a model stays until its trainer is gone, a context until its models and
-  trainers are, and the log is told. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
-  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not
-  counted.
+  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has been
+  rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on screen).
+  Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer. Contexts, models and
+  trainers may be destroyed in any order: a model stays until its trainer is gone, a context until its models and trainers
+  are, and the log is told. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
+  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not counted.
 
 THREADS
   A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each thread may
@@ -206,24 +206,26 @@ DETERMINISM
 
 ERRORS
   Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
-  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter or byte. Without a
-  context there is none. desc.logger hears every message as it comes, and notes with the code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS.
-  Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG are not; Gaussians
-  that are not finite are not drawn, those whose colour is not are black. A training step with a gradient that is not finite changes no parameter, counts in
-  skipped_steps and returns SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
+  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter or byte.
+  Without a context there is none. desc.logger hears every message as it comes, and notes with the code SSDGS_OK. Options
+  that no _default() function made are SSDGS_ERR_OPTIONS. Nothing exits or prints.
+  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG are not;
+  Gaussians that are not finite are not drawn, those whose colour is not are black. A training step with a gradient that
+  is not finite changes no parameter, counts in skipped_steps and returns SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on
+  after it and gives up at ten in a row.
 
 FILES
   A model is one binary little-endian PLY of 32-bit values: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
   splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
-  raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders,
-  skips what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats).
-  Limits: 8 GiB, 2^28 Gaussians, a header of 1 MiB. With settings.origin x y z are doubles, in the dataset's coordinates.
-  A plain 3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it
-  cannot be trained. One with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and
-  networks at their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all this. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options, settings,
-  cameras or lights are refused. Both kinds of file are written under another name and renamed when
-  complete: a link is replaced, not followed, and the file's mode is a new file's.
+  raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders, skips
+  what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats). Limits:
+  8 GiB, 2^28 Gaussians, a header of 1 MiB. With settings.origin x y z are doubles, in the dataset's coordinates. A plain
+  3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it cannot be
+  trained. One with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and networks at
+  their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all this. Checkpoints
+  hold a run's whole state in native byte order; other versions, precisions, options, settings, cameras or lights are
+  refused. Both kinds of file are written under another name and renamed when complete: a link is replaced, not followed,
+  and the file's mode is a new file's.
 
 DOUBLE
   With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values and
