@@ -7569,13 +7569,13 @@ static double ssdgs__correlation(const double *a, const double *b, int n, int wi
     return ab / sqrt(aa * bb + 1e-30);
 }
 
-/* How well shading follows the lights, 1 at most: a picture is brightest on the light's side, and as a whole where the light is on the
-   camera's side. *facing: how far on that side lights are, on average, with twice its error added; of what lies on the ground only
-   two axes tell. scratch: (n, 6). */
+/* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright as a whole where the light is
+   on the camera's side. On a floor seen from above only two axes tell of the former. 1 where nothing tells. *facing: how far the lights
+   are on the camera's side, on average, plus twice its error. scratch: (n, 6). */
 static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading, const double centre[3], double *scratch,
                                double *facing) {
     double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
-    double best = -1, spread, mean = 0, brightness = 0, front_mean = 0;
+    double sideways = -2, frontal, spread, brightness = 0, front_mean = 0;
     int flat, i, c, l;
     for (flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
         double lights = 0, shown = 0, r;
@@ -7601,13 +7601,14 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
         }
         if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0)) continue; /* neither a floor nor a ceiling */
         r = ssdgs__correlation(toward, shift, n, 2, &shown);
-        best = shown > 0.1 && r > best ? r : best;
+        sideways = shown > 0.1 && r > sideways ? r : sideways;
     }
     for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
     for (i = 0; i < n; i++) bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
-    mean = ssdgs__correlation(front, bright, n, 1, &spread);
+    frontal = ssdgs__correlation(front, bright, n, 1, &spread);
     *facing = front_mean + 2 * spread / sqrt((double)n);
-    return spread > 0.2 ? 0.5 * (best + mean) : best; /* where lights hardly change sides brightness tells nothing */
+    if (!(spread > 0.2)) return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
+    return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
 }
 
 /* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. */
@@ -7624,7 +7625,7 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     if (!s) return SSDGS_ERR_MEMORY;
     for (i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
     agrees = n < FEW ? 1 : ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
-    if (agrees > -1 && (agrees < 0.6 || (n >= FEW && facing < -0.1))) {
+    if (agrees < 0.6 || (n >= FEW && facing < -0.1)) {
         for (way = 0; way < 4 && n >= ENOUGH; way++)
             for (order = 0; order < 6; order++)
                 for (signs = 0; signs < 8; signs++) {
@@ -7654,19 +7655,19 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     return SSDGS_OK;
 }
 
-/* Notes where the lights do not tell what other lights do. */
+/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes. */
 static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
-    double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0;
+    double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
     int pass, i, j, within = 0, points = 0;
     for (j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
     for (pass = 0; pass < 2; pass++)
         for (i = 0; i < n; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
             const int point = photo->light.kind == SSDGS_LIGHT_POINT;
-            double p[3], seen[3], eye[3], from_mean = 0, from_held = 0, to_eye = 0;
+            double p[3], seen[3], eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
             ssdgs__camera_centre(&photo->camera, eye);
             for (j = 0; j < 3; j++) p[j] = (double)photo->light.position[j];
             ssdgs__to_camera(&photo->camera, p, point, seen);
@@ -7674,11 +7675,13 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
                 from_mean += (p[j] - mean[j]) * (p[j] - mean[j]);
                 from_held += (seen[j] - held[j]) * (seen[j] - held[j]);
                 to_eye += (eye[j] - centre[j]) * (eye[j] - centre[j]);
+                to_light += (p[j] - centre[j]) * (p[j] - centre[j]);
             }
             if (pass) {
                 spread = from_mean > spread ? from_mean : spread;
                 apart = from_held > apart ? from_held : apart;
                 away += (points ? sqrt(to_eye) : 1) / n;
+                lit_from += (points ? sqrt(to_light) : 1) / n;
                 continue;
             }
             for (j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
@@ -7688,9 +7691,9 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
         }
     if (within) ssdgs__note(context, "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone", within, n);
     if (n < 2 || (points && points < n)) return SSDGS_OK;
-    if (sqrt(spread) < 1e-3 * (points ? trainer->unit : 1))
+    if (sqrt(spread) < 0.03 * lit_from)
         ssdgs__note(context, "all photographs are lit from one place: they do not tell how the object looks in other light");
-    else if (sqrt(apart) < 0.03 * away)
+    else if (sqrt(apart) < 0.1 * away)
         ssdgs__note(context, "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in all photographs: they do "
                     "not tell how the object looks in other light", floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);

@@ -1569,7 +1569,7 @@ static void test_light_notes(void) {
         for (k = 0; k < SHOTS; k++) {
             const double turn = 2.4 * k, rise = cases[i].above ? 0.95 : 1 - (2 * k + 1.0) / SHOTS, out = sqrt(1 - rise * rise);
             const double light_turn = 1.7 * k + 1, light_rise = cases[i].above ? 0.5 : 0.9 * sin(2.9 * k), light_out = sqrt(1 - light_rise * light_rise);
-            const double away = cases[i].directional ? 1 : 2 + 0.2 * (k % 3);
+            const double away = cases[i].directional ? 1 : strcmp(name, "one") ? 2 + 0.2 * (k % 3) : 2;
             const ssdgs_real eye[3] = {(ssdgs_real)(2 * out * cos(turn)), (ssdgs_real)(2 * out * sin(turn)), (ssdgs_real)(2 * rise)};
             ssdgs_light *light = &shots[k].light;
             ssdgs_real p[3], *to;
@@ -1579,8 +1579,11 @@ static void test_light_notes(void) {
             light->position[1] = (ssdgs_real)(away * light_out * sin(light_turn));
             light->position[2] = (ssdgs_real)(away * light_rise);
             for (c = 0; c < 3; c++) light->intensity[c] = cases[i].directional ? 1 : 4;
-            if (!strcmp(name, "flash")) memcpy(light->position, eye, sizeof eye);
-            if (!strcmp(name, "one")) memcpy(light->position, shots[0].light.position, sizeof eye);
+            for (c = 0; c < 3; c++) { /* held by hand */
+                const double shake = (cases[i].directional ? 0.01 : 0.03) * sin(7.0 * k + 2 * c);
+                if (!strcmp(name, "flash")) light->position[c] = eye[c] + (ssdgs_real)shake;
+                if (!strcmp(name, "one")) light->position[c] = (ssdgs_real)((c == 2 ? 1 : 0) * away + (cases[i].directional ? 0 : shake));
+            }
             ball_picture(&shots[k].camera, light, cases[i].multiplied, pictures[k]);
             shots[k].pixels = pictures[k];
             shots[k].format = SSDGS_PIXELS_RGBA8;
