@@ -126,8 +126,8 @@ CONVENTIONS
   images    (h,w,3) or (h,w), row-major, top row first, stride in pixels, up to 32768 pixels a side. Photographs: RGBA, 8
             or 16 bit, straight alpha, tightly packed. Those with transparency are fitted on a new random background each
             step; random_background = 0 puts them on options.background. Where none is transparent around the object, their
-            borders decide: of the colour of options.background to two bytes, they show an empty background, and Gaussians of
-            its colour fade; else everything they show is opaque. A note says which.
+            borders decide: where most are of about the colour of options.background, that is empty, and Gaussians of its
+            colour fade; else everything that they show is opaque. A note says which.
   networks  per layer (out,in) weights, row-major, then (out) biases; ReLU between layers.
 
 OPTIONS, macros defined before the header; those with * the same way in every file that includes it
@@ -151,7 +151,7 @@ MEMORY
   rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on screen).
   Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer. Contexts, models and
   trainers may be destroyed in any order: a model stays until its trainer is gone, a context until its models and trainers
-  are, and the log is told. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
+  are, and the log is told; the allocator and the log must be there as long. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
   run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not counted.
 
 THREADS
@@ -159,7 +159,7 @@ THREADS
   have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller counted) and joins them
   when destroyed. desc.parallel, if set, replaces them: it gets batches of independent tasks and returns when all are
   done. Hooks, the allocator, the log and the progress callback run on the caller's thread.
-  While a call is at work, any other on the same context returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
+  While a call is at work, any other that uses the same context, so all but those that only tell something of it, returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
   whether it comes from a hook (which may call ssdgs_stage_cpu()), a task, the allocator, the log or, where the compiler has
   atomic operations, another thread. The progress callback runs between two steps: it may make any call but the one that
   destroys its trainer.
@@ -215,7 +215,7 @@ ERRORS
   after it and gives up at ten in a row.
 
 FILES
-  A model is one binary little-endian PLY of 32-bit values: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
+  A model is one binary little-endian PLY: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
   splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
   raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders, skips
   what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats). Limits:
@@ -458,7 +458,7 @@ typedef struct ssdgs_settings {
     ssdgs_real centre[3];     /* origin of the networks' positions */
     ssdgs_real length_unit;   /* world units in one network unit */
     ssdgs_real light_scale;   /* factor from the dataset's intensities to the model's */
-    ssdgs_real origin[3];     /* where the model's 0 lies in the world of its dataset, exactly. Nothing is computed with it: it is for
+    ssdgs_real origin[3];     /* where the model's 0 lies in the world of its dataset, as floats. Nothing is computed with it: it is for
                                  scenes far from 0, whose cameras, lights and Gaussians are given less it, since floats would be too
                                  coarse. Files hold positions with it added, as doubles */
 } ssdgs_settings;
@@ -501,8 +501,9 @@ typedef struct ssdgs_load_stats {
     int clamped_scales;      /* beyond +-20 */
     int dropped;             /* Gaussians with other non-finite values */
     int plain;               /* 1: no SSD-GS properties, loaded as baked colours */
-    int untrained;           /* 1: ours, but without settings, ASG or a network, which other programs drop: has the published settings
-                                and networks at their start instead. ssdgs_model_adopt() gives it those of the original */
+    int untrained;           /* 1: ours, but without settings, which other programs drop, mostly with ASG and networks: has the published
+                                settings, and networks at their start where they are missing. ssdgs_model_adopt() gives it those of
+                                the original */
     int sorted;              /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
 } ssdgs_load_stats;
 
@@ -1420,8 +1421,12 @@ static void ssdgs__context_drop(ssdgs_context *context);
 
 /* Ends one that took a reference first, as it may free all others; the context is busy until it is gone. */
 static void ssdgs__leave_and_drop(ssdgs_context *context) {
-    if (context->references > 1) SSDGS__PUBLISH(&context->busy, 0);
-    ssdgs__context_drop(context);
+    if (context->references == 1) {
+        ssdgs__context_drop(context);
+        return;
+    }
+    context->references--;
+    SSDGS__PUBLISH(&context->busy, 0);
 }
 
 static int ssdgs__product_fits(size_t a, size_t b, size_t *product) {
@@ -5878,7 +5883,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
 
     ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
     stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
-    for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS; kind++) stats->untrained |= !stats->plain && !ours && !ply->known[kind];
+    stats->untrained = !stats->plain && !ours;
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
         for (kind = 0; kind < 3; kind++) ply->origin[kind] = (double)settings.origin[kind];
@@ -5896,8 +5901,8 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
         const size_t expected = ssdgs__ply_rows(&settings, kind), rows = ply->known[kind] ? ply->known[kind]->count : 0;
         if (rows != expected && (ours || ply->known[kind]))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s has %z rows, the settings need %z", ply->name,
-                               ssdgs__ply_kinds[kind], rows, expected);
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s has %z rows, the settings need %z%s", ply->name,
+                               ssdgs__ply_kinds[kind], rows, expected, ply->known[kind] ? "" : ": has another program dropped it?");
         if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
     }
     if (!result) result = ssdgs__model_create(ply->context, &settings, (int)vertex->count, out);
@@ -5915,8 +5920,8 @@ static void ssdgs__ply_tell(const ssdgs_model *model, const char *name, const ss
     else if (model->settings.baked)
         ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing", name);
     if (stats->untrained)
-        ssdgs__note(context, "%s: has no settings, ASG or networks, which editors of splats drop: what is drawn instead is untrained. "
-                    "ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the original file", name);
+        ssdgs__note(context, "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it is not drawn as it "
+                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the original file", name);
 }
 
 static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size, ssdgs_model **out,
@@ -7571,7 +7576,7 @@ static double ssdgs__correlation(const double *a, const double *b, int n, int wi
 
 /* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright as a whole where the light is
    on the camera's side. On a floor seen from above only two axes tell of the former. 1 where nothing tells. *facing: how far the lights
-   are on the camera's side, on average, plus twice its error. scratch: (n, 6). */
+   are on the camera's side, on average, plus thrice its error. scratch: (n, 6). */
 static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading, const double centre[3], double *scratch,
                                double *facing) {
     double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
@@ -7606,7 +7611,7 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
     for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
     for (i = 0; i < n; i++) bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
     frontal = ssdgs__correlation(front, bright, n, 1, &spread);
-    *facing = front_mean + 2 * spread / sqrt((double)n);
+    *facing = front_mean + 3 * spread / sqrt((double)n);
     if (!(spread > 0.2)) return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
     return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
 }
@@ -7625,7 +7630,7 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     if (!s) return SSDGS_ERR_MEMORY;
     for (i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
     agrees = n < FEW ? 1 : ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
-    if (agrees < 0.6 || (n >= FEW && facing < -0.1)) {
+    if (agrees < 0.5 || (n >= ENOUGH && facing < -0.1)) {
         for (way = 0; way < 4 && n >= ENOUGH; way++)
             for (order = 0; order < 6; order++)
                 for (signs = 0; signs < 8; signs++) {
@@ -7636,17 +7641,18 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
                     reading.in_camera = way & 1;
                     reading.from_camera = way >> 1;
                     other = ssdgs__agreement(s, n, &reading, centre, scratch, &facing);
-                    if (facing < -0.1 || other < best + (reading.from_camera != found.from_camera ? 0.03 : 0)) continue;
+                    /* a place beside the camera mixes in the camera's direction, of which much is right in any reading */
+                    if (facing < -0.1 || other < best + (reading.from_camera != found.from_camera ? 0.2 : 0)) continue;
                     best = other;
                     found = reading;
                 }
-        if (agrees < 0.6)
+        if (agrees < 0.5)
             ssdgs__note(context, "the photographs' shading contradicts their lights: its correlation with their directions is %g, and "
                         "near 1 where these are right", floor(100 * agrees + 0.5) / 100);
         else
             ssdgs__note(context, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
-        if (best > 0.75 && best > agrees + 0.05)
-            ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights' positions would agree with the shading (%g)",
+        if (best > 0.65 && best > agrees + 0.05)
+            ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
                         axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
                         axes[found.sign[2] < 0][found.axis[2]], found.in_camera ? "each camera's (right, down, forward)" : "the world's",
                         found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
@@ -7655,8 +7661,8 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     return SSDGS_OK;
 }
 
-/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes. */
-static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
+/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes. radius: of the cameras. */
+static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radius) {
     ssdgs_context *context = trainer->context;
     const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
@@ -7693,7 +7699,7 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer) {
     if (n < 2 || (points && points < n)) return SSDGS_OK;
     if (sqrt(spread) < 0.03 * lit_from)
         ssdgs__note(context, "all photographs are lit from one place: they do not tell how the object looks in other light");
-    else if (sqrt(apart) < 0.1 * away)
+    else if (sqrt(apart) < 0.1 * (points && radius > 1e-3 * trainer->unit && radius < away ? radius : away)) /* bounds may be wrong */
         ssdgs__note(context, "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in all photographs: they do "
                     "not tell how the object looks in other light", floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);
@@ -7739,8 +7745,8 @@ static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
 
 /* ---- a trainer and its steps ---- */
 
-/* Decides what opaque photographs show around the object: options.background, where nearly all of their borders have its colour to two
-   bytes, else surfaces, which fill the pictures. */
+/* Decides what opaque photographs show around the object: options.background, where most of their borders have about its colour, else
+   surfaces, which fill the pictures. */
 static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     const ssdgs_real *background = trainer->options.background;
     double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, same = 0, spread = 0;
@@ -7759,7 +7765,7 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
                     mean[c] += (double)value[c];
                     square[c] += (double)value[c] * (double)value[c];
                 }
-                same += apart < (ssdgs_real)(2.5 / 255);
+                same += apart < (ssdgs_real)(8.5 / 255);
                 count++;
             }
     }
@@ -7767,7 +7773,7 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
         const double variance = square[c] / count - mean[c] / count * (mean[c] / count);
         spread = variance > spread ? variance : spread;
     }
-    trainer->backdrop = same >= 0.9 * count;
+    trainer->backdrop = same >= 0.5 * count;
     trainer->filled = !trainer->backdrop;
     if (trainer->backdrop)
         ssdgs__note(trainer->context, "too few photographs are transparent around the object, but their borders have the colour of "
@@ -7849,7 +7855,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (radius < 1e-3 * trainer->unit)
         ssdgs__note(context, "all photographs are taken from one place: other views cannot be right");
     else result = ssdgs__note_bounds(trainer, within);
-    if (!result) result = ssdgs__note_lights(trainer);
+    if (!result) result = ssdgs__note_lights(trainer, radius);
     ssdgs__note_alpha(trainer);
     if (result) return result;
     trainer->extent = 1.1 * (radius > trainer->unit ? radius : trainer->unit); /* one camera has no radius */

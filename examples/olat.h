@@ -158,6 +158,22 @@ static int olat__write_file(const char *path, const unsigned char *data, size_t 
     return reason ? olat__fail(error, "%s: cannot be written: %s", olat__tail(path), strerror(reason)) : 0;
 }
 
+/* Whether a file could be written: neither it nor what is there changes. */
+OLAT__API int olat_check_writable(const char *path, char error[512]) {
+    const size_t room = strlen(path) + 40;
+    char *name = (char *)malloc(room);
+    struct stat info;
+    int file = -1, reason;
+    if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
+    snprintf(name, room, "%s.tmp.%ld", path, (long)getpid());
+    if (stat(path, &info) != 0 || S_ISREG(info.st_mode)) file = open(name, OLAT__WRITE_FLAGS, 0666);
+    else errno = EISDIR;
+    reason = errno;
+    if (file >= 0) close(file), remove(name);
+    free(name);
+    return file < 0 ? olat__fail(error, "%s: cannot be written: %s", olat__tail(path), strerror(reason)) : 0;
+}
+
 /* ==== inflate and deflate, RFC 1950 and 1951 ==== */
 
 static const unsigned short olat__length_base[29] = {3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 17, 19, 23, 27, 31,
@@ -1431,9 +1447,12 @@ static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
 static int olat__apply_mask(olat_frame *frame, char *error) {
     int width, height, failed = 0;
     ssdgs_pixels format;
+    char problem[512];
     void *mask;
     size_t i;
-    if (olat_read_png(frame->mask, &width, &height, &format, &mask, error)) return 1;
+    if (olat_read_png(frame->mask, &width, &height, &format, &mask, problem)) {
+        return olat__fail(error, "mask_path: %s", problem);
+    }
     if (width != frame->camera.width || height != frame->camera.height) {
         failed = olat__fail(error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
                             olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
@@ -1514,7 +1533,7 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
         oblong += !(lens.focal[0] + lens.focal[1] > 0) && fabs((double)(camera->fx / camera->fy) - 1) > 0.01;
     }
     if (olat__dot(out->origin, out->origin) > 0) {
-        olat__note(out, "coordinates are taken relative to %g, %g, %g", out->origin[0], out->origin[1], out->origin[2]);
+        olat__note(out, "coordinates are taken relative to %.9g, %.9g, %.9g", out->origin[0], out->origin[1], out->origin[2]);
     }
     if (masked) olat__note(out, "masks of %d of the %d photographs are used", masked, out->count);
     if (curved) {
@@ -1704,9 +1723,14 @@ OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[5
 
 /* A file to be written: fails where it is an input, or was named as an output before, if only in other case. */
 OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
-    uint64_t id[2];
-    return (olat__identify(path, id) && olat__guard_add(guard, path, id, 1, error)) ||
-           olat__guard_add(guard, path, NULL, 1, error); /* the place too: by then it may have been written */
+    olat__known file;
+    const olat__known *input;
+    file.name = "";
+    if (guard->room && olat__identify(path, file.id) && (input = olat__slot(guard, &file))->path) {
+        return olat__fail(error, "%s: would replace an input, %s: choose another output folder", olat__tail(path),
+                          olat__tail(input->path));
+    }
+    return olat__guard_add(guard, path, NULL, 1, error);
 }
 
 /* A dataset as input: the JSON, and the images and masks that it names as far as it can be read. */

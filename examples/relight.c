@@ -81,7 +81,7 @@ static int parse(job *j, int argc, char **argv)
         j->given[option] = option < TRAJECTORY ? argv[++i] : "";
     }
     j->out = j->given[OUT_FOLDER];
-    if (!j->dataset || !j->out) return usage("needs MODEL.ply, DATASET and", "--out DIR");
+    if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
     else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid")) return usage("no such split:", value);
@@ -523,8 +523,9 @@ static int relight(job *j)
         if (result) return fail(ssdgs_error_message(j->context));
         fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", j->given[NETWORKS]);
     }
-    if (!load_frames(j) || !check_outputs(j) || !make_planes(j)) return 1;
-    make_folders(j->out);
+    if (!load_frames(j)) return 1;
+    make_folders(j->out); /* so that paths can be told apart by what they are */
+    if (!check_outputs(j) || !make_planes(j)) return 1;
     for (i = 0; i < j->data.count; i++) {
         const olat_frame *frame = &j->data.frames[i];
         int components = j->given[COMPONENTS] != NULL;

@@ -156,6 +156,7 @@ static void on_interrupt(int signal_number)
 
 typedef struct run {
     int iterations, checkpoint_every, terminal;
+    int kept, done;               /* iterations of a checkpoint that another run left, which a run behind it does not replace; of this one */
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
 } run;
@@ -167,6 +168,7 @@ static int progress(void *user, const ssdgs_train_stats *stats)
     int percent = (int)(100.0 * done / total), finished = done >= total;
     double now = seconds_now();
     char left[32];
+    r->done = done;
     if (r->first < 0) { /* the first step also allocates: time starts after it */
         r->first = r->drawn_at = done;
         r->start = r->drawn = now;
@@ -318,23 +320,15 @@ static int check_outputs(job *j, const char *train_json, char error[512])
     int i;
     if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_train.json", error) ||
-        olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error))
+        olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error) ||
+        olat_guard_folder(&j->guard, j->dataset, "transforms_valid.json", error))
         return 1;
-    for (i = 0; i < 3; i++) {
-        FILE *file;
-        if (!outputs[i]) continue;
-        if (olat_guard_output(&j->guard, outputs[i], error)) return 1;
-        file = fopen(outputs[i], "r+b"); /* what is there stays as it is */
-        if (!file && errno == ENOENT && (file = fopen(outputs[i], "ab")) != NULL) {
-            fclose(file);
-            remove(outputs[i]);
-        } else if (file) fclose(file);
-        if (!file) return sprintf(error, "%.480s: cannot be written", outputs[i]), 1;
-    }
+    for (i = 0; i < 3; i++)
+        if (outputs[i] && (olat_guard_output(&j->guard, outputs[i], error) || olat_check_writable(outputs[i], error))) return 1;
     return 0;
 }
 
-/* A run that is further than this one will get must not be lost for it. */
+/* A run that is further than this one must not be lost for it. */
 static int check_checkpoint(job *j, char error[512])
 {
     FILE *file = fopen(j->checkpoint, "rb");
@@ -346,6 +340,7 @@ static int check_checkpoint(job *j, char error[512])
     if (done > j->options.iterations)
         return sprintf(error, "%.300s holds a run of %d iterations, and this one of %d would replace it: go on with --resume, give "
                        "another name with -o, or remove it", j->checkpoint, done, j->options.iterations), 1;
+    j->progress.kept = done;
     return 0;
 }
 
@@ -389,6 +384,7 @@ static int train(job *j)
     if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
     if (has_test && olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error)) return fail(error);
     olat_print_notes(&j->train_set, "train");
+    if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");
     for (i = 0; i < 3; i++) {
         j->settings.origin[i] = (ssdgs_real)j->train_set.origin[i];
         j->options.bounds_min[i] = (ssdgs_real)(j->bounds.bounds_min[i] - j->train_set.origin[i]);
@@ -416,6 +412,12 @@ static int train(job *j)
     j->progress.first = -1;
     signal(SIGINT, on_interrupt);
     while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
+        if (j->progress.done < j->progress.kept) {
+            if (!interrupted) continue;
+            fprintf(stderr, "\nstopped; %s stays as it is, of a run that is further (%d iterations): --resume goes on with that\n",
+                    j->checkpoint, j->progress.kept);
+            return 130;
+        }
         if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
         if (interrupted) {
             fprintf(stderr, "\nstopped; the same command with --resume goes on from %s\n", j->checkpoint);

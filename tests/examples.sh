@@ -50,6 +50,7 @@ for sheet in "$set/test/r_000.png" "$out/link/r_000.png" "$model" "$set/transfor
     check "--sheet $sheet" says 1 "would replace an input" relight --out "$out/relit" --sheet "$sheet"
 done
 check "--sheet twice" says 1 "would be written twice" relight --out "$out/relit" --sheet "$out/relit/./r_000.png"
+check "--out over a folder that is not there" says 1 "would replace an input" relight --out "$out/nowhere/../tiny/test"
 check "nothing was rendered" test ! -e "$out/relit/r_000.png"
 for file in transforms_train.json transforms_test.json train/r_000.png test/r_000.png; do
     check "-o $file" says 1 "would replace an input" "$build/train" "$set" -o "$set/$file" --iterations 1
@@ -60,6 +61,10 @@ check "--refine over its input" says 1 "would replace an input" "$build/train" "
 rm "$set/x.ply.refined.json"
 check "the dataset is as it was" unchanged
 check "relight" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
+mkdir "$out/same"
+cp "$out/relit/r_000.png" "$out/same/r_000.png"
+for file in r_001 r_002 r_003; do ln "$out/same/r_000.png" "$out/same/$file.png"; done
+check "into files that are links to each other" says 0 "4 images" relight --out "$out/same"
 check "relight again" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
 check "the dataset is as it was" unchanged
 
@@ -79,7 +84,12 @@ check "the dataset is as it was" unchanged
 kept=$(hash_of "$model.ckpt")
 check "a shorter run" says 1 "holds a run of 30 iterations, and this one of 20 would replace it" train --iterations 20
 check "its checkpoint stays" test "$(hash_of "$model.ckpt")" = "$kept"
+check "a longer run" says 0 "^test: PSNR" train --iterations 35 --checkpoint-every 12
+check "does not replace it where it is behind" test "$(hash_of "$model.ckpt")" = "$kept"
 check "as long a run" says 0 "^test: PSNR" train --iterations 30
+ln -s "$out/target.ply" "$out/dangling.ply"
+check "a link to nothing" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/dangling.ply" --iterations 1 --points 100
+check "its target is not made" test ! -e "$out/target.ply"
 check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
 echo "somebody's notes" >"$out/notes.ply.ckpt"
 check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1
@@ -88,7 +98,7 @@ check "it stays" grep -q somebody "$out/notes.ply.ckpt"
 # an edited model, and its networks back
 check "whole" says 0 "4 images" relight --out "$out/whole"
 LC_ALL=C sed '/^element ssdgs_settings 1$/,/^end_header$/{/^end_header$/!d;}' "$model" >"$out/edited.ply"
-check "edited" says 0 "note: .*edited.ply: has no settings, ASG or networks" "$build/relight" "$out/edited.ply" "$set" --out "$out/edited" --threads 1
+check "edited" says 0 "note: .*edited.ply: has no settings" "$build/relight" "$out/edited.ply" "$set" --out "$out/edited" --threads 1
 check "edited looks different" test "$(psnr "$out/edited")" != "$(psnr "$out/whole")"
 check "--networks" says 0 "are those of" "$build/relight" "$out/edited.ply" "$set" --out "$out/given" --threads 1 --networks "$model"
 check "and is whole again" test "$(psnr "$out/given")" = "$(psnr "$out/whole")"

@@ -1347,7 +1347,7 @@ static void test_far_places(void) {
             CHECK(!olat_load_at(FOLDER, "near.json", OLAT_NO_IMAGES, offset, &nearby, error));
             if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4))) printf("    %d, %d: %g\n", i, refined,
                 apart(&there, &nearby));
-            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %g, %g, %g", there.origin[0],
+            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %.9g, %.9g, %.9g", there.origin[0],
                 there.origin[1],
                      there.origin[2]);
             CHECK(!strcmp(there.notes, i < 4 ? wanted : ""));

@@ -477,7 +477,7 @@ static void test_edited(void) {
     CHECK(tells(&file, &stats, NULL) && !stats.untrained);
     cut.tables = 1;
     other = emit(&cut, &v);
-    CHECK(tells(&other, &stats, "has no settings, ASG or networks") && stats.untrained == 1 && !stats.plain);
+    CHECK(tells(&other, &stats, "has no settings, as editors of splats drop them") && stats.untrained == 1 && !stats.plain);
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && stats.untrained == 1 && !same_globals(model, back));
     memory.calls = 0;
     memory.fail_at = 1;

@@ -1624,7 +1624,8 @@ static void test_light_notes(void) {
 static void test_borders(void) {
     static const struct { double border, noise, background; int backdrop, alike, bottom; } cases[] = { /* bottom: its last row is grey */
         {1, 0, 0, 0, 1, 0}, {1, 0, 1, 1, 0, 0}, {0, 0, 0, 1, 0, 0}, {0.5, 0.1, 0, 0, 0, 0}, {0.5, 0.5, 0, 0, 0, 0},
-        {0.12, 0, 0, 0, 1, 0}, {2.0 / 255, 0, 0, 1, 0, 0}, {3.0 / 255, 0, 0, 0, 1, 0}, {1, 0, 1, 0, 0, 1}, {0.995, 0.005, 1, 1, 0, 0}};
+        {0.12, 0, 0, 0, 1, 0}, {8.0 / 255, 0, 0, 1, 0, 0}, {9.0 / 255, 0, 0, 0, 1, 0}, {1, 0, 1, 1, 0, 1}, {0.98, 0.02, 1, 1, 0, 0},
+        {0.5, 0, 0.5, 1, 0, 1}, {0.9, 0.1, 1, 0, 0, 0}};
     static unsigned char opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
