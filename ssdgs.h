@@ -7576,7 +7576,7 @@ static double ssdgs__correlation(const double *a, const double *b, int n, int wi
 
 /* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright as a whole where the light is
    on the camera's side. On a floor seen from above only two axes tell of the former. 1 where nothing tells. *facing: how far the lights
-   are on the camera's side, on average, plus thrice its error. scratch: (n, 6). */
+   are on the camera's side, on average, plus twice its error. scratch: (n, 6). */
 static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading, const double centre[3], double *scratch,
                                double *facing) {
     double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
@@ -7611,12 +7611,13 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
     for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
     for (i = 0; i < n; i++) bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
     frontal = ssdgs__correlation(front, bright, n, 1, &spread);
-    *facing = front_mean + 3 * spread / sqrt((double)n);
+    *facing = front_mean + 2 * spread / sqrt((double)n);
     if (!(spread > 0.2)) return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
     return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
 }
 
-/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. */
+/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. Right captures agree to 0.8 and more,
+   wrong readings to 0.5 or so; on a floor seen from above one that puts the lights below it may agree to 0.86. */
 static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const double centre[3]) {
     enum { FEW = 6, ENOUGH = 12 };
     static const ssdgs__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
@@ -7624,39 +7625,39 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     ssdgs_context *context = trainer->context;
     const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
     ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
-    double *scratch = (double *)(s + trainer->photo_count), agrees, facing, other, best = 0;
+    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, facing_so, agrees_so, best = 0;
     ssdgs__reading reading, found = as_given;
-    int n = 0, i, order, signs, way;
+    int n = 0, contradicts, behind, i, order, signs, way;
     if (!s) return SSDGS_ERR_MEMORY;
     for (i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
-    agrees = n < FEW ? 1 : ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
-    if (agrees < 0.5 || (n >= ENOUGH && facing < -0.1)) {
-        for (way = 0; way < 4 && n >= ENOUGH; way++)
-            for (order = 0; order < 6; order++)
-                for (signs = 0; signs < 8; signs++) {
-                    for (i = 0; i < 3; i++) {
-                        reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
-                        reading.sign[i] = signs >> i & 1 ? -1 : 1;
-                    }
-                    reading.in_camera = way & 1;
-                    reading.from_camera = way >> 1;
-                    other = ssdgs__agreement(s, n, &reading, centre, scratch, &facing);
-                    /* a place beside the camera mixes in the camera's direction, of which much is right in any reading */
-                    if (facing < -0.1 || other < best + (reading.from_camera != found.from_camera ? 0.2 : 0)) continue;
-                    best = other;
-                    found = reading;
+    if (n >= FEW) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
+    for (way = 0; way < 4 && n >= ENOUGH; way++)
+        for (order = 0; order < 6; order++)
+            for (signs = 0; signs < 8; signs++) {
+                for (i = 0; i < 3; i++) {
+                    reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
+                    reading.sign[i] = signs >> i & 1 ? -1 : 1;
                 }
-        if (agrees < 0.5)
-            ssdgs__note(context, "the photographs' shading contradicts their lights: its correlation with their directions is %g, and "
-                        "near 1 where these are right", floor(100 * agrees + 0.5) / 100);
-        else
-            ssdgs__note(context, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
-        if (best > 0.65 && best > agrees + 0.05)
-            ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
-                        axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
-                        axes[found.sign[2] < 0][found.axis[2]], found.in_camera ? "each camera's (right, down, forward)" : "the world's",
-                        found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
-    }
+                reading.in_camera = way & 1;
+                reading.from_camera = way >> 1;
+                agrees_so = ssdgs__agreement(s, n, &reading, centre, scratch, &facing_so);
+                /* a place beside the camera mixes in the camera's direction, of which much is right in any reading */
+                if (facing_so < -0.1 || agrees_so < best + (reading.from_camera != found.from_camera ? 0.2 : 0)) continue;
+                best = agrees_so;
+                found = reading;
+            }
+    behind = n >= ENOUGH && agrees < 0.88 && facing < -0.1;
+    contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
+    if (contradicts)
+        ssdgs__note(context, "the photographs' shading contradicts their lights: its correlation with their directions is %g, and near 1 "
+                    "where these are right", floor(100 * agrees + 0.5) / 100);
+    else if (behind)
+        ssdgs__note(context, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
+    if ((contradicts || behind) && best > 0.7 && best > agrees + 0.03)
+        ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
+                    axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
+                    axes[found.sign[2] < 0][found.axis[2]], found.in_camera ? "each camera's (right, down, forward)" : "the world's",
+                    found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
     ssdgs__release(context, s);
     return SSDGS_OK;
 }
