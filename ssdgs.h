@@ -4836,7 +4836,7 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
 
 /* The bytes of 8192 equal parts of 0 .. 1, the last one half, by the sRGB curve, made for each call: each part has the byte of its
    middle, 0.2 of a byte from its ends at most. */
-enum { SSDGS__PARTS = 8192 };
+#define SSDGS__PARTS 8192
 #define SSDGS__PART_SCALE ((ssdgs_real)(SSDGS__PARTS - 0.5))
 
 static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
