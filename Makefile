@@ -91,6 +91,9 @@ test-c99: ## tests with -std=c99
 test-matrix: ## tests with every compiler and machine at hand (hours); others are named
 	sh tests/matrix.sh $(BUILD)
 
+size: ## what including ssdgs.h costs: seconds of compiling and bytes of code
+	bash tests/size.sh $(BUILD)
+
 fuzz: $(BUILD)/fuzzers/all ## fuzzes each target for FUZZ_SECONDS (1800); needs clang's libFuzzer; findings go to build/fuzzers
 	sh tests/fuzz/run.sh $(BUILD)/fuzzers $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
@@ -147,5 +150,5 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo bench experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo bench size experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

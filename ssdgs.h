@@ -135,7 +135,8 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
   SSDGS_STATIC           not set      every function is static: a private copy, in a file that has the implementation
   SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
   SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
-  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo
+  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo, ssdgs_compare, and no
+                                      backward stages: half of the code and of the time to compile
   SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
   SSDGS_NO_SIMD          not set      the scalar kernels alone
   SSDGS_NO_AVX2          not set      no AVX2 and no AVX-512 kernels
@@ -615,14 +616,14 @@ SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, 
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored);
 
+#ifndef SSDGS_NO_TRAINER
+/* ---- training, and comparing with photographs ---- */
+
 typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
 
 /* Compares (h,w,3) images of stored values, clamped to [0,1]. */
 SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
                                      int width, int height, ssdgs_metrics *metrics);
-
-#ifndef SSDGS_NO_TRAINER
-/* ---- training ---- */
 
 typedef enum ssdgs_pixels { SSDGS_PIXELS_RGBA8 = 0, SSDGS_PIXELS_RGBA16 } ssdgs_pixels; /* native-endian 16 bit */
 
@@ -909,6 +910,17 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__PREFETCH(p) __builtin_prefetch(p)
 #else
 #define SSDGS__PREFETCH(p) ((void)(p))
+#endif
+
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define SSDGS__UNUSED __attribute__((unused))
+#else
+#define SSDGS__UNUSED
+#endif
+#ifdef SSDGS_NO_TRAINER
+#define SSDGS__TRAINING SSDGS__UNUSED /* what only training calls is left out by the compiler */
+#else
+#define SSDGS__TRAINING
 #endif
 
 #define SSDGS__ISA_SCALAR 1
@@ -4240,7 +4252,7 @@ static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
 
 /* Overwrites gradient and the networks' part of global_gradient, without layers the ASG's too; adds to light_gradient and
    view_gradient. */
-static ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
+static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS, lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
     ssdgs_real sums[SSDGS__LANE_SUMS];
@@ -4580,7 +4592,7 @@ static void ssdgs__highlight_gradient(ssdgs_frame *frame, const ssdgs__uncomposi
         }
 }
 
-static ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
+static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     ssdgs_splat_view *v = frame->views;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
@@ -4620,7 +4632,7 @@ static void ssdgs__project_backward_task(void *data, int chunk) {
                                             (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
 }
 
-static ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
+static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const int chunks = ssdgs__chunks(frame);
     ssdgs_real *slots;
@@ -4643,9 +4655,11 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
         case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
         case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
         case SSDGS_STAGE_COMPOSITE: return ssdgs__composite(frame);
+#ifndef SSDGS_NO_TRAINER
         case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
         case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
         case SSDGS_STAGE_PROJECT_BACKWARD: return ssdgs__project_backward(frame);
+#endif
         default: return SSDGS_ERR_ARGUMENT;
     }
 }
@@ -4942,6 +4956,7 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
     }
 }
 
+#ifndef SSDGS_NO_TRAINER
 typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
 
 typedef struct ssdgs__loss_job {
@@ -5268,6 +5283,7 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
     result = ssdgs__enter(context, "ssdgs_compare");
     return result ? result : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
 }
+#endif /* SSDGS_NO_TRAINER */
 
 /* ==== >>ply  model files, files at large ==== */
 
@@ -8622,7 +8638,12 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VEXPONENT(x) vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
 #endif
 
-#define SSDGS__FN static SSDGS__TARGET
+#define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
+#ifdef SSDGS_NO_TRAINER
+#define SSDGS__TRAINS(kernel) NULL
+#else
+#define SSDGS__TRAINS(kernel) kernel
+#endif
 #define SSDGS__FI static SSDGS__INLINE SSDGS__TARGET
 #define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
 #define F(name) SSDGS__NAME(name)
@@ -10688,12 +10709,13 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
 }
 
 static const ssdgs__kernels F(kernels) = {
-    F(project), F(project_backward), F(bin), F(walk_camera), F(walk_light), F(composite), F(composite_backward),
-    F(highlight), F(highlight_backward), F(lobe), F(lobe_backward),
-    F(transport), F(dense), F(live_rows), F(transpose), SSDGS__DENSE_BF16, F(row_sums), F(encode), F(encode_backward),
-    F(reflect), F(reflect_backward), F(dipole_profile),
-    F(colour), F(colour_backward), F(depth_normals), F(srgb_encode), F(srgb_decode), F(ssim_row), F(ssim_backward_row),
-    F(finite), F(adam)
+    F(project), SSDGS__TRAINS(F(project_backward)), F(bin), F(walk_camera), F(walk_light), F(composite),
+    SSDGS__TRAINS(F(composite_backward)), F(highlight), SSDGS__TRAINS(F(highlight_backward)), F(lobe),
+    SSDGS__TRAINS(F(lobe_backward)), F(transport), F(dense), F(live_rows), SSDGS__TRAINS(F(transpose)), SSDGS__DENSE_BF16,
+    SSDGS__TRAINS(F(row_sums)), F(encode), SSDGS__TRAINS(F(encode_backward)), F(reflect), SSDGS__TRAINS(F(reflect_backward)),
+    SSDGS__TRAINS(F(dipole_profile)), F(colour), SSDGS__TRAINS(F(colour_backward)), SSDGS__TRAINS(F(depth_normals)),
+    F(srgb_encode), F(srgb_decode), SSDGS__TRAINS(F(ssim_row)), SSDGS__TRAINS(F(ssim_backward_row)), F(finite),
+    SSDGS__TRAINS(F(adam))
 };
 
 #undef SSDGS__NAME
@@ -10734,6 +10756,7 @@ static const ssdgs__kernels F(kernels) = {
 #undef SSDGS__BY_HEIGHT
 #undef SSDGS__DENSE_BF16
 #undef SSDGS__FN
+#undef SSDGS__TRAINS
 #undef SSDGS__FI
 #undef SSDGS__NV
 #endif /* SSDGS__ISA */

@@ -18,6 +18,11 @@ done
 output=$("$@" -Dnear= -Dfar= -DNEAR= -DFAR= -DIN= -DOUT= -DOPTIONAL= -DPLANES=14 -DERROR=0 -Dsmall=char -Dinterface=struct \
     -c tests/multi_a.c -o "$build/option.o" 2>&1) && output= || output=${output:-no message}
 check "a name that Windows' headers take" "$output"
+# without the trainer the same is rendered, with half of the code
+"$@" -O1 tests/render_only.c -o "$build/render_only" -lm -lpthread
+"$@" -O1 -DSSDGS_NO_TRAINER tests/render_only.c -o "$build/render_only_small" -lm -lpthread
+whole=$("$build/render_only") small=$("$build/render_only_small")
+check "without the trainer another picture: $whole, $small" "$([ -n "$whole" ] && [ "$whole" = "$small" ] || echo differs)"
 rm -f "$build/option.o"
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]
