@@ -4876,9 +4876,12 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
     unsigned char table[SSDGS__PARTS];
     size_t i;
     if (!values || !bytes) return;
-    ssdgs__bytes_make(table);
-    if (transfer == SSDGS_TRANSFER_SRGB) for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
-    else for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
+    if (transfer == SSDGS_TRANSFER_SRGB) {
+        ssdgs__bytes_make(table);
+        for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
+    } else {
+        for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
+    }
 }
 
 SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
@@ -4888,7 +4891,7 @@ SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, 
     const unsigned char *table = transfer == SSDGS_TRANSFER_SRGB ? bytes : NULL;
     int x, y;
     if (!image || !image->color || !pixels) return;
-    ssdgs__bytes_make(bytes);
+    if (table) ssdgs__bytes_make(bytes);
     for (y = 0; y < height; y++) {
         const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
         const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
@@ -4949,7 +4952,7 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
     size_t i;
     int c;
     if (!color || !alpha || !background || !stored) return;
-    ssdgs__lines_make(curve);
+    if (lines) ssdgs__lines_make(curve);
     for (i = 0; i < pixels; i++, color += 3, stored += 3) {
         const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
         for (c = 0; c < 3; c++) stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];

@@ -156,7 +156,8 @@ static void on_interrupt(int signal_number)
 
 typedef struct run {
     int iterations, checkpoint_every, terminal;
-    int kept, done;               /* iterations of a checkpoint that another run left, which a run behind it does not replace; of this one */
+    int kept;                     /* iterations in the checkpoint that another run left: it is replaced once this run has done as many */
+    int done;                     /* iterations of this run */
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
 } run;
