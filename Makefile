@@ -16,7 +16,7 @@ COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT))
 HEADERS = ssdgs.h examples/olat.h tests/test.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
-IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR == 1 && /real64/ { print FILENAME }' $(SOURCES)))
+IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual $(BUILD)/fuzz
 BUILDS = builds examples

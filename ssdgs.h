@@ -1,18 +1,20 @@
 /* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end
 
-Trains 3D Gaussians on photographs that each show an object under one known light, and renders them from new views under
-new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of "SSD-GS: Scattering
-and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026), whose equations the comments below number.
-It runs on the CPU and needs C99 or C++11, libc, libm and the system's threads.
+Trains 3D Gaussians on photographs that each show an object under one known light, and renders them from new
+views under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that
+of "SSD-GS: Scattering and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026), whose
+equations the comments below number. It runs on the CPU and needs C99 or C++11, libc, libm and the system's
+threads.
 
 DO THIS
-  In one C or C++ file of the program, best one of its own, as the code defines short macros (R, V, F, VADD) and undefines
-  them at its end:
+  In one C or C++ file of the program, best one of its own, as the code defines short macros (R, V, F, VADD)
+  and undefines them at its end:
       #define SSDGS_IMPLEMENTATION
       #include "ssdgs.h"
-  Everywhere else include it without the define. Link with -lm -lpthread (nothing on Windows). Keep the name ssdgs.h:
-  the implementation includes its own file again for every instruction set, as "ssdgs.h" beside itself. A renamed copy
-  needs SSDGS_SELF, for instance -DSSDGS_SELF='"relight.h"'. Pasted into another file it cannot work.
+  Everywhere else include it without the define. Link with -lm -lpthread (nothing on Windows). Keep the name
+  ssdgs.h: the implementation includes its own file again for every instruction set, as "ssdgs.h" beside
+  itself. A renamed copy needs SSDGS_SELF, for instance -DSSDGS_SELF='"relight.h"'. Pasted into another file
+  it cannot work.
 
   Rendering, of a model file or, without one, of a single grey Gaussian:
 
@@ -37,8 +39,8 @@ DO THIS
     }
 --- end ---
 
-  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on photographs that the
-  program has read:
+  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on
+  photographs that the program has read:
 
 --- train example ---
     #define SSDGS_IMPLEMENTATION
@@ -66,76 +68,91 @@ DO THIS
     }
 --- end ---
 
-  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is then whole,
-  but terms that the schedule had not reached (stats->terms; in the default's all join after a twelfth of a run) are
-  untrained: render without them.
+  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is
+  then whole, but terms that the schedule had not reached (stats->terms; in the default's all join after a
+  twelfth of a run) are untrained: render without them.
 
 WHAT IT COMPUTES
-  Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one colour C each:
-      C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss),  E = light_scale intensity / distance^2
+  Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one
+  colour C each:
+      C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss),  E = light_scale intensity /
+      distance^2
   (eq. 3), with
   f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
-  f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of the half
-         vector (eqs. 10 to 12)
-  S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow network (eq. 8)
-  f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a material code
-         (eq. 4)
-  A Gaussian's raw parameters, SSDGS_POSITION and on, are used as: scale = exp(log scale), opacity = sigmoid, c_d, c_s,
-  c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The 8 ASG bases and both networks
-  are shared by all Gaussians.
-  ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering network, 3
-  layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and what true dipole
-  transport brings to x from wherever the light enters (five sums, of lengths from short to long; held fixed in training),
-  but no sines of wo and few of wi (view_octaves, light_octaves); the shadow network corrects the logit of eq. 7, where
-  what lies nearer to the light by less than light_bias casts no shadow. Direct light is deferred (ssdgs_asg): Gaussians
-  blend what they would reflect without shadow, their normals, sharpness and F0, and f_s and S are each pixel's own. A
-  narrow highlight passes over one Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a
-  pixel carries over to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place
-  shows it.
-  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole). Colours are the
-  stored values; every Gaussian has a specular term; one sigma_s, sigma_a for all channels, 6 layers, 256 wide, four
-  octaves, no depth cue, no transport; the shadow network's output is S, no bias; both passes add 0.3 px^2, where the
-  default adds 0.1 for the camera and keeps to a floor for the light.
-  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step. Where light
-  is deferred, the blended normals are drawn to those of the blended depth besides (normal_weight): dark, shining
-  surfaces tell nothing else of them, and a model finds wrong ones that fit the photographs it was shown. Diffuse alone
-  comes first, the other terms join together after 5,000 iterations of 60,000; shorter runs scale this, longer ones do not.
-  In the paper's order, one term after the other, scattering learns the highlights by heart before specular is there.
-  Density control clones or splits where the image pulls at a Gaussian, as published; it also halves what lies half in
-  shadow (densify_shadow) and drops what hardly shows (prune_weight) or lies outside of the outlines (prune_outside).
+  f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of
+         the half vector (eqs. 10 to 12)
+  S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow
+         network (eq. 8)
+  f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a
+         material code (eq. 4)
+  A Gaussian's raw parameters, SSDGS_POSITION and on, are used as: scale = exp(log scale), opacity =
+  sigmoid, c_d, c_s, c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The
+  8 ASG bases and both networks are shared by all Gaussians.
+  ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering
+  network, 3 layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and
+  what true dipole transport brings to x from wherever the light enters (five sums, of lengths from short to
+  long; held fixed in training), but no sines of wo and few of wi (view_octaves, light_octaves); the shadow
+  network corrects the logit of eq. 7, where what lies nearer to the light by less than light_bias casts no
+  shadow. Direct light is deferred (ssdgs_asg): Gaussians blend what they would reflect without shadow,
+  their normals, sharpness and F0, and f_s and S are each pixel's own. A narrow highlight passes over one
+  Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a pixel carries over
+  to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows
+  it.
+  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole).
+  Colours are the stored values; every Gaussian has a specular term; one sigma_s, sigma_a for all channels,
+  6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow network's output is S, no bias;
+  both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
+  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step.
+  Where light is deferred, the blended normals are drawn to those of the blended depth besides
+  (normal_weight): dark, shining surfaces tell nothing else of them, and a model finds wrong ones that fit
+  the photographs it was shown. Diffuse alone comes first, the other terms join together after 5,000
+  iterations of 60,000; shorter runs scale this, longer ones do not. In the paper's order, one term after
+  the other, scattering learns the highlights by heart before specular is there. Density control clones or
+  splits where the image pulls at a Gaussian, as published; it also halves what lies half in shadow
+  (densify_shadow) and drops what hardly shows (prune_weight) or lies outside of the outlines
+  (prune_outside).
   ssdgs_train_options_published(): the paper's order and density control, 60,000 iterations.
 
 CONVENTIONS
-  camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a translation. The
-            centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy in px. No lens distortion.
-  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0 means 0.02
-            of settings.length_unit (published: 0.01). Training starts within options.bounds_min, bounds_max: [-0.5, 0.5]^3 unless set.
-            Floats hold seven digits: of a scene 1,000 times its size away from 0, give cameras, lights and bounds less a
-            nearby point, and that point as settings.origin.
-  light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB irradiance. Any
-            number of them in a rendering, one in a photograph. Intensities have the unit of the photographs':
-            ssdgs_trainer_create() gives an empty model the light_scale that makes E's geometric mean 1 at the centre of
-            the bounds; it stays in the model.
-  colour    transfer says how stored values, in photographs and image files, relate to the colours that are blended:
-            SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and Gaussians blend linear light;
-            SSDGS_TRANSFER_NONE: they are the same. A photograph's alpha blends stored values, as image programs do it, and
-            ssdgs_compose() does the same to a rendering. ssdgs_render() never encodes: linear light out (or stored values),
-            not clamped; render options give `background` likewise. ssdgs_to_bytes() encodes. Training options,
-            ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value; ssdgs_evaluate() and
+  camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a
+            translation. The centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy
+            in px. No lens distortion.
+  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0
+            means 0.02 of settings.length_unit (published: 0.01). Training starts within options.bounds_min,
+            bounds_max: [-0.5, 0.5]^3 unless set. Floats hold seven digits: of a scene 1,000 times its size
+            away from 0, give cameras, lights and bounds less a nearby point, and that point as
+            settings.origin.
+  light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB
+            irradiance. Any number of them in a rendering, one in a photograph. Intensities have the unit of
+            the photographs':
+            ssdgs_trainer_create() gives an empty model the light_scale that makes E's geometric mean 1 at
+            the centre of the bounds; it stays in the model.
+  colour    transfer says how stored values, in photographs and image files, relate to the colours that are
+            blended: SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and Gaussians blend linear
+            light; SSDGS_TRANSFER_NONE: they are the same. A photograph's alpha blends stored values, as
+            image programs do it, and
+            ssdgs_compose() does the same to a rendering. ssdgs_render() never encodes: linear light out (or
+            stored values), not clamped; render options give `background` likewise. ssdgs_to_bytes()
+            encodes. Training options,
+            ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value;
+            ssdgs_evaluate() and
             ssdgs_compare() deal in stored values.
-  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels, up to 32768 pixels a side. Photographs: RGBA, 8
-            or 16 bit, straight alpha, tightly packed. Those with transparency are fitted on a new random background each
-            step; random_background = 0 puts them on options.background. Where none is transparent around the object, their
-            borders decide: where most are of about the colour of options.background, that is empty, and Gaussians of its
-            colour fade; else everything that they show is opaque. A note says which.
+  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels, up to 32768 pixels a side.
+            Photographs: RGBA, 8 or 16 bit, straight alpha, tightly packed. Those with transparency are
+            fitted on a new random background each step; random_background = 0 puts them on
+            options.background. Where none is transparent around the object, their borders decide: where
+            most are of about the colour of options.background, that is empty, and Gaussians of its colour
+            fade; else everything that they show is opaque. A note says which.
   networks  per layer (out,in) weights, row-major, then (out) biases; ReLU between layers.
 
 OPTIONS, macros defined before the header; those with * the same way in every file that includes it
   SSDGS_IMPLEMENTATION   not set      in one file: the code
-  SSDGS_STATIC           not set      every function is static: a private copy, in a file that has the implementation
+  SSDGS_STATIC           not set      every function is static: a private copy, in a file that has the
+                         implementation
   SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
   SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
-  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo, ssdgs_compare, and no
+  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo,
+                         ssdgs_compare, and no
                                       backward stages: half of the code and of the time to compile
   SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
   SSDGS_NO_SIMD          not set      the scalar kernels alone
@@ -145,100 +162,111 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
   SSDGS_SELF             "ssdgs.h"    how the file includes itself, quotes included
 
 MEMORY
-  All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both or none),
-  called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed inside, so it need not do
-  either. What the C library needs itself (qsort, stdio, threads) is not in it.
-  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size has been
-  rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more splats on screen).
-  Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the trainer. Contexts, models and
-  trainers may be destroyed in any order: a model stays until its trainer is gone, a context until its models and trainers
-  are, and the log is told; the allocator and the log must be there as long. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
-  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs not counted.
+  All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both
+  or none), called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed
+  inside, so it need not do either. What the C library needs itself (qsort, stdio, threads) is not in it.
+  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size
+  has been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more
+  splats on screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the
+  trainer. Contexts, models and trainers may be destroyed in any order: a model stays until its trainer is
+  gone, a context until its models and trainers are, and the log is told; the allocator and the log must be
+  there as long. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
+  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs
+  not counted.
 
 THREADS
-  A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each thread may
-  have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller counted) and joins them
-  when destroyed. desc.parallel, if set, replaces them: it gets batches of independent tasks and returns when all are
-  done. Hooks, the allocator, the log and the progress callback run on the caller's thread.
-  While a call is at work, any other that uses the same context, so all but those that only tell something of it, returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
-  whether it comes from a hook (which may call ssdgs_stage_cpu()), a task, the allocator, the log or, where the compiler has
-  atomic operations, another thread. The progress callback runs between two steps: it may make any call but the one that
-  destroys its trainer.
-  After fork() the child may use and destroy its copies of contexts; they have no threads of their own there.
+  A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each
+  thread may have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller
+  counted) and joins them when destroyed. desc.parallel, if set, replaces them: it gets batches of
+  independent tasks and returns when all are done. Hooks, the allocator, the log and the progress callback
+  run on the caller's thread. While a call is at work, any other that uses the same context, so all but
+  those that only tell something of it, returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
+  whether it comes from a hook (which may call ssdgs_stage_cpu()), a task, the allocator, the log or, where
+  the compiler has atomic operations, another thread. The progress callback runs between two steps: it may
+  make any call but the one that destroys its trainer. After fork() the child may use and destroy its copies
+  of contexts; they have no threads of their own there.
 
 SPEED
   ssdgs_render_options_exact()    the method as written; training and ssdgs_evaluate() use it
-  ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was measured
+  ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was
+                                  measured
   ssdgs_render_options_fast()     max_error 1/8, light_detail 0.6, alpha_threshold 1/200: less than 0.1 dB
-  max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in any pixel, and
-  they are blended in the colour of the Gaussian before them instead, a neighbour in the order that training leaves
-  (halved across the longest side, again and again). `make bench` shows what each of these costs and gains.
-  Left out without any change of a bit: what no pixel blends; neurons that are 0 for 64 neighbouring Gaussians; terms and
-  networks not in use, gradients of those that rest; components and planes nobody asked for. And what the last frame on
-  the context found, where model, options and camera, or lights, are the same: a camera at rest needs no projection, order
-  and tiles, lights at rest no maps, no shadow network and no transport. Writing through ssdgs_model_get() needs a new call
-  of it each time, which is how the library knows. ssdgs_render_stats tells what was left out.
+  max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in
+  any pixel, and they are blended in the colour of the Gaussian before them instead, a neighbour in the
+  order that training leaves (halved across the longest side, again and again). `make bench` shows what each
+  of these costs and gains. Left out without any change of a bit: what no pixel blends; neurons that are 0
+  for 64 neighbouring Gaussians; terms and networks not in use, gradients of those that rest; components and
+  planes nobody asked for. And what the last frame on the context found, where model, options and camera, or
+  lights, are the same: a camera at rest needs no projection, order and tiles, lights at rest no maps, no
+  shadow network and no transport. Writing through ssdgs_model_get() needs a new call of it each time, which
+  is how the library knows. ssdgs_render_stats tells what was left out.
 
 SIMD
-  The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit ARM), and for
-  scalar code (anything else, tcc included); a context picks the best that CPU and system have. desc.isa asks for one,
-  and fails with SSDGS_ERR_ISA where it is missing. No -m flags are needed; do switch optimisation on (-O2, /O2).
-  MinGW's gcc without optimisation gets SSE2 at most. ssdgs_render_options.bf16 lets rendering run the networks in
-  bfloat16 where the CPU has it (AVX-512 BF16; gcc 10 or clang 9 and on); training never does.
+  The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit
+  ARM), and for scalar code (anything else, tcc included); a context picks the best that CPU and system
+  have. desc.isa asks for one, and fails with SSDGS_ERR_ISA where it is missing. No -m flags are needed; do
+  switch optimisation on (-O2, /O2). MinGW's gcc without optimisation gets SSE2 at most.
+  ssdgs_render_options.bf16 lets rendering run the networks in bfloat16 where the CPU has it (AVX-512 BF16;
+  gcc 10 or clang 9 and on); training never does.
 
 GPU HOOK
-  desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and writes
-  ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no memory before them:
-  a hook points the members at its own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y.
-  The rest is there. With any hook set no frame keeps results of the last. Where layer_count is not 0, WALK fills the
-  lights' falls, SHADE layers, and COMPOSITE adds the diffuse and specular terms (ssdgs_asg) from what they blend to. In
-  training SHADE and SHADE_BACKWARD must be replaced together: the CPU keeps activations in between.
-  ssdgs_stage_cpu(frame, stage) runs the CPU's version. An image's components are the CPU's work, of layer_pixels and
-  pixel_shadow or, where layer_count is 0, of view 0's record, depth, order, tile_start, tile_list and tile_seen, which
-  must be in host memory then. A result other than SSDGS_OK ends the frame.
+  desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and
+  writes ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no
+  memory before them: a hook points the members at its own, valid until the library's call returns; PROJECT
+  also sets tiles_x and tiles_y. The rest is there. With any hook set no frame keeps results of the last.
+  Where layer_count is not 0, WALK fills the lights' falls, SHADE layers, and COMPOSITE adds the diffuse and
+  specular terms (ssdgs_asg) from what they blend to. In training SHADE and SHADE_BACKWARD must be replaced
+  together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs the CPU's version. An
+  image's components are the CPU's work, of layer_pixels and pixel_shadow or, where layer_count is 0, of
+  view 0's record, depth, order, tile_start, tile_list and tile_seen, which must be in host memory then. A
+  result other than SSDGS_OK ends the frame.
 
 DETERMINISM
-  The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the problem, and
-  sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that never stopped. One build
-  gives the same bits on AVX2 and AVX-512 (so does NEON), and the same on SSE2 and scalar code; between the two they
-  differ, as FMA rounds once where SSE2 rounds twice. A checkpoint that changes sides goes on, and tells the log.
-  Builds agree as far as their C libraries do (density control calls exp and log) and no -ffast-math or x87 is in
-  play: the implementation turns the compiler's own fusing of products and sums off.
+  The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the
+  problem, and sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that
+  never stopped. One build gives the same bits on AVX2 and AVX-512 (so does NEON), and the same on SSE2 and
+  scalar code; between the two they differ, as FMA rounds once where SSE2 rounds twice. A checkpoint that
+  changes sides goes on, and tells the log. Builds agree as far as their C libraries do (density control
+  calls exp and log) and no -ffast-math or x87 is in play: the implementation turns the compiler's own
+  fusing of products and sums off.
 
 ERRORS
   Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
-  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter or byte.
-  Without a context there is none. desc.logger hears every message as it comes, and notes with the code SSDGS_OK. Options
-  that no _default() function made are SSDGS_ERR_OPTIONS. Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG are not;
-  Gaussians that are not finite are not drawn, those whose colour is not are black. A training step with a gradient that
-  is not finite changes no parameter, counts in skipped_steps and returns SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on
-  after it and gives up at ten in a row.
+  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter
+  or byte. Without a context there is none. desc.logger hears every message as it comes, and notes with the
+  code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS. Nothing exits or prints.
+  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG
+  are not; Gaussians that are not finite are not drawn, those whose colour is not are black. A training step
+  with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
+  SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
 
 FILES
   A model is one binary little-endian PLY: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
-  splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_ neural_material_, all
-  raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading takes ASCII and both byte orders, skips
-  what it does not know, mends or drops broken Gaussians and sorts those that are in no order (ssdgs_load_stats). Limits:
-  8 GiB, 2^28 Gaussians, a header of 1 MiB. With settings.origin x y z are doubles, in the dataset's coordinates. A plain
-  3DGS file (f_dc_, or red green blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it cannot be
-  trained. One with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and networks at
-  their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all this. Checkpoints
-  hold a run's whole state in native byte order; other versions, precisions, options, settings, cameras or lights are
-  refused. Both kinds of file are written under another name and renamed when complete: a link is replaced, not followed,
-  and the file's mode is a new file's.
+  splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_
+  neural_material_, all raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading
+  takes ASCII and both byte orders, skips what it does not know, mends or drops broken Gaussians and sorts
+  those that are in no order (ssdgs_load_stats). Limits: 8 GiB, 2^28 Gaussians, a header of 1 MiB. With
+  settings.origin x y z are doubles, in the dataset's coordinates. A plain 3DGS file (f_dc_, or red green
+  blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it cannot be trained. One
+  with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and networks
+  at their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all
+  this. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options,
+  settings, cameras or lights are refused. Both kinds of file are written under another name and renamed
+  when complete: a link is replaced, not followed, and the file's mode is a new file's.
 
 DOUBLE
-  With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values and
-  gradients.
+  With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values
+  and gradients.
 
 ssdgs.h DOES NOT
   - read dataset folders, JSON or PNG, or write PNG: examples/olat.h does
-  - find cameras or lights: both must be known; refine_camera, refine_light and ssdgs_refine_photo() correct small
-    errors
-  - light or train with environment maps, train on photographs with several lights, or trace light between objects
+  - find cameras or lights: both must be known; refine_camera, refine_light and ssdgs_refine_photo() correct
+    small errors
+  - light or train with environment maps, train on photographs with several lights, or trace light between
+    objects
   - contain GPU kernels, undistort lenses, compress models or open a window
-  - evaluate spherical harmonics beyond degree 0 of plain files, or compute LPIPS (PSNR, SSIM and FLIP it does)
+  - evaluate spherical harmonics beyond degree 0 of plain files, or compute LPIPS (PSNR, SSIM and FLIP it
+    does)
 
 CONTENTS, search for the tag
   >>config          what this compiler and CPU can do
@@ -268,8 +296,7 @@ CONTENTS, search for the tag
   >>dipole_kernel, >>colour_kernel, >>image_kernels
 
 VERSIONS
-  0.1.0  the first
-*/
+  0.1.0  the first */
 
 /* ==== the interface ==== */
 
@@ -306,16 +333,16 @@ typedef float ssdgs_real;
 #endif
 
 /* One list makes the enum, ssdgs_result_string() and the codes the log sees. */
-#define SSDGS_RESULTS(X)                                                      \
-    X(OK, "ok")                                                               \
-    X(ERR_ARGUMENT, "an argument is out of range")                            \
-    X(ERR_OPTIONS, "the options were not made by their _default() function")  \
-    X(ERR_MEMORY, "out of memory")                                            \
-    X(ERR_IO, "a file could not be read or written")                          \
-    X(ERR_FORMAT, "a file does not hold what it should")                      \
-    X(ERR_LIMIT, "a size is over its limit")                                  \
-    X(ERR_CANCELLED, "cancelled by the progress callback")                    \
-    X(ERR_NONFINITE, "a value is not finite")                                 \
+#define SSDGS_RESULTS(X) \
+    X(OK, "ok") \
+    X(ERR_ARGUMENT, "an argument is out of range") \
+    X(ERR_OPTIONS, "the options were not made by their _default() function") \
+    X(ERR_MEMORY, "out of memory") \
+    X(ERR_IO, "a file could not be read or written") \
+    X(ERR_FORMAT, "a file does not hold what it should") \
+    X(ERR_LIMIT, "a size is over its limit") \
+    X(ERR_CANCELLED, "cancelled by the progress callback") \
+    X(ERR_NONFINITE, "a value is not finite") \
     X(ERR_ISA, "this CPU or build lacks the instruction set asked for")
 
 #define SSDGS__RESULT_ENUM(name, text) SSDGS_##name,
@@ -323,7 +350,13 @@ typedef enum ssdgs_result { SSDGS_RESULTS(SSDGS__RESULT_ENUM) SSDGS_RESULT_COUNT
 #undef SSDGS__RESULT_ENUM
 
 typedef enum ssdgs_isa {
-    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON, SSDGS_ISA_COUNT
+    SSDGS_ISA_AUTO = 0,
+    SSDGS_ISA_SCALAR,
+    SSDGS_ISA_SSE2,
+    SSDGS_ISA_AVX2,
+    SSDGS_ISA_AVX512,
+    SSDGS_ISA_NEON,
+    SSDGS_ISA_COUNT
 } ssdgs_isa;
 
 typedef struct ssdgs_context ssdgs_context; /* allocator, log, threads, kernels, GPU hook */
@@ -352,16 +385,16 @@ typedef struct ssdgs_parallel {
 
 /* The stages of a frame, in order. A hook replaces any of them; NULL runs the CPU's. */
 typedef enum ssdgs_stage {
-    SSDGS_STAGE_PROJECT = 0,        /* Gaussians -> records and depths of every view */
-    SSDGS_STAGE_SORT,               /* -> order, nearest first */
-    SSDGS_STAGE_BIN,                /* -> instances and tile lists */
-    SSDGS_STAGE_WALK,               /* -> seen (camera), visibility, depth_cue, flux, falls (lights) */
-    SSDGS_STAGE_SHADE,              /* -> color, layers or the components asked for */
-    SSDGS_STAGE_COMPOSITE,          /* -> pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow */
-    SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient, normal_gradient -> splat_gradient, color_gradient, layer_gradient; the
-                                       shared gradients anew */
-    SSDGS_STAGE_SHADE_BACKWARD,     /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
-    SSDGS_STAGE_PROJECT_BACKWARD,   /* splat_gradient -> gradient, view_gradient */
+    SSDGS_STAGE_PROJECT = 0, /* Gaussians -> records and depths of every view */
+    SSDGS_STAGE_SORT,        /* -> order, nearest first */
+    SSDGS_STAGE_BIN,         /* -> instances and tile lists */
+    SSDGS_STAGE_WALK,        /* -> seen (camera), visibility, depth_cue, flux, falls (lights) */
+    SSDGS_STAGE_SHADE,       /* -> color, layers or the components asked for */
+    SSDGS_STAGE_COMPOSITE,   /* -> pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow */
+    SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient, normal_gradient -> splat_gradient, color_gradient,
+                                       layer_gradient; the shared gradients anew */
+    SSDGS_STAGE_SHADE_BACKWARD, /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
+    SSDGS_STAGE_PROJECT_BACKWARD, /* splat_gradient -> gradient, view_gradient */
     SSDGS_STAGE_COUNT
 } ssdgs_stage;
 
@@ -372,12 +405,12 @@ typedef struct ssdgs_gpu_hook {
 } ssdgs_gpu_hook;
 
 typedef struct ssdgs_context_desc { /* all zero = defaults */
-    ssdgs_allocator allocator; /* malloc, free */
-    ssdgs_logger logger;       /* none */
-    ssdgs_parallel parallel;   /* the context's own thread pool */
-    ssdgs_gpu_hook gpu;        /* none */
-    int threads;               /* 0 = one per CPU; the pool's size */
-    ssdgs_isa isa;             /* the best this CPU has; another one fails with SSDGS_ERR_ISA if absent */
+    ssdgs_allocator allocator;      /* malloc, free */
+    ssdgs_logger logger;            /* none */
+    ssdgs_parallel parallel;        /* the context's own thread pool */
+    ssdgs_gpu_hook gpu;             /* none */
+    int threads;                    /* 0 = one per CPU; the pool's size */
+    ssdgs_isa isa; /* the best this CPU has; another one fails with SSDGS_ERR_ISA if absent */
 } ssdgs_context_desc;
 
 /* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
@@ -395,88 +428,114 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
 /* ---- the model ---- */
 
 typedef enum ssdgs_dipole {
-    SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED, SSDGS_DIPOLE_RELEASED, SSDGS_DIPOLE_BURLEY
+    SSDGS_DIPOLE_JENSEN = 0,
+    SSDGS_DIPOLE_PRINTED,
+    SSDGS_DIPOLE_RELEASED,
+    SSDGS_DIPOLE_BURLEY
 } ssdgs_dipole;
-/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form; so is S. Deferred: one term per pixel and
-   light, from what the pixel's Gaussians blend to, so that their normals agree, highlights carry over to other views and shadows
-   have edges: S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))) with
-   D = (c_d / pi) f_d E, M = c_s E, the blended normal n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes
-   and F0; p is h less its part along n. So t_j chooses between the normals' mean, right for smooth surfaces, and all of them,
-   right for rough ones. n.wi / (wo.h)^2 is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001),
-   n.wi >= 0, wo.h >= 0.25. S is eq. 8's of the blended answers of the shadow network and of (1 - soft) v + soft v_g: v is the
-   transmittance to the place at the pixel's depth, as the light's map tells from where it falls below 0.9, 0.5 and 0.1 (a veil
-   that leaves more casts no shadow), v_g the Gaussians', over alpha as their softness is: 0 for a shadow's edge on what reflects,
-   1 where light comes out beside where it went in */
+/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form; so is S. Deferred: one
+   term per pixel and light, from what the pixel's Gaussians blend to, so that their normals agree, highlights
+   carry over to other views and shadows have edges: S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5)
+   sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))) with D = (c_d / pi) f_d E, M = c_s E, the blended normal
+   n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part
+   along n. So t_j chooses between the normals' mean, right for smooth surfaces, and all of them, right for
+   rough ones. n.wi / (wo.h)^2 is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos
+   2001), n.wi >= 0, wo.h >= 0.25. S is eq. 8's of the blended answers of the shadow network and of (1 - soft)
+   v + soft v_g: v is the transmittance to the place at the pixel's depth, as the light's map tells from where
+   it falls below 0.9, 0.5 and 0.1 (a veil that leaves more casts no shadow), v_g the Gaussians', over alpha
+   as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes out beside where it went
+   in */
 typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
 typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 
 enum { /* terms of eq. 3; a mask */
-    SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8, SSDGS_ALL_TERMS = 15
+       SSDGS_DIFFUSE_TERM = 1,
+       SSDGS_SPECULAR_TERM = 2,
+       SSDGS_SHADOW_TERM = 4,
+       SSDGS_SCATTERING_TERM = 8,
+       SSDGS_ALL_TERMS = 15
 };
 
 #define SSDGS_ASG_COUNT 8
 #define SSDGS_MATERIAL_COUNT 6
 #define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
 
-/* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale), sigmoid(opacity),
-   softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first ASG weights are log lambda, log mu,
-   the logit of F0 less that of 0.04 and that of the shadow's softness; the others rest. */
+/* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale),
+   sigmoid(opacity), softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first
+   ASG weights are log lambda, log mu, the logit of F0 less that of 0.04 and that of the shadow's softness;
+   the others rest. */
 enum {
-    SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
-    SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
+    SSDGS_POSITION = 0,
+    SSDGS_ROTATION = 3,
+    SSDGS_LOG_SCALE = 7,
+    SSDGS_OPACITY = 10,
+    SSDGS_DIFFUSE = 11,
+    SSDGS_SPECULAR = 14,
+    SSDGS_SCATTERING = 17,
+    SSDGS_FRAME = 20,
+    SSDGS_ASG_WEIGHT = 24,
+    SSDGS_MATERIAL = 32,
+    SSDGS_CHANNELS = 38
 };
 
 /* What a model computes; stored in its file. */
 typedef struct ssdgs_settings {
-    int version;              /* stamped by ssdgs_settings_default / _published */
-    int terms;                /* SSDGS_*_TERM mask */
-    int baked;                /* 1: softplus(diffuse) is the colour itself, lights are ignored (a plain splat file) */
-    int transfer;             /* ssdgs_transfer: how stored images relate to the colours splatted */
-    int dipole;               /* ssdgs_dipole */
-    int asg;                  /* ssdgs_asg; deferred */
-    int per_channel_optics;   /* 1: sigma_s, sigma_a for each colour channel */
-    int depth_cue;            /* 1: the scattering network sees the depth cue; positions are in length units */
-    int transport;            /* 1: it also sees the light that true dipole transport brings from where it enters */
-    int residual_shadow;      /* 1: the shadow network corrects the logit of the visibility; positions in length units */
+    int version;  /* stamped by ssdgs_settings_default / _published */
+    int terms;    /* SSDGS_*_TERM mask */
+    int baked;    /* 1: softplus(diffuse) is the colour itself, lights are ignored (a plain splat file) */
+    int transfer; /* ssdgs_transfer: how stored images relate to the colours splatted */
+    int dipole;   /* ssdgs_dipole */
+    int asg;      /* ssdgs_asg; deferred */
+    int per_channel_optics; /* 1: sigma_s, sigma_a for each colour channel */
+    int depth_cue;          /* 1: the scattering network sees the depth cue; positions are in length units */
+    int transport; /* 1: it also sees the light that true dipole transport brings from where it enters */
+    int residual_shadow; /* 1: the shadow network corrects the logit of the visibility; positions in length
+                            units */
     int shadow_on_scattering; /* 1: eq. 14, the ablation */
     int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
     int scattering_width;     /* hidden width */
-    int view_octaves;         /* of sines and cosines of wo, which the scattering network sees, 0 .. 8: with many it learns the
-                                 photographs by heart */
-    int light_octaves;        /* and of wi */
-    int shadow_layers;        /* linear layers; 0 = no network, S = visibility */
+    int view_octaves;  /* of sines and cosines of wo, which the scattering network sees, 0 .. 8: with many it
+                          learns the  photographs by heart */
+    int light_octaves; /* and of wi */
+    int shadow_layers; /* linear layers; 0 = no network, S = visibility */
     int shadow_width;
-    int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size;       /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene; of strays, at most
-                                 one Gaussian in 200 on each side, only those within three times the others' box */
-    ssdgs_real light_bias;    /* length units: what lies nearer to the light by less than this casts no shadow. A surface is a
-                                 layer of Gaussians that would shadow each other at random. 3 standard deviations of a
-                                 surface's Gaussians, where a model made in code is coarser than trained ones */
-    ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: the pixel filter's, added to a splat's in the camera pass */
-    ssdgs_real eta;           /* index of refraction, 1 .. 2.5 */
-    ssdgs_real centre[3];     /* origin of the networks' positions */
-    ssdgs_real length_unit;   /* world units in one network unit */
-    ssdgs_real light_scale;   /* factor from the dataset's intensities to the model's */
-    ssdgs_real origin[3];     /* where the model's 0 lies in the world of its dataset, as floats. Nothing is computed with it: it is for
-                                 scenes far from 0, whose cameras, lights and Gaussians are given less it, since floats would be too
-                                 coarse. Files hold positions with it added, as doubles */
+    int light_blur;     /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
+    int light_map_size; /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene;
+                           of strays, at most one Gaussian in 200 on each side, only those within three times
+                           the others' box */
+    ssdgs_real light_bias; /* length units: what lies nearer to the light by less than this casts no shadow. A
+                              surface is a layer of Gaussians that would shadow each other at random. 3
+                              standard deviations of a surface's Gaussians, where a model made in code is
+                              coarser than trained ones */
+    ssdgs_real
+        pixel_variance;     /* px^2, 0.01 .. 10: the pixel filter's, added to a splat's in the camera pass */
+    ssdgs_real eta;         /* index of refraction, 1 .. 2.5 */
+    ssdgs_real centre[3];   /* origin of the networks' positions */
+    ssdgs_real length_unit; /* world units in one network unit */
+    ssdgs_real light_scale; /* factor from the dataset's intensities to the model's */
+    ssdgs_real
+        origin[3]; /* where the model's 0 lies in the world of its dataset, as floats. Nothing is computed
+                      with it: it is for scenes far from 0, whose cameras, lights and Gaussians are given less
+                      it, since floats would be too coarse. Files hold positions with it added, as doubles */
 } ssdgs_settings;
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
 SSDGS_API ssdgs_settings ssdgs_settings_published(void);
 
-/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in code, and call
-   ssdgs_model_get() before every round of writing: rendering keeps what it found for a model that has not changed. */
+/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in
+   code, and call ssdgs_model_get() before every round of writing: rendering keeps what it found for a model
+   that has not changed. */
 typedef struct ssdgs_model_view {
-    int count;               /* Gaussians */
-    size_t stride;           /* floats from one plane to the next */
-    ssdgs_real *gaussians;   /* (SSDGS_CHANNELS, stride) */
-    ssdgs_real *asg_basis;   /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
-    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u; deferred: log s, logit t */
-    ssdgs_real *asg_sigma;   /* (SSDGS_ASG_COUNT) raw sigma of the angular form; deferred: a before softplus */
-    ssdgs_real *scattering;  /* per layer: (out, in) weights, then (out) biases */
+    int count;                 /* Gaussians */
+    size_t stride;             /* floats from one plane to the next */
+    ssdgs_real *gaussians;     /* (SSDGS_CHANNELS, stride) */
+    ssdgs_real *asg_basis;     /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
+    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u; deferred:
+                                  log s, logit t */
+    ssdgs_real *asg_sigma;  /* (SSDGS_ASG_COUNT) raw sigma of the angular form; deferred: a before softplus */
+    ssdgs_real *scattering; /* per layer: (out, in) weights, then (out) biases */
     size_t scattering_count;
     ssdgs_real *shadow;
     size_t shadow_count;
@@ -484,40 +543,44 @@ typedef struct ssdgs_model_view {
 
 /* A model of count Gaussians with neutral parameters (grey, opacity 0.1, networks at their start).
    settings NULL = default. ERR_OPTIONS, ERR_ARGUMENT, ERR_LIMIT, ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out);
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
+                                          ssdgs_model **out);
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model);
 SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
-/* Puts the Gaussians in the order that training leaves, neighbours together, as speed and max_error want them: for models made in
-   code or put together. Their indices change. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
+/* Puts the Gaussians in the order that training leaves, neighbours together, as speed and max_error want
+   them: for models made in code or put together. Their indices change. Not while the model is trained.
+   ERR_ARGUMENT; ERR_MEMORY, and all stays. */
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
-/* Gives the model the settings, ASG and networks of another, of any context: back to one whose file lost them in an editor. Not while
-   the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
+/* Gives the model the settings, ASG and networks of another, of any context: back to one whose file lost them
+   in an editor. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 /* What reading a file had to mend. */
 typedef struct ssdgs_load_stats {
-    int zero_rotations;      /* all below 1e-37, or one beyond 1e37: replaced by the identity */
-    int clamped_opacities;   /* infinite or beyond +-20 */
-    int clamped_scales;      /* beyond +-20 */
-    int dropped;             /* Gaussians with other non-finite values */
-    int plain;               /* 1: no SSD-GS properties, loaded as baked colours */
-    int untrained;           /* 1: ours, but without settings, which other programs drop, mostly with ASG and networks: has the published
-                                settings, and networks at their start where they are missing. ssdgs_model_adopt() gives it those of
-                                the original */
-    int sorted;              /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
+    int zero_rotations;    /* all below 1e-37, or one beyond 1e37: replaced by the identity */
+    int clamped_opacities; /* infinite or beyond +-20 */
+    int clamped_scales;    /* beyond +-20 */
+    int dropped;           /* Gaussians with other non-finite values */
+    int plain;             /* 1: no SSD-GS properties, loaded as baked colours */
+    int untrained; /* 1: ours, but without settings, which other programs drop, mostly with ASG and networks:
+                      has the published settings, and networks at their start where they are missing.
+                      ssdgs_model_adopt() gives it those of the original */
+    int sorted;    /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
 } ssdgs_load_stats;
 
 #ifndef SSDGS_NO_STDIO
-/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact. Loading sorts
-   Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY;
-   on saving ERR_NONFINITE, where networks or ASG are not finite. */
+/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact.
+   Loading sorts Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL.
+   ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not
+   finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
-SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats);
+SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
+                                        ssdgs_load_stats *stats);
 #endif
 /* The same from bytes in memory (not kept). */
-SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out,
-                                               ssdgs_load_stats *stats);
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size,
+                                               ssdgs_model **out, ssdgs_load_stats *stats);
 
 /* ---- rendering ---- */
 
@@ -525,8 +588,9 @@ typedef struct ssdgs_camera {
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major world to camera; x right, y down, z forward */
-    ssdgs_real near_plane;     /* world units; 0 = 0.02 length units, 0.01 without them. Gaussians with a centre nearer than that are not drawn, nor those more than
-                                  56 degrees to the side or above that reach back, by five standard deviations, beside the camera */
+    ssdgs_real near_plane; /* world units; 0 = 0.02 length units, 0.01 without them. Gaussians with a centre
+                              nearer than that are not drawn, nor those more than 56 degrees to the side or
+                              above that reach back, by five standard deviations, beside the camera */
 } ssdgs_camera;
 
 typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
@@ -536,13 +600,15 @@ typedef struct ssdgs_light {
     ssdgs_real intensity[3]; /* RGB, 0 or more, in the units of the training data; directional: irradiance */
 } ssdgs_light;
 
-/* Camera at eye looking at target; focal length for a horizontal field of view in radians. up may be any vector. */
-SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3], const ssdgs_real up[3],
-                                            ssdgs_real fov_x, int width, int height);
+/* Camera at eye looking at target; focal length for a horizontal field of view in radians. up may be any
+   vector. */
+SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
+                                            const ssdgs_real up[3], ssdgs_real fov_x, int width, int height);
 
-/* Where results go. The caller owns every plane; NULL = not computed. Colours are linear (settings.transfer none: stored
-   values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha) background = color. With max_error
-   > 0 what is left unshaded has its neighbour's depth, normal and shadow too. */
+/* Where results go. The caller owns every plane; NULL = not computed. Colours are linear (settings.transfer
+   none: stored values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha)
+   background = color. With max_error > 0 what is left unshaded has its neighbour's depth, normal and shadow
+   too. */
 typedef struct ssdgs_image {
     int stride;             /* pixels from row to row; 0 = camera width */
     ssdgs_real *color;      /* (h,w,3) */
@@ -556,17 +622,17 @@ typedef struct ssdgs_image {
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
-    int version;                  /* stamped by ssdgs_render_options_default */
-    int terms;                    /* of the model's terms, those to render */
-    int bf16;                     /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour. Leaves no dead neurons
-                                     out: slower than 0 on Intel's CPUs, see `make bench` on others */
-    int antialias;                /* 1: opacity compensated for pixel_variance (Mip-Splatting) */
-    ssdgs_real background[3];     /* linear; transfer none: stored values */
-    ssdgs_real stop;              /* a pixel is done when its transmittance falls below; 0 = never */
-    ssdgs_real alpha_threshold;   /* splats fainter than this at a pixel are not drawn */
-    ssdgs_real max_error;         /* Gaussians are left unshaded where, in every pixel, the blend weights of all that are
-                                     sum to no more than this; 0 = every Gaussian seen is shaded */
-    ssdgs_real light_detail;      /* resolution of the lights' maps, relative to the model's choice */
+    int version; /* stamped by ssdgs_render_options_default */
+    int terms;   /* of the model's terms, those to render */
+    int bf16; /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour. Leaves no dead neurons
+                 out: slower than 0 on Intel's CPUs, see `make bench` on others */
+    int antialias;              /* 1: opacity compensated for pixel_variance (Mip-Splatting) */
+    ssdgs_real background[3];   /* linear; transfer none: stored values */
+    ssdgs_real stop;            /* a pixel is done when its transmittance falls below; 0 = never */
+    ssdgs_real alpha_threshold; /* splats fainter than this at a pixel are not drawn */
+    ssdgs_real max_error; /* Gaussians are left unshaded where, in every pixel, the blend weights of all that
+                             are sum to no more than this; 0 = every Gaussian seen is shaded */
+    ssdgs_real light_detail; /* resolution of the lights' maps, relative to the model's choice */
 } ssdgs_render_options;
 
 /* What a game wants: shortcuts that cannot be seen (less than 0.02 dB against photographs). */
@@ -577,174 +643,209 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
 
 typedef struct ssdgs_render_stats {
-    int gaussians;      /* in the model */
-    int visible;        /* inside the camera's frustum */
-    int shaded;         /* contributing to a pixel; 1 at least where any is glimpsed */
-    int glimpsed;       /* contributing, but left unshaded within max_error */
-    int rejected;       /* never drawn: position or rotation is not finite, scale or opacity is NaN */
-    int blackened;      /* drawn black: the colour is not finite */
-    int light_views;    /* light maps in use */
-    int camera_kept;    /* 1: projection, order, tiles and what the camera sees are the last frame's */
-    int lights_kept;    /* 1: so is the light pass */
-    int shadows_kept;   /* Gaussians x lights whose shadow network did not run again */
+    int gaussians;       /* in the model */
+    int visible;         /* inside the camera's frustum */
+    int shaded;          /* contributing to a pixel; 1 at least where any is glimpsed */
+    int glimpsed;        /* contributing, but left unshaded within max_error */
+    int rejected;        /* never drawn: position or rotation is not finite, scale or opacity is NaN */
+    int blackened;       /* drawn black: the colour is not finite */
+    int light_views;     /* light maps in use */
+    int camera_kept;     /* 1: projection, order, tiles and what the camera sees are the last frame's */
+    int lights_kept;     /* 1: so is the light pass */
+    int shadows_kept;    /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done, neurons dead in a block left out */
-    size_t instances;   /* (tile, splat) pairs of the camera */
+    size_t instances;    /* (tile, splat) pairs of the camera */
 } ssdgs_render_stats;
 
-/* Renders model seen by camera, lit by lights[0 .. light_count). After the first frame of a size nothing is allocated. */
-SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                    const ssdgs_image *image);
+/* Renders model seen by camera, lit by lights[0 .. light_count). After the first frame of a size nothing is
+   allocated. */
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                                    int light_count, const ssdgs_image *image);
 /* The same with options (NULL = default) and statistics (may be NULL). */
-SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats);
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera,
+                                       const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image,
+                                       ssdgs_render_stats *stats);
 
 /* sRGB transfer curve and its inverse (IEC 61966-2-1). */
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear);
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
-/* Clamps, encodes by the model's transfer and rounds (count) values to bytes, at most one level off. Like the next two it does
-   nothing where an array is NULL. */
+/* Clamps, encodes by the model's transfer and rounds (count) values to bytes, at most one level off. Like the
+   next two it does nothing where an array is NULL. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
 
 typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8 } ssdgs_format; /* 4 bytes a pixel */
 
-/* color and alpha of a rendering without background as pixels of straight alpha: encode(color / alpha). Without image->alpha they are
-   opaque. pitch: bytes from one row to the next; negative where `pixels` is the first row of an image stored bottom row first. */
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
-                               ptrdiff_t pitch);
-/* Stored values (pixels,3) of a rendering without background, color (pixels,3) and alpha (pixels), laid over one of stored
-   values: alpha encode(color / alpha) + (1 - alpha) background. stored may be color. */
+/* color and alpha of a rendering without background as pixels of straight alpha: encode(color / alpha).
+   Without image->alpha they are opaque. pitch: bytes from one row to the next; negative where `pixels` is the
+   first row of an image stored bottom row first. */
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                               ssdgs_format format, void *pixels, ptrdiff_t pitch);
+/* Stored values (pixels,3) of a rendering without background, color (pixels,3) and alpha (pixels), laid over
+   one of stored values: alpha encode(color / alpha) + (1 - alpha) background. stored may be color. */
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored);
 
 #ifndef SSDGS_NO_TRAINER
 /* ---- training, and comparing with photographs ---- */
 
-typedef struct ssdgs_metrics { double psnr, ssim, flip; } ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
+typedef struct ssdgs_metrics {
+    double psnr, ssim, flip;
+} ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
 
 /* Compares (h,w,3) images of stored values, clamped to [0,1]. */
-SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
-                                     int width, int height, ssdgs_metrics *metrics);
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
+                                     const ssdgs_real *reference, int width, int height,
+                                     ssdgs_metrics *metrics);
 
-typedef enum ssdgs_pixels { SSDGS_PIXELS_RGBA8 = 0, SSDGS_PIXELS_RGBA16 } ssdgs_pixels; /* native-endian 16 bit */
+typedef enum ssdgs_pixels {
+    SSDGS_PIXELS_RGBA8 = 0,
+    SSDGS_PIXELS_RGBA16
+} ssdgs_pixels; /* native-endian 16 bit */
 
 /* One photograph. The pixels stay the caller's and must outlive the trainer. */
 typedef struct ssdgs_photo {
     ssdgs_camera camera;
     ssdgs_light light;
-    const void *pixels;  /* (h,w,4), tightly packed, straight alpha, stored values */
+    const void *pixels; /* (h,w,4), tightly packed, straight alpha, stored values */
     ssdgs_pixels format;
 } ssdgs_photo;
 
 typedef enum ssdgs_schedule { /* the paper's orders H to K */
-    SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
+                              SSDGS_SCHEDULE_PROGRESSIVE = 0,
+                              SSDGS_SCHEDULE_JOINT,
+                              SSDGS_SCHEDULE_SWAPPED,
+                              SSDGS_SCHEDULE_MERGED
 } ssdgs_schedule;
 
 /* Learning rate: from start to end by equal factors, to or from 0 by equal steps. */
-typedef struct ssdgs_rate { ssdgs_real start, end; } ssdgs_rate;
+typedef struct ssdgs_rate {
+    ssdgs_real start, end;
+} ssdgs_rate;
 
-/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations` below that. */
+/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations` below
+   that. */
 typedef struct ssdgs_train_options {
-    int version;               /* stamped by ssdgs_train_options_default / _published */
-    int iterations;            /* 20000 */
-    uint64_t seed;             /* 1 */
-    int schedule;              /* ssdgs_schedule; merged */
-    int random_background;     /* 1: photographs are fitted on a new colour each time, so dark splats cannot pass for a dark background,
-                                  but for opaque ones that show `background`; 0: on `background` */
-    int initial_points;        /* random Gaussians in the bounds when the model is empty, less those that prune_outside drops; where
-                                  these are three in four or more others are drawn; 10000 */
-    int max_gaussians;         /* cap of the density control; 100000 */
+    int version;           /* stamped by ssdgs_train_options_default / _published */
+    int iterations;        /* 20000 */
+    uint64_t seed;         /* 1 */
+    int schedule;          /* ssdgs_schedule; merged */
+    int random_background; /* 1: photographs are fitted on a new colour each time, so dark splats cannot pass
+                              for a dark background, but for opaque ones that show `background`; 0: on
+                              `background` */
+    int initial_points;    /* random Gaussians in the bounds when the model is empty, less those that
+                              prune_outside drops; where    these are three in four or more others are drawn;
+                              10000 */
+    int max_gaussians;     /* cap of the density control; 100000 */
     int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
-    int opacity_reset_every;   /* 3000, not scaled, the last one at least half of it before densify_until*: with fewer than 5,400
-                                  iterations there is none; 0 = never */
-    int refine_camera, refine_light; /* 1: fit each photograph's pose, but for what all have in common, light position; 0 */
-    ssdgs_real background[3];  /* stored values */
-    ssdgs_real dssim;          /* weight of 1 - SSIM; 0.2 */
-    ssdgs_real normal_weight;  /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended depth, so
-                                  that normals are right where only highlights tell; 0.05; 0 = none */
-    ssdgs_real bounds_min[3], bounds_max[3]; /* where random Gaussians start: the object's box, not the cameras'; -0.5, 0.5 */
-    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split; 4e-4. Where outlines
-                                  show that the object fills less than 0.15 of a photograph it counts for more, by the root */
-    ssdgs_real densify_size;   /* clone below, split above, of the scene's extent; 0.01 */
-    ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on average, is halved,
-                                  since no shadow's edge shows within a Gaussian; 0.5; 0 = none is */
+    int opacity_reset_every; /* 3000, not scaled, the last one at least half of it before densify_until*: with
+                                fewer than 5,400 iterations there is none; 0 = never */
+    int refine_camera,
+        refine_light; /* 1: fit each photograph's pose, but for what all have in common, light position; 0 */
+    ssdgs_real background[3]; /* stored values */
+    ssdgs_real dssim;         /* weight of 1 - SSIM; 0.2 */
+    ssdgs_real
+        normal_weight; /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended
+                          depth, so that normals are right where only highlights tell; 0.05; 0 = none */
+    ssdgs_real bounds_min[3],
+        bounds_max[3]; /* where random Gaussians start: the object's box, not the cameras'; -0.5, 0.5 */
+    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split;
+                                  4e-4. Where outlines show that the object fills less than 0.15 of a
+                                  photograph it counts for more, by the root */
+    ssdgs_real densify_size;     /* clone below, split above, of the scene's extent; 0.01 */
+    ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on
+                                  average, is halved, since no shadow's edge shows within a Gaussian; 0.5; 0 =
+                                  none is */
     ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
-    ssdgs_real prune_weight;   /* so is one whose blend weight, summed over the pixels, is less than so many px on average over the
-                                  photographs that see it; 0.05; 0 = none */
-    ssdgs_real prune_outside;  /* and one outside of the object's outlines: where more than this share of the photographs that have
-                                  its centre in the picture, and more than one of eight or more, are transparent there, 1/128 of
-                                  the width around, or where none has it; 0.02; 0 = none. Photographs have outlines where more
-                                  than a hundredth of the picture is wholly transparent, but not all of it; of eight or more those
-                                  are left out that are transparent on a third of what the others show */
-    ssdgs_real opacity_fade;   /* px: where opaque photographs show `background` around the object (see images), and at most a fiftieth
-                                  of all have outlines, an opaque Gaussian costs as much as so many px wrong by 1, less and less up
-                                  to iteration 30,000*, as those of the background's colour have no other reason to go; 0.8; 0 =
-                                  nothing */
-    ssdgs_real adam_epsilon;   /* Adam's epsilon, in what 1 / 255 in one colour of one pixel of the photograph costs (positions: by a
-                                  move of the bounds' longest side). What no photograph shows hardly moves; with the published
-                                  1e-15 rounding noise takes full steps without end; 0.1; 0 = 1e-15 */
-    ssdgs_rate position, opacity, scale, rotation, color; /* over the whole run; position: of 1.1 x the cameras' radius */
-    ssdgs_rate asg, frame;                /* start up to iteration 40,000*, end at 90,000*: the published shape */
+    ssdgs_real prune_weight;  /* so is one whose blend weight, summed over the pixels, is less than so many px
+                                 on average over the  photographs that see it; 0.05; 0 = none */
+    ssdgs_real prune_outside; /* and one outside of the object's outlines: where more than this share of the
+                                 photographs that have its centre in the picture, and more than one of eight
+                                 or more, are transparent there, 1/128 of the width around, or where none has
+                                 it; 0.02; 0 = none. Photographs have outlines where more than a hundredth of
+                                 the picture is wholly transparent, but not all of it; of eight or more those
+                                 are left out that are transparent on a third of what the others show */
+    ssdgs_real opacity_fade; /* px: where opaque photographs show `background` around the object (see images),
+                                and at most a fiftieth of all have outlines, an opaque Gaussian costs as much
+                                as so many px wrong by 1, less and less up to iteration 30,000*, as those of
+                                the background's colour have no other reason to go; 0.8; 0 = nothing */
+    ssdgs_real adam_epsilon; /* Adam's epsilon, in what 1 / 255 in one colour of one pixel of the photograph
+                                costs (positions: by a move of the bounds' longest side). What no photograph
+                                shows hardly moves; with the published 1e-15 rounding noise takes full steps
+                                without end; 0.1; 0 = 1e-15 */
+    ssdgs_rate position, opacity, scale, rotation,
+        color;             /* over the whole run; position: of 1.1 x the cameras' radius */
+    ssdgs_rate asg, frame; /* start up to iteration 40,000*, end at 90,000*: the published shape */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
-    ssdgs_rate camera_rate, light_rate;   /* up to 60,000*; of the bounds' longest side, turns of the picture's width; for 300 shows of
-                                             each photograph; with fewer, times the root of 300 / shows */
+    ssdgs_rate camera_rate,
+        light_rate; /* up to 60,000*; of the bounds' longest side, turns of the picture's width; for 300 shows
+                       of each photograph; with fewer, times the root of 300 / shows */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
-/* The paper's order of the terms, what rests when, density control and length. Other than in the paper, points start in the
-   bounds, backgrounds are random (random_background) and refinement takes longer steps where photographs are shown seldom. */
+/* The paper's order of the terms, what rests when, density control and length. Other than in the paper,
+   points start in the bounds, backgrounds are random (random_background) and refinement takes longer steps
+   where photographs are shown seldom. */
 SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 
 typedef struct ssdgs_train_stats {
-    int iteration;        /* done so far */
+    int iteration; /* done so far */
     int gaussians;
-    int shaded;           /* in this step */
-    int terms;            /* of this step, SSDGS_*_TERM: the schedule's so far; what is still to come is untrained */
-    int skipped_steps;    /* refused for non-finite gradients, so far */
-    double loss, psnr;    /* of this step's image */
+    int shaded; /* in this step */
+    int terms;  /* of this step, SSDGS_*_TERM: the schedule's so far; what is still to come is untrained */
+    int skipped_steps; /* refused for non-finite gradients, so far */
+    double loss, psnr; /* of this step's image */
 } ssdgs_train_stats;
 
 /* Returns 0 to stop: ssdgs_trainer_run then returns SSDGS_ERR_CANCELLED, the state is whole. */
 typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
-/* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians starts from
-   random points and is given light_scale, centre, length_unit and new networks; one that has Gaussians keeps all it has, but
-   the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. Once another trainer's density control or checkpoint, or
-   ssdgs_model_sort(), has moved the Gaussians this one's calls fail with ERR_ARGUMENT.
-   options NULL = default. */
+/* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians
+   starts from random points and is given light_scale, centre, length_unit and new networks; one that has
+   Gaussians keeps all it has, but the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. Once
+   another trainer's density control or checkpoint, or ssdgs_model_sort(), has moved the Gaussians this one's
+   calls fail with ERR_ARGUMENT. options NULL = default. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
-/* One iteration. A step with non-finite gradients changes nothing, is counted and returns SSDGS_ERR_NONFINITE. One that runs
-   out of memory changes nothing and can be tried again; where only its density control does, it is done without, as
-   stats->iteration says beside SSDGS_ERR_MEMORY. */
+/* One iteration. A step with non-finite gradients changes nothing, is counted and returns
+   SSDGS_ERR_NONFINITE. One that runs out of memory changes nothing and can be tried again; where only its
+   density control does, it is done without, as stats->iteration says beside SSDGS_ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
-/* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are skipped, ten in a
-   row end the run. */
+/* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are
+   skipped, ten in a row end the run. */
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
 /* The training camera and light of photo index as refined so far. */
-SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light);
-/* About how many bytes a run will hold at max_gaussians, the photographs not counted; 0 for what would be refused. */
-SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height);
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
+                                             ssdgs_light *light);
+/* About how many bytes a run will hold at max_gaussians, the photographs not counted; 0 for what would be
+   refused. */
+SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
+                                    int width, int height);
 
 #ifndef SSDGS_NO_STDIO
-/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and settings: others are
-   refused, but for the photos' pixels, which are not looked at. ERR_NONFINITE as on saving a model. */
+/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and
+   settings: others are refused, but for the photos' pixels, which are not looked at. ERR_NONFINITE as on
+   saving a model. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
-/* How far the run of a checkpoint had come, which tells whether it may be replaced. ERR_IO without a file, ERR_FORMAT where it is
-   no checkpoint or that of another version. */
+/* How far the run of a checkpoint had come, which tells whether it may be replaced. ERR_IO without a file,
+   ERR_FORMAT where it is no checkpoint or that of another version. */
 SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration);
 #endif
 
-/* Renders a photograph's camera and light, with the exact options, and compares. image (h,w,3, stored values) may be NULL.
-   background: stored values. */
-SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
-                                      ssdgs_real *image, ssdgs_metrics *metrics);
+/* Renders a photograph's camera and light, with the exact options, and compares. image (h,w,3, stored values)
+   may be NULL. background: stored values. */
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
+                                      const ssdgs_real background[3], ssdgs_real *image,
+                                      ssdgs_metrics *metrics);
 /* Fits photo's camera and light position to its pixels by `iterations` steps of Adam, the model fixed. */
-SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations);
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
+                                          const ssdgs_real background[3], int iterations);
 #endif /* SSDGS_NO_TRAINER */
 
-/* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own ---- */
+/* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own
+   ---- */
 
 #define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, camera depth */
 
@@ -753,46 +854,53 @@ typedef struct ssdgs_tile_entry {
 } ssdgs_tile_entry;
 
 /* One Gaussian in one tile. A Gaussian's instances are neighbours, from number `first` on. */
-typedef struct ssdgs_instance { uint32_t place, mask; } ssdgs_instance; /* in tile_list; as there */
-typedef struct ssdgs_instances { uint32_t first, count; } ssdgs_instances;
+typedef struct ssdgs_instance {
+    uint32_t place, mask;
+} ssdgs_instance; /* in tile_list; as there */
+typedef struct ssdgs_instances {
+    uint32_t first, count;
+} ssdgs_instances;
 
 enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
 typedef struct ssdgs_splat_view {
-    int light;                  /* -1: the camera */
-    int width, height;          /* px */
-    int tiles_x, tiles_y;       /* of 16x16 px */
+    int light;            /* -1: the camera */
+    int width, height;    /* px */
+    int tiles_x, tiles_y; /* of 16x16 px */
     int orthographic;
-    ssdgs_real distance;        /* of a point light seen as a parallel one, else 1 */
-    int by_distance;            /* order by distance, not by depth */
-    int kept;                   /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
-    int compensate;             /* opacity compensated for the blur */
-    int blur;                   /* ssdgs_blur */
-    ssdgs_real variance;        /* px^2, of the blur */
+    ssdgs_real distance; /* of a point light seen as a parallel one, else 1 */
+    int by_distance;     /* order by distance, not by depth */
+    int kept;            /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
+    int compensate;      /* opacity compensated for the blur */
+    int blur;            /* ssdgs_blur */
+    ssdgs_real variance; /* px^2, of the blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
     /* SSDGS_STAGE_PROJECT */
-    ssdgs_real *record;         /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
-    ssdgs_real *depth;          /* (n) camera depth or distance to the light; negative = not drawn, see ssdgs_camera.near_plane */
+    ssdgs_real
+        *record; /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
+    ssdgs_real *depth; /* (n) camera depth or distance to the light; negative = not drawn, see
+                          ssdgs_camera.near_plane */
     /* SSDGS_STAGE_SORT */
-    uint32_t *order;            /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
+    uint32_t *order; /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
     int visible;
     /* SSDGS_STAGE_BIN */
-    size_t instance_room;       /* instance numbers in use, with gaps */
-    size_t instances;           /* without the gaps */
-    ssdgs_instance *instance;   /* (instance_room) */
+    size_t instance_room;         /* instance numbers in use, with gaps */
+    size_t instances;             /* without the gaps */
+    ssdgs_instance *instance;     /* (instance_room) */
     ssdgs_instances *of_gaussian; /* (n) none where not drawn */
-    uint32_t *tile_start;       /* (tiles + 1) places in tile_list */
-    ssdgs_tile_entry *tile_list; /* (instances) per tile, nearest first */
+    uint32_t *tile_start;         /* (tiles + 1) places in tile_list */
+    ssdgs_tile_entry *tile_list;  /* (instances) per tile, nearest first */
     /* SSDGS_STAGE_WALK, camera */
     uint16_t *tile_seen;        /* (instances) which micro-tiles blend it */
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
-    ssdgs_real *tile_sums;      /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
-    ssdgs_real *falls;          /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each the
-                                   distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5, 0.1, or
-                                   1e30; what is left after the first two falls, what there was before the last two, and what is
-                                   left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
+    ssdgs_real *tile_sums; /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
+    ssdgs_real
+        *falls; /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each the
+                   distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5, 0.1,
+                   or 1e30; what is left after the first two falls, what there was before the last two, and
+                   what is left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -802,43 +910,49 @@ typedef struct ssdgs_frame {
     ssdgs_model_view gaussians;
     ssdgs_camera camera;
     ssdgs_render_options options;
-    ssdgs_real eye[3];          /* the camera's centre */
+    ssdgs_real eye[3]; /* the camera's centre */
     const ssdgs_light *lights;
     int light_count;
-    int terms;                  /* to render, after settings and options */
-    int training;               /* 1: network activations are kept for the backward */
-    int frozen[2];              /* 1: no gradient of the scattering, the shadow network's weights */
+    int terms;     /* to render, after settings and options */
+    int training;  /* 1: network activations are kept for the backward */
+    int frozen[2]; /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
-    unsigned char *seen;        /* (n) SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
-    ssdgs_real *visibility;     /* (lights, n) eq. 7 */
-    ssdgs_real *depth_cue;      /* (lights, n) world units */
-    ssdgs_real *flux;           /* (lights, n) intercepted, sr per unit intensity, directional: area; NULL, so not computed, unless
-                                   settings.transport asks or the caller of the stages points it at memory */
+    unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
+    ssdgs_real *visibility; /* (lights, n) eq. 7 */
+    ssdgs_real *depth_cue;  /* (lights, n) world units */
+    ssdgs_real
+        *flux; /* (lights, n) intercepted, sr per unit intensity, directional: area; NULL, so not computed,
+                  unless settings.transport asks or the caller of the stages points it at memory */
     /* SSDGS_STAGE_SHADE */
-    uint32_t *shaded;           /* (shaded_count) Gaussians seen, ascending */
+    uint32_t *shaded; /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
-    ssdgs_real *color;          /* (n, 4); the fourth: 1 where one was not finite, so black */
-    int layer_count;            /* 0, or 4 + 3 light_count: light is deferred, color is scattering alone */
-    ssdgs_real *layers;         /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; of each light M;
-                                   D; the shadow network's answer, v_g, softness */
-    ssdgs_real *diffuse, *specular, *scattering, *normal, *shadow; /* (n, 4) each; shadow: S, depth; NULL: light is deferred */
+    ssdgs_real *color;  /* (n, 4); the fourth: 1 where one was not finite, so black */
+    int layer_count;    /* 0, or 4 + 3 light_count: light is deferred, color is scattering alone */
+    ssdgs_real *layers; /* (layer_count, n, 4) Q's xx, yy, zz; xy, yz, zx; camera depth, F0, 1; normal; of
+                           each light M; D; the shadow network's answer, v_g, softness */
+    ssdgs_real *diffuse, *specular, *scattering, *normal,
+        *shadow; /* (n, 4) each; shadow: S, depth; NULL: light is deferred */
     /* SSDGS_STAGE_COMPOSITE */
-    ssdgs_real *pixels;         /* (3, h, w) without background */
-    ssdgs_real *layer_pixels;   /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where nothing is; for
-                                   components and training */
-    ssdgs_real *transmittance;  /* (h, w) */
-    ssdgs_real *pixel_visibility, *pixel_shadow; /* (lights, h, w) v, S where light is deferred; as layer_pixels */
-    int visibility_given;       /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other means */
+    ssdgs_real *pixels;        /* (3, h, w) without background */
+    ssdgs_real *layer_pixels;  /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
+                                  nothing is; for  components and training */
+    ssdgs_real *transmittance; /* (h, w) */
+    ssdgs_real *pixel_visibility,
+        *pixel_shadow;    /* (lights, h, w) v, S where light is deferred; as layer_pixels */
+    int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
+                             means */
     /* backward */
     ssdgs_real *pixel_gradient; /* (4, h, w) dL/d(pixels), dL/d(transmittance) */
-    ssdgs_real *normal_gradient; /* (4, h, w) dL/d(the normals' layer), dL/d(its alpha, the ones' layer); NULL = 0 */
+    ssdgs_real
+        *normal_gradient; /* (4, h, w) dL/d(the normals' layer), dL/d(its alpha, the ones' layer); NULL = 0 */
     ssdgs_real *splat_gradient; /* (n, SSDGS_SPLAT_GRADIENTS) */
     ssdgs_real *color_gradient; /* (n, 4) */
     ssdgs_real *layer_gradient; /* (layer_count, n, 4) */
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
-    ssdgs_real *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
+    ssdgs_real
+        *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
     ssdgs_real light_gradient[3]; /* position of light 0 */
     ssdgs_real view_gradient[12]; /* camera.view */
     struct ssdgs__frame_memory *memory;
@@ -872,7 +986,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS_SELF "ssdgs.h" /* how this file includes itself: keep its name, or define this */
 #endif
 
-/* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says so. */
+/* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says
+   so. */
 #if defined(__clang__)
 #if __clang_major__ >= 12 && !defined(__wasm__)
 #pragma float_control(precise, on, push) /* which lets expressions fuse */
@@ -893,7 +1008,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__UNROLL_SCALAR /* its vectoriser does better */
 #elif __GNUC__ >= 8
 #define SSDGS__UNROLL _Pragma("GCC unroll 16")
-#define SSDGS__UNROLL_SCALAR _Pragma("GCC unroll 4") /* sixteenfold is slower, and half of the time to compile */
+#define SSDGS__UNROLL_SCALAR \
+    _Pragma("GCC unroll 4") /* sixteenfold is slower, and half of the time to compile */
 #endif
 #elif defined(_MSC_VER)
 #define SSDGS__INLINE __forceinline
@@ -930,7 +1046,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__ISA_NEON 5
 
 #if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && !defined(__TINYC__)
-#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)) && (defined(__GNUC__) || defined(_MSC_VER))
+#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)) && \
+    (defined(__GNUC__) || defined(_MSC_VER))
 #if defined(__MINGW32__) && !defined(__clang__) && !defined(__OPTIMIZE__)
 #define SSDGS__X86 1 /* its 16-byte stack cannot hold spilled AVX vectors: SSE2 alone */
 #elif defined(SSDGS_NO_AVX2)
@@ -947,7 +1064,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #ifndef SSDGS__X86
 #define SSDGS__X86 0
 #endif
-#if SSDGS__X86 >= 3 && ((defined(__clang__) && __clang_major__ >= 9) || (!defined(__clang__) && defined(__GNUC__) && __GNUC__ >= 10))
+#if SSDGS__X86 >= 3 && ((defined(__clang__) && __clang_major__ >= 9) || \
+                        (!defined(__clang__) && defined(__GNUC__) && __GNUC__ >= 10))
 #define SSDGS__BF16 1
 #else
 #define SSDGS__BF16 0
@@ -999,48 +1117,62 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__SQRT(x) sqrtf(x)
 #endif
 
-#define SSDGS__BLOCK 64      /* Gaussians shaded together */
-#define SSDGS__AHEAD 12      /* ranks; what is theirs lies anywhere in memory */
-#define SSDGS__BATCH 64      /* tile entries walked together: bits of a word */
+#define SSDGS__BLOCK 64 /* Gaussians shaded together */
+#define SSDGS__AHEAD 12 /* ranks; what is theirs lies anywhere in memory */
+#define SSDGS__BATCH 64 /* tile entries walked together: bits of a word */
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
-#define SSDGS__SLOTS 16      /* partial sums of shared gradients: fixed, so that threads cannot change the result */
-#define SSDGS__GLANCES 2000  /* about 0.1 ms */
-#define SSDGS__BAND 16       /* image rows of a task */
-#define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
-#define SSDGS__LENGTHS 5        /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
+#define SSDGS__SLOTS \
+    16 /* partial sums of shared gradients: fixed, so that threads cannot change the result */
+#define SSDGS__GLANCES 2000 /* about 0.1 ms */
+#define SSDGS__BAND 16      /* image rows of a task */
+#define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
+#define SSDGS__LENGTHS 5    /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
 #define SSDGS__ALPHA_MAX 0.999
-#define SSDGS__SHARE ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
-#define SSDGS__F0 0.04       /* Schlick */
+#define SSDGS__SHARE \
+    ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
+#define SSDGS__F0 0.04    /* Schlick */
 #define SSDGS__F0_LOGIT -3.1780538303479458
-#define SSDGS__SHARPEST 12   /* |log lambda|, |log mu| of deferred lobes at most */
+#define SSDGS__SHARPEST 12             /* |log lambda|, |log mu| of deferred lobes at most */
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
 #define SSDGS__SOLID ((ssdgs_real)0.5) /* alpha from which on a pixel's depth is a surface's */
 #define SSDGS__MAX_GAUSSIANS (1 << 28)
 #define SSDGS__MAX_SIDE (1 << 15) /* px of an image */
-#define SSDGS__MOST_LIGHT 1e30 /* of light_scale */
+#define SSDGS__MOST_LIGHT 1e30    /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
-#define SSDGS__FALLS 3       /* levels of transmittance below which a light's map says where it falls */
-enum { /* a map's pixel: distances of the falls, what is left after the first of them, what there was before the others, and behind all */
-    SSDGS__LEFT = SSDGS__FALLS, SSDGS__BEFORE = 2 * SSDGS__FALLS - 1, SSDGS__BEHIND = 3 * SSDGS__FALLS - 2, SSDGS__FALL_VALUES
+#define SSDGS__FALLS 3 /* levels of transmittance below which a light's map says where it falls */
+enum { /* a map's pixel: distances of the falls, what is left after the first of them, what there was before
+          the others, and behind all */
+       SSDGS__LEFT = SSDGS__FALLS,
+       SSDGS__BEFORE = 2 * SSDGS__FALLS - 1,
+       SSDGS__BEHIND = 3 * SSDGS__FALLS - 2,
+       SSDGS__FALL_VALUES
 };
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
-#define SSDGS__LAYERS 8      /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, three of one light */
+#define SSDGS__LAYERS \
+    8 /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, three of one light */
 #define SSDGS__LIGHT_LAYER 5 /* the first light's: M, D, residual of S; the next light's follow */
 #define SSDGS__PER_LIGHT 3
 #define SSDGS__DEPTH_LAYER 3
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
-#define SSDGS__LOBE 11       /* rows: Q (6), normal (3), F0, how soft its shadow is */
-#define SSDGS__HIGHLIGHT_SUMS (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
-/* A Gaussian beside the camera that reaches back to the plane z = 0 would by its affine projection cover the whole picture: beyond
-   this slope x / z, y / z none is drawn whose standard deviation along z is so much of its depth. The picture's borders have no say
-   in it, so its parts agree. */
+#define SSDGS__LOBE 11         /* rows: Q (6), normal (3), F0, how soft its shadow is */
+#define SSDGS__HIGHLIGHT_SUMS \
+    (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
+/* A Gaussian beside the camera that reaches back to the plane z = 0 would by its affine projection cover the
+   whole picture: beyond this slope x / z, y / z none is drawn whose standard deviation along z is so much of
+   its depth. The picture's borders have no say in it, so its parts agree. */
 #define SSDGS__STEEP 1.5
 #define SSDGS__BACK 0.2
 
 enum { /* rows of a block's geometry */
-    SSDGS__WI = 0, SSDGS__WO = 3, SSDGS__NORMAL = 6, SSDGS__IRRADIANCE = 9, SSDGS__COSINE, SSDGS__GLOSS, SSDGS__ROWS,
-    SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
+       SSDGS__WI = 0,
+       SSDGS__WO = 3,
+       SSDGS__NORMAL = 6,
+       SSDGS__IRRADIANCE = 9,
+       SSDGS__COSINE,
+       SSDGS__GLOSS,
+       SSDGS__ROWS,
+       SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
 };
 
 /* ---- what the kernels are called with ---- */
@@ -1058,12 +1190,13 @@ typedef struct ssdgs__tile {
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
     int cue, flux, orthographic; /* whether the light pass finds them */
-    ssdgs_real *falls; /* of the tile in a light's map, or NULL */
+    ssdgs_real *falls;           /* of the tile in a light's map, or NULL */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
     ssdgs_real *out;
-    const ssdgs_real *a, *b, *bias, *mask; /* bias (rows), mask as out: results where it is not positive become 0 */
+    const ssdgs_real *a, *b, *bias,
+        *mask; /* bias (rows), mask as out: results where it is not positive become 0 */
     size_t out_stride, a_row, a_k, b_stride;
     const uint16_t *row_list, *depth_list; /* (rows), (depth) */
     int rows, columns, depth, accumulate, relu;
@@ -1073,22 +1206,24 @@ typedef struct ssdgs__lighting {
     ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
     int directional, angular, dipole, diffuse, specular, shadow, scattering;
     int residual_shadow, refined_shadow, per_channel_optics, shadow_on_scattering, deferred;
-    ssdgs_real view[12], inverse_fx, inverse_fy, cx, cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
+    ssdgs_real view[12], inverse_fx, inverse_fy, cx,
+        cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
 } ssdgs__lighting;
 
 typedef struct ssdgs__kernels {
-    void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *, ssdgs_real *);
-    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, const ssdgs_real *,
-                             ssdgs_real *, size_t, ssdgs_real *);
+    void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *,
+                    ssdgs_real *);
+    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t,
+                             const ssdgs_real *, ssdgs_real *, size_t, ssdgs_real *);
     void (*bin)(const ssdgs_splat_view *, const uint16_t *, ssdgs_real, int, int, uint32_t);
     void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
     void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
     void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
-    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *, ssdgs_real *, ssdgs_real *,
-                               size_t, int);
+    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *,
+                               ssdgs_real *, ssdgs_real *, size_t, int);
     void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *, ssdgs_real *);
-    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
-                               ssdgs_real *);
+    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *,
+                               const ssdgs_real *, ssdgs_real *, ssdgs_real *);
     void (*lobe)(const ssdgs_real *, ssdgs_real *);
     void (*lobe_backward)(const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
@@ -1100,44 +1235,50 @@ typedef struct ssdgs__kernels {
     void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
-    void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *);
-    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, ssdgs_real *,
-                           ssdgs_real *, size_t);
-    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                   const ssdgs_real *, ssdgs_real *);
-    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
+                             ssdgs_real *);
+    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real,
+                           ssdgs_real *, ssdgs_real *, size_t);
+    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                   const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
+    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *,
+                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
+                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
+                            ssdgs_real *, ssdgs_real *);
     void (*depth_normals)(const ssdgs_camera *, const ssdgs_real *, size_t, int, ssdgs_real, ssdgs_real *);
     void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
     void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
-    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
-                     ssdgs_real *);
-    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, const ssdgs_real *,
-                              const ssdgs_real *,
-                              const ssdgs_real *, ssdgs_real, ssdgs_real, ssdgs_real *);
+    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *,
+                     ssdgs_real *, ssdgs_real *, ssdgs_real *);
+    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *,
+                              const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real,
+                              ssdgs_real, ssdgs_real *);
     int (*finite)(const ssdgs_real *, size_t);
-    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real, ssdgs_real, ssdgs_real);
+    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real,
+                 ssdgs_real, ssdgs_real);
 } ssdgs__kernels;
 
 /* Pixel offsets of the lanes of a 4x4 micro-tile, and the lanes' numbers. */
-static const ssdgs_real ssdgs__lane_x[16] = {0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5};
-static const ssdgs_real ssdgs__lane_y[16] = {0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5, 2.5, 2.5, 2.5, 2.5, 3.5, 3.5, 3.5, 3.5};
+static const ssdgs_real ssdgs__lane_x[16] = {0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5,
+                                             0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5};
+static const ssdgs_real ssdgs__lane_y[16] = {0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5,
+                                             2.5, 2.5, 2.5, 2.5, 3.5, 3.5, 3.5, 3.5};
 static const ssdgs_real ssdgs__count[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 /* Pixel centres at the low corner of the micro-tiles of a tile. */
-static const ssdgs_real ssdgs__micro_x[16] = {0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5};
-static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5, 4.5, 4.5, 4.5, 8.5, 8.5, 8.5, 8.5, 12.5, 12.5, 12.5, 12.5};
+static const ssdgs_real ssdgs__micro_x[16] = {0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5,
+                                              0.5, 4.5, 8.5, 12.5, 0.5, 4.5, 8.5, 12.5};
+static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5,  4.5,  4.5,  4.5,
+                                              8.5, 8.5, 8.5, 8.5, 12.5, 12.5, 12.5, 12.5};
 #if SSDGS__NEON
 static const uint32_t ssdgs__lane_bits[4] = {1, 2, 4, 8};
 #endif
 static const ssdgs_real ssdgs__fall[SSDGS__FALLS] = {(ssdgs_real)0.9, (ssdgs_real)0.5, (ssdgs_real)0.1};
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {
-    (ssdgs_real)0.00102838008447911, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
-        (ssdgs_real)0.10936068950970002,
-    (ssdgs_real)0.2130055377112537, (ssdgs_real)0.26601172486179436, (ssdgs_real)0.2130055377112537,
-        (ssdgs_real)0.10936068950970002,
-    (ssdgs_real)0.03600077212843083, (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
+    (ssdgs_real)0.00102838008447911,  (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
+    (ssdgs_real)0.10936068950970002,  (ssdgs_real)0.2130055377112537,   (ssdgs_real)0.26601172486179436,
+    (ssdgs_real)0.2130055377112537,   (ssdgs_real)0.10936068950970002,  (ssdgs_real)0.03600077212843083,
+    (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
 
 static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
 #if defined(__GNUC__) && !defined(__TINYC__)
@@ -1169,9 +1310,11 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 
 /* ---- a light's map of where transmittance falls ---- */
 
-/* At a distance, the transmittances of the lanes in `bits` have fallen below their next level or several, from t to `left`. */
-static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t, const ssdgs_real *left,
-                              ssdgs_real distance, ssdgs_real *next, unsigned char *level) {
+/* At a distance, the transmittances of the lanes in `bits` have fallen below their next level or several,
+   from t to `left`. */
+static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t,
+                              const ssdgs_real *left, ssdgs_real distance, ssdgs_real *next,
+                              unsigned char *level) {
     for (; bits; bits &= bits - 1) {
         const int lane = ssdgs__lowest_bit(bits);
         ssdgs_real *at = tile->falls + (16 * micro + lane) * SSDGS__FALL_VALUES;
@@ -1187,7 +1330,8 @@ static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits,
 }
 
 /* Closes the list of each pixel, of `levels` so far. */
-static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *levels, const ssdgs_real *transmittance) {
+static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *levels,
+                             const ssdgs_real *transmittance) {
     int i;
     for (i = 0; i < 256; i++) {
         ssdgs_real *at = tile->falls + i * SSDGS__FALL_VALUES;
@@ -1200,13 +1344,15 @@ static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *level
 /* ---- scalar lanes ---- */
 
 static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties to even */
-    const ssdgs_real magic = sizeof(ssdgs_real) == 4 ? (ssdgs_real)12582912.0 : (ssdgs_real)6755399441055744.0;
+    const ssdgs_real magic =
+        sizeof(ssdgs_real) == 4 ? (ssdgs_real)12582912.0 : (ssdgs_real)6755399441055744.0;
     volatile ssdgs_real shifted = x + magic; /* volatile: -ffast-math would fold it away */
     return shifted - magic;
 }
 
 static SSDGS__INLINE float ssdgs__pow2(float n) {
-    const uint32_t bits = n > -127 ? (uint32_t)((int)n + 127) << 23 : (uint32_t)1 << 22; /* 2^-127 is subnormal; NaN too */
+    const uint32_t bits =
+        n > -127 ? (uint32_t)((int)n + 127) << 23 : (uint32_t)1 << 22; /* 2^-127 is subnormal; NaN too */
     float x;
     memcpy(&x, &bits, 4);
     return x;
@@ -1260,7 +1406,8 @@ static int ssdgs__finite(ssdgs_real x) {
 
 #define SSDGS__MESSAGE 512
 
-/* Values that several threads read and write. Compilers without atomic operations neither wait for a value nor exclude each other. */
+/* Values that several threads read and write. Compilers without atomic operations neither wait for a value
+   nor exclude each other. */
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
 #define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
@@ -1293,13 +1440,15 @@ struct ssdgs_context {
     struct ssdgs__pool *pool;
     struct ssdgs__frame_memory *frame; /* reused by every render on this context */
     int isa, threads, bf16;
-    int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes frees it */
+    int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
+                          frees it */
     volatile int busy; /* 1 while a call is at work */
     int telling;       /* 1 while the log hears a message */
     long process;      /* the one that made the threads: a fork has none of them */
-    uint64_t revisions; /* handed out to models */
-    const char *subject; /* what is being checked, for messages: a file's name, or the one of several things with its number */
-    int subject_number; /* -1: it has none */
+    uint64_t revisions;  /* handed out to models */
+    const char *subject; /* what is being checked, for messages: a file's name, or the one of several things
+                            with its number */
+    int subject_number;  /* -1: it has none */
     char message[SSDGS__MESSAGE];
 };
 
@@ -1364,7 +1513,7 @@ static void ssdgs__append_format(char *text, size_t *at, const char *format, va_
             case 'd': ssdgs__append_number(text, at, (double)va_arg(arguments, int)); break;
             case 'z': ssdgs__append_number(text, at, (double)va_arg(arguments, size_t)); break;
             default: ssdgs__append_number(text, at, va_arg(arguments, double)); break;
-        }
+            }
     }
 }
 
@@ -1384,7 +1533,8 @@ static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const
     if (context->subject) {
         ssdgs__append(context->message, &at, context->subject);
         if (context->subject_number >= 0) ssdgs__append(context->message, &at, " ");
-        if (context->subject_number >= 0) ssdgs__append_number(context->message, &at, context->subject_number);
+        if (context->subject_number >= 0)
+            ssdgs__append_number(context->message, &at, context->subject_number);
         ssdgs__append(context->message, &at, ": ");
     }
     va_start(arguments, format);
@@ -1411,15 +1561,17 @@ static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
 
 static void ssdgs__pool_forked(ssdgs_context *context);
 
-/* A call begins. It is refused while another is at work: one from a hook, a callback or a task, or on another thread. The log does
-   not hear of it, as the log may be who calls. */
+/* A call begins. It is refused while another is at work: one from a hook, a callback or a task, or on another
+   thread. The log does not hear of it, as the log may be who calls. */
 static ssdgs_result ssdgs__enter(ssdgs_context *context, const char *function) {
     size_t at = 0;
     ssdgs__pool_forked(context);
     if (context->telling) return SSDGS_ERR_ARGUMENT; /* the message being told stays */
     if (!SSDGS__EXCHANGE(&context->busy, 1)) return SSDGS_OK;
     ssdgs__append(context->message, &at, function);
-    ssdgs__append(context->message, &at, ": another call on this context is at work, and a hook, a callback or a task must not make this one");
+    ssdgs__append(
+        context->message, &at,
+        ": another call on this context is at work, and a hook, a callback or a task must not make this one");
     return SSDGS_ERR_ARGUMENT;
 }
 
@@ -1480,9 +1632,12 @@ static void *ssdgs__allocate(ssdgs_context *context, size_t bytes) {
     return memory;
 }
 
-static void ssdgs__release(ssdgs_context *context, void *memory) { ssdgs__release_to(&context->allocator, memory); }
+static void ssdgs__release(ssdgs_context *context, void *memory) {
+    ssdgs__release_to(&context->allocator, memory);
+}
 
-/* A buffer that only grows: after the first frame of a size nothing is allocated. Contents are lost on growth. */
+/* A buffer that only grows: after the first frame of a size nothing is allocated. Contents are lost on
+   growth. */
 typedef struct ssdgs__buffer {
     void *memory;
     size_t bytes;
@@ -1490,8 +1645,8 @@ typedef struct ssdgs__buffer {
 
 static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
     size_t bytes;
-    if (!ssdgs__product_fits(count, size, &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes",
-            count, size);
+    if (!ssdgs__product_fits(count, size, &bytes))
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes", count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
     ssdgs__release(context, buffer->memory);
     buffer->bytes = 0;
@@ -1512,19 +1667,32 @@ typedef CRITICAL_SECTION ssdgs__mutex;
 typedef CONDITION_VARIABLE ssdgs__condition;
 typedef HANDLE ssdgs__thread;
 #define SSDGS__THREAD_FUNCTION(name) static DWORD WINAPI name(LPVOID data)
-static int ssdgs__mutex_create(ssdgs__mutex *m) { InitializeCriticalSection(m); return 1; }
+static int ssdgs__mutex_create(ssdgs__mutex *m) {
+    InitializeCriticalSection(m);
+    return 1;
+}
 static void ssdgs__mutex_destroy(ssdgs__mutex *m) { DeleteCriticalSection(m); }
 static void ssdgs__lock(ssdgs__mutex *m) { EnterCriticalSection(m); }
 static void ssdgs__unlock(ssdgs__mutex *m) { LeaveCriticalSection(m); }
-static int ssdgs__condition_create(ssdgs__condition *c) { InitializeConditionVariable(c); return 1; }
+static int ssdgs__condition_create(ssdgs__condition *c) {
+    InitializeConditionVariable(c);
+    return 1;
+}
 static void ssdgs__condition_destroy(ssdgs__condition *c) { (void)c; }
 static void ssdgs__wait(ssdgs__condition *c, ssdgs__mutex *m) { SleepConditionVariableCS(c, m, INFINITE); }
 static void ssdgs__wake(ssdgs__condition *c) { WakeAllConditionVariable(c); }
 static int ssdgs__thread_create(ssdgs__thread *t, LPTHREAD_START_ROUTINE f, void *data) {
     return (*t = CreateThread(NULL, 0, f, data, 0, NULL)) != NULL;
 }
-static void ssdgs__thread_join(ssdgs__thread t) { WaitForSingleObject(t, INFINITE); CloseHandle(t); }
-static int ssdgs__cpu_count(void) { SYSTEM_INFO info; GetSystemInfo(&info); return (int)info.dwNumberOfProcessors; }
+static void ssdgs__thread_join(ssdgs__thread t) {
+    WaitForSingleObject(t, INFINITE);
+    CloseHandle(t);
+}
+static int ssdgs__cpu_count(void) {
+    SYSTEM_INFO info;
+    GetSystemInfo(&info);
+    return (int)info.dwNumberOfProcessors;
+}
 #else
 typedef pthread_mutex_t ssdgs__mutex;
 typedef pthread_cond_t ssdgs__condition;
@@ -1553,12 +1721,12 @@ static int ssdgs__cpu_count(void) {
 
 /* A thread waits a little while before it goes to sleep: waking up takes longer than many a stage. */
 #if defined(SSDGS__PAUSE)
-#define SSDGS__LINGER(pool, condition)                                        \
-    do {                                                                      \
-        int glances_ = (pool)->glances;                                       \
-        ssdgs__unlock(&(pool)->mutex);                                        \
-        while (glances_-- && (condition)) SSDGS__PAUSE();                     \
-        ssdgs__lock(&(pool)->mutex);                                          \
+#define SSDGS__LINGER(pool, condition) \
+    do { \
+        int glances_ = (pool)->glances; \
+        ssdgs__unlock(&(pool)->mutex); \
+        while (glances_-- && (condition)) SSDGS__PAUSE(); \
+        ssdgs__lock(&(pool)->mutex); \
     } while (0)
 #else
 #define SSDGS__LINGER(pool, condition) ((void)0)
@@ -1594,7 +1762,8 @@ SSDGS__THREAD_FUNCTION(ssdgs__pool_thread) {
     unsigned seen = 0;
     ssdgs__lock(&pool->mutex);
     for (;;) {
-        if (!pool->stop && pool->generation == seen) SSDGS__LINGER(pool, SSDGS__GLANCE(&pool->generation) == seen);
+        if (!pool->stop && pool->generation == seen)
+            SSDGS__LINGER(pool, SSDGS__GLANCE(&pool->generation) == seen);
         while (!pool->stop && pool->generation == seen) ssdgs__wait(&pool->start, &pool->mutex);
         if (pool->stop) break;
         seen = pool->generation;
@@ -1671,7 +1840,8 @@ static void ssdgs__context_serial(ssdgs_context *context) {
     context->threads = 1;
 }
 
-/* In a process forked from the one that made the threads there are none, and locks may be held for ever: goes on without. */
+/* In a process forked from the one that made the threads there are none, and locks may be held for ever: goes
+   on without. */
 static void ssdgs__pool_forked(ssdgs_context *context) {
 #if !defined(SSDGS_NO_THREADS) && !defined(_WIN32)
     if (!context->pool || context->process == (long)getpid()) return;
@@ -1691,7 +1861,8 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
 /* ==== >>cpu  which tables this machine can run ==== */
 
 #if SSDGS__X86
-/* All 0 for a leaf that the CPU has not. Without <cpuid.h>: clang 14's lets ebx come out where the subleaf goes in. */
+/* All 0 for a leaf that the CPU has not. Without <cpuid.h>: clang 14's lets ebx come out where the subleaf
+   goes in. */
 static void ssdgs__cpuid(unsigned leaf, unsigned subleaf, unsigned out[4]) {
 #if defined(_MSC_VER)
     int r[4];
@@ -1699,10 +1870,12 @@ static void ssdgs__cpuid(unsigned leaf, unsigned subleaf, unsigned out[4]) {
     memcpy(out, r, sizeof r);
 #elif defined(__x86_64__)
     __asm__("xchgq %%rbx, %q1\n\tcpuid\n\txchgq %%rbx, %q1"
-            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3]) : "0"(leaf), "2"(subleaf));
+            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3])
+            : "0"(leaf), "2"(subleaf));
 #else
     __asm__("xchgl %%ebx, %k1\n\tcpuid\n\txchgl %%ebx, %k1"
-            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3]) : "0"(leaf), "2"(subleaf));
+            : "=a"(out[0]), "=&r"(out[1]), "=c"(out[2]), "=d"(out[3])
+            : "0"(leaf), "2"(subleaf));
 #endif
     if (leaf) {
         unsigned first[4];
@@ -1751,20 +1924,20 @@ static const ssdgs__kernels *ssdgs__table(int isa) {
     const int level = ssdgs__x86_level();
 #endif
     switch (isa) {
-        case SSDGS_ISA_SCALAR: return &ssdgs__kernels_scalar;
+    case SSDGS_ISA_SCALAR: return &ssdgs__kernels_scalar;
 #if SSDGS__X86 >= 1
-        case SSDGS_ISA_SSE2: return level >= 1 ? &ssdgs__kernels_sse2 : NULL;
+    case SSDGS_ISA_SSE2: return level >= 1 ? &ssdgs__kernels_sse2 : NULL;
 #endif
 #if SSDGS__X86 >= 2
-        case SSDGS_ISA_AVX2: return level >= 2 ? &ssdgs__kernels_avx2 : NULL;
+    case SSDGS_ISA_AVX2: return level >= 2 ? &ssdgs__kernels_avx2 : NULL;
 #endif
 #if SSDGS__X86 >= 3
-        case SSDGS_ISA_AVX512: return level >= 3 ? &ssdgs__kernels_avx512 : NULL;
+    case SSDGS_ISA_AVX512: return level >= 3 ? &ssdgs__kernels_avx512 : NULL;
 #endif
 #if SSDGS__NEON
-        case SSDGS_ISA_NEON: return &ssdgs__kernels_neon;
+    case SSDGS_ISA_NEON: return &ssdgs__kernels_neon;
 #endif
-        default: return NULL;
+    default: return NULL;
     }
 }
 
@@ -1790,13 +1963,15 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     *out = NULL;
     memset(&zero, 0, sizeof zero);
     if (desc) zero = *desc;
-    if (!zero.allocator.allocate != !zero.allocator.release || zero.threads < 0 || zero.threads > 1024) return SSDGS_ERR_ARGUMENT;
+    if (!zero.allocator.allocate != !zero.allocator.release || zero.threads < 0 || zero.threads > 1024)
+        return SSDGS_ERR_ARGUMENT;
     if (!zero.allocator.allocate) {
         zero.allocator.allocate = ssdgs__default_allocate;
         zero.allocator.release = ssdgs__default_release;
     }
-    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT || (zero.isa != SSDGS_ISA_AUTO &&
-            !ssdgs__table((int)zero.isa))) return SSDGS_ERR_ISA;
+    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT ||
+        (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)zero.isa)))
+        return SSDGS_ERR_ISA;
     context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
@@ -1850,13 +2025,19 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
     }
 #endif
     if (context->references > 1)
-        ssdgs__note(context, "ssdgs_context_destroy: %d models or trainers are still there: the context goes with the last of them",
+        ssdgs__note(context,
+                    "ssdgs_context_destroy: %d models or trainers are still there: the context goes with the "
+                    "last of them",
                     context->references - 1);
     ssdgs__leave_and_drop(context);
 }
 
-SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) { return context ? context->message : "no context"; }
-SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) { return context ? (ssdgs_isa)context->isa : SSDGS_ISA_AUTO; }
+SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) {
+    return context ? context->message : "no context";
+}
+SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) {
+    return context ? (ssdgs_isa)context->isa : SSDGS_ISA_AUTO;
+}
 SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return context ? context->threads : 0; }
 
 /* ==== >>model  Gaussians, ASG bases, networks, settings ==== */
@@ -1865,20 +2046,35 @@ struct ssdgs_model {
     ssdgs_context *context;
     ssdgs_settings settings;
     uint64_t revision;    /* another one whenever the model may have changed */
-    uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must follow */
+    uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must
+                             follow */
     int references;       /* itself and its trainers: the last that goes frees it */
     int count;
-    size_t capacity;      /* plane stride, a multiple of SSDGS__BLOCK */
+    size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
     size_t global_count;
-    ssdgs_real *globals;  /* the groups of ssdgs__global_groups, in order */
+    ssdgs_real *globals; /* the groups of ssdgs__global_groups, in order */
 };
 
 enum { /* parameters that learn together: planes of every Gaussian, then what all share */
-    SSDGS__G_POSITION = 0, SSDGS__G_ROTATION, SSDGS__G_SCALE, SSDGS__G_OPACITY, SSDGS__G_DIFFUSE, SSDGS__G_SPECULAR,
-    SSDGS__G_SCATTERING, SSDGS__G_FRAME, SSDGS__G_ASG_WEIGHT, SSDGS__G_MATERIAL, SSDGS__PLANE_GROUPS,
-    SSDGS__ASG_BASIS = 0, SSDGS__ASG_SHARPNESS, SSDGS__ASG_SIGMA, SSDGS__SCATTERING_NET, SSDGS__SHADOW_NET, SSDGS__GLOBAL_GROUPS,
-    SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
+       SSDGS__G_POSITION = 0,
+       SSDGS__G_ROTATION,
+       SSDGS__G_SCALE,
+       SSDGS__G_OPACITY,
+       SSDGS__G_DIFFUSE,
+       SSDGS__G_SPECULAR,
+       SSDGS__G_SCATTERING,
+       SSDGS__G_FRAME,
+       SSDGS__G_ASG_WEIGHT,
+       SSDGS__G_MATERIAL,
+       SSDGS__PLANE_GROUPS,
+       SSDGS__ASG_BASIS = 0,
+       SSDGS__ASG_SHARPNESS,
+       SSDGS__ASG_SIGMA,
+       SSDGS__SCATTERING_NET,
+       SSDGS__SHADOW_NET,
+       SSDGS__GLOBAL_GROUPS,
+       SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
 };
 
 /* Whether positions are in a length unit, which the paper's form does not have. */
@@ -1886,7 +2082,8 @@ static int ssdgs__has_unit(const ssdgs_settings *s) {
     return s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0;
 }
 
-/* A counter-based generator: the value depends on the key and the counter alone, never on the order of use. */
+/* A counter-based generator: the value depends on the key and the counter alone, never on the order of
+   use. */
 static uint64_t ssdgs__hash(uint64_t key, uint64_t counter) {
     uint64_t x = key * UINT64_C(0x9E3779B97F4A7C15) + counter;
     x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
@@ -1905,8 +2102,9 @@ static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int 
     const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
     int i;
     sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT
-        : 27 + 3 * (1 + 2 * settings->view_octaves) + 3 * (1 + 2 * settings->light_octaves) + 3 + SSDGS_MATERIAL_COUNT +
-        (settings->depth_cue ? 9 : 0) + (settings->transport ? SSDGS__LENGTHS : 0);
+                      : 27 + 3 * (1 + 2 * settings->view_octaves) + 3 * (1 + 2 * settings->light_octaves) +
+                            3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0) +
+                            (settings->transport ? SSDGS__LENGTHS : 0);
     for (i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
     if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
     return layers;
@@ -1967,14 +2165,14 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     return s;
 }
 
-#define SSDGS__RANGE_OF(what, s, field, low, high)                                                                        \
-    if (!((s)->field >= (low) && (s)->field <= (high)) || !ssdgs__finite((ssdgs_real)(s)->field))                         \
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field,                  \
-                           (double)(s)->field, (double)(low), (double)(high))
+#define SSDGS__RANGE_OF(what, s, field, low, high) \
+    if (!((s)->field >= (low) && (s)->field <= (high)) || !ssdgs__finite((ssdgs_real)(s)->field)) \
+    return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field, \
+                       (double)(s)->field, (double)(low), (double)(high))
 
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
-    if (s->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
-            "settings: not made by ssdgs_settings_default()");
+    if (s->version != SSDGS_VERSION)
+        return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
 #define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("settings", s, field, low, high)
     SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
     SSDGS__RANGE(baked, 0, 1);
@@ -2017,26 +2215,29 @@ static void ssdgs__gaussian_reset(ssdgs_real *gaussians, size_t stride, size_t i
     gaussians[SSDGS_OPACITY * stride + index] = (ssdgs_real)-2.1972245773362196; /* logit 0.1 */
     for (i = 0; i < 3; i++) {
         gaussians[(size_t)(SSDGS_LOG_SCALE + i) * stride + index] = (ssdgs_real)-4;
-        gaussians[(size_t)(SSDGS_DIFFUSE + i) * stride + index] = gaussians[(size_t)(SSDGS_SPECULAR + i) * stride + index] =
-            gaussians[(size_t)(SSDGS_SCATTERING + i) * stride + index] = (ssdgs_real)0.5;
+        gaussians[(size_t)(SSDGS_DIFFUSE + i) * stride + index] =
+            gaussians[(size_t)(SSDGS_SPECULAR + i) * stride + index] =
+                gaussians[(size_t)(SSDGS_SCATTERING + i) * stride + index] = (ssdgs_real)0.5;
     }
     for (i = 0; i < SSDGS_MATERIAL_COUNT; i++) gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
 }
 
-/* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow network's last layer is
-   0. ASG lobes start spread over the hemisphere, from broad to sharp. */
+/* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow
+   network's last layer is 0. ASG lobes start spread over the hemisphere, from broad to sharp. */
 static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
     const double pi = 3.14159265358979323846;
     size_t first[SSDGS__GLOBAL_GROUPS + 1], at;
     int net, layer, j, i;
     ssdgs__global_groups(&model->settings, first);
     for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-        ssdgs_real *q = model->globals + 4 * j, *sharpness = model->globals + first[SSDGS__ASG_SHARPNESS] + 2 * j;
+        ssdgs_real *q = model->globals + 4 * j,
+                   *sharpness = model->globals + first[SSDGS__ASG_SHARPNESS] + 2 * j;
         q[0] = (ssdgs_real)cos(pi * j / (2 * SSDGS_ASG_COUNT));
         q[1] = q[2] = 0;
         q[3] = (ssdgs_real)sin(pi * j / (2 * SSDGS_ASG_COUNT)); /* a turn about the normal */
-        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR ? 0
-            : (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
+        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR
+                           ? 0
+                           : (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
         sharpness[1] = model->settings.asg == SSDGS_ASG_DEFERRED ? 0 : sharpness[0];
     }
     for (net = 0; net < 2; net++) {
@@ -2047,7 +2248,8 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
             const double bound = 1 / sqrt((double)sizes[layer]);
             const int still = net && layer == layers - 1 && model->settings.residual_shadow;
             for (i = 0; i < (sizes[layer] + 1) * sizes[layer + 1]; i++, at++)
-                model->globals[at] = still ? 0 : (ssdgs_real)(bound * (2 * ssdgs__uniform(seed ^ UINT64_C(0x6E6574), at) - 1));
+                model->globals[at] =
+                    still ? 0 : (ssdgs_real)(bound * (2 * ssdgs__uniform(seed ^ UINT64_C(0x6E6574), at) - 1));
         }
     }
 }
@@ -2062,7 +2264,8 @@ static void ssdgs__model_drop(ssdgs_model *model) {
     ssdgs__context_drop(context);
 }
 
-static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
+                                        ssdgs_model **out) {
     const ssdgs_settings s = settings ? *settings : ssdgs_settings_default();
     ssdgs_model *model;
     ssdgs_result result;
@@ -2072,7 +2275,8 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     result = ssdgs__settings_check(context, &s);
     if (result) return result;
     if (count < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians", count);
-    if (count > SSDGS__MAX_GAUSSIANS) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians", count);
+    if (count > SSDGS__MAX_GAUSSIANS)
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians", count);
     model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
     if (!model) return SSDGS_ERR_MEMORY;
     model->context = context;
@@ -2097,7 +2301,8 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count, ssdgs_model **out) {
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
+                                          ssdgs_model **out) {
     ssdgs_result result;
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
@@ -2109,7 +2314,8 @@ SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
     ssdgs_context *context;
     if (!model || ssdgs__enter(model->context, "ssdgs_model_destroy")) return;
     context = model->context;
-    if (model->references > 1) ssdgs__note(context, "ssdgs_model_destroy: a trainer still has the model, which goes with it");
+    if (model->references > 1)
+        ssdgs__note(context, "ssdgs_model_destroy: a trainer still has the model, which goes with it");
     context->references++;
     ssdgs__model_drop(model);
     ssdgs__leave_and_drop(context);
@@ -2117,15 +2323,16 @@ SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
 
 /* No frame and no file may hold networks or ASG that are not finite: all Gaussians share them. */
 static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
-    static const char *const names[SSDGS__GLOBAL_GROUPS] = {
-        "asg_basis", "asg_sharpness", "asg_sigma", "the scattering network", "the shadow network"};
+    static const char *const names[SSDGS__GLOBAL_GROUPS] = {"asg_basis", "asg_sharpness", "asg_sigma",
+                                                            "the scattering network", "the shadow network"};
     size_t first[SSDGS__GLOBAL_GROUPS + 1], i;
     int group;
     if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
     ssdgs__global_groups(&model->settings, first);
     for (i = 0; ssdgs__finite(model->globals[i]); i++) {}
     for (group = 0; i >= first[group + 1]; group++) {}
-    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %z of %s is not finite", i - first[group], names[group]);
+    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %z of %s is not finite",
+                       i - first[group], names[group]);
 }
 
 static void ssdgs__model_changed(ssdgs_model *model) { model->revision = ++model->context->revisions; }
@@ -2155,16 +2362,20 @@ SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
     return ssdgs__model_view(model);
 }
 
-SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) { return model ? &model->settings : NULL; }
+SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
+    return model ? &model->settings : NULL;
+}
 
 static int ssdgs__key_compare(const void *a, const void *b) {
     const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return x < y ? -1 : x > y;
 }
 
-/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each half likewise, down to
-   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact. Neighbours in space then share
-   a block, whose neurons live and die together, the cache, and a node of what transport gathers from. */
+/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each
+   half likewise, down to
+   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact.
+   Neighbours in space then share a block, whose neurons live and die together, the cache, and a node of what
+   transport gathers from. */
 static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
     size_t node, half, i, c;
     while (count > 8) {
@@ -2197,7 +2408,8 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
 }
 
 /* Puts a Gaussian's values, or what is kept of them, in the places of its key. scratch: count values. */
-static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count, ssdgs_real *scratch) {
+static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count,
+                           ssdgs_real *scratch) {
     size_t c, i;
     for (c = 0; c < SSDGS_CHANNELS; c++) {
         ssdgs_real *plane = planes + c * stride;
@@ -2235,7 +2447,8 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
     int c;
     if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
     if (model->settings.baked || original->settings.baked)
-        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a baked model has no networks");
+        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
+                           "ssdgs_model_adopt: a baked model has no networks");
     if (model->references > 1)
         return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a trainer has the model");
     globals = (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
@@ -2247,7 +2460,8 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
     for (c = 0; c < 3; c++) {
         const double move = (double)model->settings.origin[c] - (double)original->settings.origin[c];
         ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
-        for (i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++) x[i] = (ssdgs_real)((double)x[i] + move);
+        for (i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++)
+            x[i] = (ssdgs_real)((double)x[i] + move);
     }
     model->settings = original->settings;
     ssdgs__model_changed(model);
@@ -2261,8 +2475,8 @@ SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *
     return result ? result : ssdgs__leave(model->context, ssdgs__model_adopt(model, original));
 }
 
-/* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in no order, seldom in
-   ssdgs__split's, however far apart some are. */
+/* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in
+   no order, seldom in ssdgs__split's, however far apart some are. */
 static int ssdgs__in_no_order(const ssdgs_model *model) {
     enum { FEW = 1024, AROUND = 128 }; /* order of few matters little */
     const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
@@ -2274,7 +2488,8 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
         double step2 = 0, back2 = 0;
         for (c = 0; c < 3; c++) {
             const ssdgs_real *at = x + c * model->capacity + i;
-            const double step = (double)at[0] - (double)*(at - 1), leap = (double)at[0] - (double)*(at - back);
+            const double step = (double)at[0] - (double)*(at - 1),
+                         leap = (double)at[0] - (double)*(at - back);
             step2 += step * step;
             back2 += leap * leap;
         }
@@ -2286,7 +2501,8 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
 /* ==== >>frame  memory of a frame, its views ==== */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed, sums, falls;
+    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
+        sums, falls;
     ssdgs__buffer histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
@@ -2307,11 +2523,14 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 } ssdgs__bounds;
 
 typedef struct ssdgs__frame_memory {
-    ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels, transmittance;
-    ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots, view_slots;
+    ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels,
+        transmittance;
+    ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots,
+        view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known, transport, transport_known;
+    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known, transport,
+        transport_known;
     int view_room;
     ssdgs__kept kept;
     ssdgs__bounds scene;
@@ -2323,18 +2542,19 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
     if (!m) return;
     for (v = 0; v < m->view_room; v++) {
         ssdgs__buffer *b = (ssdgs__buffer *)((ssdgs__view_memory *)m->view_memory.memory + v);
-        for (i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++) ssdgs__release(context, b[i].memory);
+        for (i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++)
+            ssdgs__release(context, b[i].memory);
     }
     for (i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
         ssdgs__release(context, ((ssdgs__buffer *)m + i)->memory);
     ssdgs__release(context, m);
 }
 
-#define SSDGS__RESERVE(buffer, pointer, type, count)                                             \
-    do {                                                                                         \
+#define SSDGS__RESERVE(buffer, pointer, type, count) \
+    do { \
         const ssdgs_result reserved_ = ssdgs__reserve(context, &(buffer), (size_t)(count), sizeof(type)); \
-        if (reserved_) return reserved_;                                                         \
-        (pointer) = (type *)(buffer).memory;                                                     \
+        if (reserved_) return reserved_; \
+        (pointer) = (type *)(buffer).memory; \
     } while (0)
 
 /* Room for `count` views; what the present ones own is kept. */
@@ -2350,12 +2570,15 @@ static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_me
     return SSDGS_OK;
 }
 
-/* View axes (right, down, forward) looking along `forward` from `eye`; the image's up is the axis least along forward. */
-static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3], ssdgs_real view[12]) {
+/* View axes (right, down, forward) looking along `forward` from `eye`; the image's up is the axis least along
+   forward. */
+static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3],
+                              ssdgs_real view[12]) {
     double f[3], r[3], d[3], u[3], length, best = 2;
     int i, axis = 0;
     length = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
-    for (i = 0; i < 3; i++) f[i] = length > 0 && length < 1e300 ? forward[i] / length : (i == 2); /* no direction: any */
+    for (i = 0; i < 3; i++)
+        f[i] = length > 0 && length < 1e300 ? forward[i] / length : (i == 2); /* no direction: any */
     for (i = 0; i < 3; i++) {
         u[i] = up ? up[i] : 0;
         if (fabs(f[i]) < best) {
@@ -2381,13 +2604,13 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
         view[4 + i] = (ssdgs_real)d[i];
         view[8 + i] = (ssdgs_real)f[i];
     }
-    view[3] = (ssdgs_real)-(r[0] * eye[0] + r[1] * eye[1] + r[2] * eye[2]);
-    view[7] = (ssdgs_real)-(d[0] * eye[0] + d[1] * eye[1] + d[2] * eye[2]);
-    view[11] = (ssdgs_real)-(f[0] * eye[0] + f[1] * eye[1] + f[2] * eye[2]);
+    view[3] = (ssdgs_real) - (r[0] * eye[0] + r[1] * eye[1] + r[2] * eye[2]);
+    view[7] = (ssdgs_real) - (d[0] * eye[0] + d[1] * eye[1] + d[2] * eye[2]);
+    view[11] = (ssdgs_real) - (f[0] * eye[0] + f[1] * eye[1] + f[2] * eye[2]);
 }
 
-SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3], const ssdgs_real up[3],
-                                            ssdgs_real fov_x, int width, int height) {
+SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
+                                            const ssdgs_real up[3], ssdgs_real fov_x, int width, int height) {
     ssdgs_camera camera;
     double e[3], f[3], u[3];
     int i;
@@ -2407,14 +2630,17 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     return camera;
 }
 
-/* Where a Gaussian reaches, and its mean log scale; 0 where alpha_threshold, by its logit, lets it draw nothing. */
-static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint, double low[3], double high[3], double *log_scale) {
+/* Where a Gaussian reaches, and its mean log scale; 0 where alpha_threshold, by its logit, lets it draw
+   nothing. */
+static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint, double low[3],
+                         double high[3], double *log_scale) {
     const ssdgs_real *p = g->gaussians + index;
     ssdgs_real largest = -20;
     double reach;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
     for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
-    for (*log_scale = 0; j < SSDGS_OPACITY; j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
+    for (*log_scale = 0; j < SSDGS_OPACITY;
+         j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
         const ssdgs_real s = p[(size_t)j * g->stride];
         usable = usable && s < 20;
         largest = s > largest ? s : largest;
@@ -2429,7 +2655,11 @@ static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint,
     return 1;
 }
 
-typedef struct ssdgs__bounds_job { const ssdgs_model_view *g; ssdgs__bounds *chunk; ssdgs_real faint; } ssdgs__bounds_job;
+typedef struct ssdgs__bounds_job {
+    const ssdgs_model_view *g;
+    ssdgs__bounds *chunk;
+    ssdgs_real faint;
+} ssdgs__bounds_job;
 
 static void ssdgs__bounds_task(void *data, int index) {
     const ssdgs__bounds_job *job = (const ssdgs__bounds_job *)data;
@@ -2463,8 +2693,9 @@ static void ssdgs__keep_least(double *least, int keep, double number) {
     least[i] = number;
 }
 
-/* Cuts what a few stray Gaussians add to the bounds: these stay within thrice the box that, on each side, one in 200 of a sample
-   reaches beyond. A light's map that had to hold them would have few pixels left for the scene. */
+/* Cuts what a few stray Gaussians add to the bounds: these stay within thrice the box that, on each side, one
+   in 200 of a sample reaches beyond. A light's map that had to hold them would have few pixels left for the
+   scene. */
 static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs__bounds *total) {
     enum { SAMPLE = 4096, KEEP = SAMPLE / 200 + 1 };
     double least[6][KEEP], low[3], high[3], log_scale;
@@ -2486,8 +2717,8 @@ static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs
 }
 
 /* Of the Gaussians that alpha_threshold lets draw anything. */
-static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m, const ssdgs_model_view *g,
-                                        ssdgs_real alpha_threshold,
+static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m,
+                                        const ssdgs_model_view *g, ssdgs_real alpha_threshold,
                                         ssdgs__bounds *total) {
     const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
     ssdgs__bounds_job job;
@@ -2495,7 +2726,7 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
     SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
     job.g = g;
     job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold)
-        : -21; /* below the logit, by little */
+                                                   : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
     for (i = 0; i < chunks; i++) {
@@ -2513,10 +2744,10 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
     return SSDGS_OK;
 }
 
-/* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very far, six faces of
-   a cube from close by or inside. Returns how many; with views NULL only that. */
-static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b, const ssdgs_light *light, double detail,
-                              int index, ssdgs_splat_view *views) {
+/* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very
+   far, six faces of a cube from close by or inside. Returns how many; with views NULL only that. */
+static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b,
+                              const ssdgs_light *light, double detail, int index, ssdgs_splat_view *views) {
     double centre[3], position[3], to_scene[3], radius2 = 0, radius, distance2 = 0, distance, size;
     int i, faces, face, map;
     for (i = 0; i < 3; i++) {
@@ -2562,9 +2793,11 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
             v->distance = v->orthographic && light->kind == SSDGS_LIGHT_POINT ? (ssdgs_real)distance : 1;
             for (i = 0; i < 3; i++) {
                 direction[i] = to_scene[i];
-                eye[i] = v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
+                eye[i] =
+                    v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
             }
-            f = v->orthographic ? 0.5 * map / radius : 0.5 * map * sqrt(distance * distance - radius2) / radius;
+            f = v->orthographic ? 0.5 * map / radius
+                                : 0.5 * map * sqrt(distance * distance - radius2) / radius;
             v->near_plane = v->orthographic ? 0 : (ssdgs_real)(1e-3 * distance);
             v->by_distance = !v->orthographic;
         }
@@ -2579,19 +2812,23 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
     int i, j;
     if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
-    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) || !ssdgs__finite(c->cx) ||
-        !ssdgs__finite(c->cy) || !(c->near_plane >= 0) || !ssdgs__finite(c->near_plane))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
-                           "lengths must be positive, near_plane not negative, all finite", (double)c->fx, (double)c->fy,
-                           (double)c->cx, (double)c->cy, (double)c->near_plane);
+    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
+        !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
+        !ssdgs__finite(c->near_plane))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
+                           "lengths must be positive, near_plane not negative, all finite",
+                           (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
     for (i = 0; i < 12; i++)
-        if (!ssdgs__finite(c->view[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
+        if (!ssdgs__finite(c->view[i]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
     for (i = 0; i < 3; i++)
         for (j = 0; j <= i; j++) {
             const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
             const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-            if (fabs(dot - (i == j)) > 1e-3) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                    "camera: the rows of view are not orthonormal");
+            if (fabs(dot - (i == j)) > 1e-3)
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "camera: the rows of view are not orthonormal");
         }
     determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
                            c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
@@ -2602,22 +2839,25 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
 
 static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
     int i, j;
-    if (light_count < 0 || (light_count && !lights)) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
+    if (light_count < 0 || (light_count && !lights))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
     for (i = 0; i < light_count; i++) {
         double norm2 = 0;
         if (lights[i].kind != SSDGS_LIGHT_POINT && lights[i].kind != SSDGS_LIGHT_DIRECTIONAL)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
         for (j = 0; j < 3; j++) {
-            if (!ssdgs__finite(lights[i].position[j])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
-                    "light %d: its position is not finite", i);
+            if (!ssdgs__finite(lights[i].position[j]))
+                return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
             if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: intensity[%d] = %g is negative or not finite", i, j,
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "light %d: intensity[%d] = %g is negative or not finite", i, j,
                                    (double)lights[i].intensity[j]);
             norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
         if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector", i);
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
+                               i);
     }
     return SSDGS_OK;
 }
@@ -2648,8 +2888,9 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
 }
 
 static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ssdgs_render_options *o) {
-    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
-            "render options: not made by ssdgs_render_options_default()");
+    if (o->version != SSDGS_VERSION)
+        return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+                           "render options: not made by ssdgs_render_options_default()");
     SSDGS__RANGE_OF("render options", o, stop, 0, 1);
     SSDGS__RANGE_OF("render options", o, alpha_threshold, 0, 1);
     SSDGS__RANGE_OF("render options", o, max_error, 0, 1);
@@ -2660,11 +2901,11 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
 /* Whether the lights' maps serve these terms. */
 static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
     return (terms & SSDGS_SHADOW_TERM) ||
-        ((terms & SSDGS_SCATTERING_TERM) && (frame->settings.depth_cue || frame->settings.transport));
+           ((terms & SSDGS_SCATTERING_TERM) && (frame->settings.depth_cue || frame->settings.transport));
 }
 
-/* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every time, and what
-   hooks leave is theirs. */
+/* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
+   time, and what hooks leave is theirs. */
 static void ssdgs__compare_kept(ssdgs_frame *frame) {
     ssdgs__kept *kept = &frame->memory->kept;
     const ssdgs_render_options *now = &frame->options, *old = &kept->options;
@@ -2673,19 +2914,24 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
     int known = !frame->training && kept->revision == frame->model->revision, i, j;
     for (i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
     kept->revision = frame->training ? 0 : frame->model->revision;
-    known = known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
+    known =
+        known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
     kept->bounds_ready = kept->bounds_ready && known;
     kept->camera_ready = kept->camera_ready && known && a->width == b->width && a->height == b->height &&
-        now->antialias == old->antialias && !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
-        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
-        !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+                         now->antialias == old->antialias &&
+                         !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
+                         !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
+                         !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
     known = known && kept->lights_ready && frame->light_count == kept->light_count &&
-        !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
-        ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
-        !(frame->terms & ~kept->terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
+            !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
+            ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
+            !(frame->terms & ~kept->terms &
+              (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
     for (i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
-        for (j = 0; j < 3; j++) known = known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
+        for (j = 0; j < 3; j++)
+            known =
+                known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
     }
     kept->lights_ready = known;
     kept->shadows_ready = kept->shadows_ready && known && now->bf16 == old->bf16;
@@ -2698,8 +2944,8 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
 
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
-                                       const ssdgs_light *lights,
-                                       int light_count, const ssdgs_render_options *options, int components, int training) {
+                                       const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
     ssdgs_light *kept_lights;
@@ -2717,8 +2963,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (!result) result = ssdgs__lights_check(context, lights, light_count);
     if (result) return result;
     for (i = 0; i < 3; i++)
-        if (!ssdgs__finite(frame->options.background[i])) return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
-                "the background is not finite");
+        if (!ssdgs__finite(frame->options.background[i]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
     if (m->kept.revision != model->revision) {
         result = ssdgs__globals_check(model);
         if (result) return result;
@@ -2735,24 +2981,26 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->terms = model->settings.terms & frame->options.terms;
     frame->training = training;
     for (i = 0; i < 3; i++)
-        frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] + camera->view[8 + i] *
-                          camera->view[11]);
+        frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
+                          camera->view[8 + i] * camera->view[11]);
     needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__compare_kept(frame);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
         if (!m->kept.bounds_ready) {
-            result = ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
+            result =
+                ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
             if (result) return result;
             m->kept.bounds_ready = m->kept.revision != 0;
         }
         for (i = 0; i < frame->light_count; i++)
-            frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail, i,
-                                                    NULL);
+            frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i,
+                                                    (double)frame->options.light_detail, i, NULL);
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
-    if (m->views.bytes < (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
+    if (m->views.bytes <
+        (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
         m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = m->kept.transport_ready = 0;
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
     if (!m->kept.camera_ready) {
@@ -2764,14 +3012,17 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].fy = camera->fy;
         frame->views[0].cx = camera->cx;
         frame->views[0].cy = camera->cy;
-        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : ssdgs__has_unit(&frame->settings)
-            ? (ssdgs_real)0.02 * frame->settings.length_unit : (ssdgs_real)0.01;
+        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane
+                                     : ssdgs__has_unit(&frame->settings)
+                                         ? (ssdgs_real)0.02 * frame->settings.length_unit
+                                         : (ssdgs_real)0.01;
         frame->views[0].compensate = frame->options.antialias;
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
     for (i = 0, j = 1; needs_light && i < frame->light_count && !m->kept.lights_ready; i++)
-        j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail, i, frame->views + j);
+        j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
+                                i, frame->views + j);
     frame->views[0].kept = m->kept.camera_ready;
     for (i = 1; i < frame->view_count; i++) frame->views[i].kept = m->kept.lights_ready;
     m->kept.camera_ready = m->kept.lights_ready = 0; /* again once the walks are done */
@@ -2789,11 +3040,16 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
         SSDGS__RESERVE(m->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
         if (components || training) {
-            SSDGS__RESERVE(m->layer_pixels, frame->layer_pixels, ssdgs_real, pixels * 3 * (size_t)(frame->layer_count + 1));
-            SSDGS__RESERVE(m->pixel_visibility, frame->pixel_visibility, ssdgs_real, pixels * (size_t)frame->light_count);
-            SSDGS__RESERVE(m->pixel_shadow, frame->pixel_shadow, ssdgs_real, pixels * (size_t)frame->light_count);
+            SSDGS__RESERVE(m->layer_pixels, frame->layer_pixels, ssdgs_real,
+                           pixels * 3 * (size_t)(frame->layer_count + 1));
+            SSDGS__RESERVE(m->pixel_visibility, frame->pixel_visibility, ssdgs_real,
+                           pixels * (size_t)frame->light_count);
+            SSDGS__RESERVE(m->pixel_shadow, frame->pixel_shadow, ssdgs_real,
+                           pixels * (size_t)frame->light_count);
         }
-        if (training) SSDGS__RESERVE(m->layer_gradient, frame->layer_gradient, ssdgs_real, n * 4 * (size_t)frame->layer_count);
+        if (training)
+            SSDGS__RESERVE(m->layer_gradient, frame->layer_gradient, ssdgs_real,
+                           n * 4 * (size_t)frame->layer_count);
     }
     if (components && !frame->layer_count) {
         SSDGS__RESERVE(m->component[0], frame->diffuse, ssdgs_real, n * 4);
@@ -2842,17 +3098,20 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     return p;
 }
 
-static int ssdgs__chunks(const ssdgs_frame *frame) { return (frame->gaussians.count + SSDGS__CHUNK - 1) / SSDGS__CHUNK; }
+static int ssdgs__chunks(const ssdgs_frame *frame) {
+    return (frame->gaussians.count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
+}
 
 static void ssdgs__project_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int chunks = ssdgs__chunks(frame), chunk = index % chunks;
     ssdgs_splat_view *v = frame->views + index / chunks;
     const ssdgs__projection p = ssdgs__projection_of(frame, v);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n
-        ? begin + SSDGS__CHUNK : n;
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
+                 end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     if (v->kept) return;
-    frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record, v->depth);
+    frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record,
+                               v->depth);
 }
 
 static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
@@ -2871,13 +3130,15 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
-/* Least-significant-digit radix sort of (depth bits, index): stable, so equal depths keep the order of their indices. */
+/* Least-significant-digit radix sort of (depth bits, index): stable, so equal depths keep the order of their
+   indices. */
 static void ssdgs__sort_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     ssdgs_splat_view *v = frame->views + index;
     const int n = frame->gaussians.count;
-    uint64_t *from = (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory, *to = from + n,
-        *swap;
+    uint64_t *from =
+                 (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory,
+             *to = from + n, *swap;
     uint32_t *histogram = (uint32_t *)(to + n);
     int i, pass, visible = 0;
     if (v->kept) return;
@@ -2925,8 +3186,8 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
 
 /* Tiles the record's bounding box touches: first and last column and row. */
 static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, uint16_t box[4]) {
-    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1}, high[2] = {record[0] + record[6] + 1,
-        record[1] + record[7] + 1};
+    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1},
+                     high[2] = {record[0] + record[6] + 1, record[1] + record[7] + 1};
     const int tiles[2] = {v->tiles_x, v->tiles_y};
     int a;
     for (a = 0; a < 2; a++) {
@@ -2975,17 +3236,18 @@ static void ssdgs__bin_task(void *data, int index) {
     int begin, end;
     if (frame->views[view].kept) return;
     ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
-    frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame), begin, end,
-                           (uint32_t)m->chunk_room[chunk]);
+    frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
+                           begin, end, (uint32_t)m->chunk_room[chunk]);
 }
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
     const ssdgs_splat_view *v = frame->views + view;
-    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory + (size_t)chunk *
-        (size_t)(v->tiles_x * v->tiles_y);
+    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory +
+           (size_t)chunk * (size_t)(v->tiles_x * v->tiles_y);
 }
 
-/* How many instances of a chunk of ranks each tile has, and which a rank's are: what ranks own lies anywhere in memory. */
+/* How many instances of a chunk of ranks each tile has, and which a rank's are: what ranks own lies anywhere
+   in memory. */
 static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
@@ -3000,7 +3262,8 @@ static void ssdgs__bin_count_task(void *data, int index) {
     for (rank = begin; rank < end; rank++) {
         const ssdgs_instances of = v->of_gaussian[v->order[rank]];
         of_rank[rank] = of;
-        if ((ahead = rank + SSDGS__AHEAD) < end) SSDGS__PREFETCH(v->instance + v->of_gaussian[v->order[ahead]].first);
+        if ((ahead = rank + SSDGS__AHEAD) < end)
+            SSDGS__PREFETCH(v->instance + v->of_gaussian[v->order[ahead]].first);
         if ((ahead += SSDGS__AHEAD) < end) SSDGS__PREFETCH(v->of_gaussian + v->order[ahead]);
         for (i = of.first; i < of.first + of.count; i++) histogram[v->instance[i].place]++;
     }
@@ -3056,7 +3319,8 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     int i, chunk;
     for (i = 0; i < frame->view_count; i++) {
         uint16_t *box;
-        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t, 4 * n + 4);
+        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t,
+                       4 * n + 4);
         (void)box;
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
@@ -3073,8 +3337,9 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
             m->chunk_room[chunk] = room;
             room += chunk_room;
         }
-        if (room > UINT32_MAX / 2) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d",
-                                                      v->width, v->height);
+        if (room > UINT32_MAX / 2)
+            return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d", v->width,
+                               v->height);
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->of_gaussian, v->of_gaussian, ssdgs_instances, n + 1);
         SSDGS__RESERVE(m->of_rank, of_rank, ssdgs_instances, v->visible + 1);
@@ -3100,7 +3365,8 @@ static SSDGS__INLINE ssdgs_real ssdgs__nearest(const ssdgs_splat_view *view) {
    Tiles of all views in one loop: the camera's walk and the light pass run side by side. */
 
 /* With walked, of its entries those that the walk saw blended. */
-static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index, int walked) {
+static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index,
+                                  int walked) {
     ssdgs__tile t;
     t.record = v->record;
     t.depth = v->depth;
@@ -3133,8 +3399,9 @@ static void ssdgs__walk_task(void *data, int index) {
     for (; v->kept || index >= v->tiles_x * v->tiles_y; v++) index -= v->kept ? 0 : v->tiles_x * v->tiles_y;
     tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
-    if (v->light < 0) frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index],
-                                                              v->tile_needed ? v->tile_needed + v->tile_start[index] : NULL);
+    if (v->light < 0)
+        frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index],
+                                       v->tile_needed ? v->tile_needed + v->tile_start[index] : NULL);
     else frame->context->k->walk_light(&tile, v->tile_sums + (size_t)v->tile_start[index] * 4);
 }
 
@@ -3160,7 +3427,8 @@ static void ssdgs__gather_light_task(void *data, int index) {
             for (i = of.first; i < of.first + of.count; i++)
                 for (c = 0; c < 4; c++) sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
         }
-        frame->visibility[at] = sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
+        frame->visibility[at] =
+            sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
         frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
         if (frame->flux) frame->flux[at] = sum[3];
     }
@@ -3196,22 +3464,26 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         if (v->light < 0) {
             SSDGS__RESERVE(m->seen, v->tile_seen, uint16_t, v->instances + 1);
             v->tile_needed = NULL;
-            if (frame->options.max_error > 0) SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
+            if (frame->options.max_error > 0)
+                SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
         } else {
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->falls = NULL;
             if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
-                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real, (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__FALL_VALUES);
+                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real,
+                               (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__FALL_VALUES);
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
     if (!frame->views->kept) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
     job.frame = frame;
     job.end_view = 1;
-    for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count && !frame->views[job.end_view].kept;
+    for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count &&
+                        !frame->views[job.end_view].kept;
          job.light++) {
         job.first_view = job.end_view;
-        while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light) job.end_view++;
+        while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light)
+            job.end_view++;
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
     }
     frame->memory->kept.camera_ready = frame->memory->kept.lights_ready = 1;
@@ -3219,15 +3491,18 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
 }
 
 /* ==== >>transport  true dipole transport: what comes to the Gaussians seen from where the light enters ====
-   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. In the order that
-   training leaves they are compact. */
+   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one.
+   In the order that training leaves they are compact. */
 
-typedef struct ssdgs__node { ssdgs_real x[3], flux, radius; } ssdgs__node;
+typedef struct ssdgs__node {
+    ssdgs_real x[3], flux, radius;
+} ssdgs__node;
 
 #define SSDGS__LEVELS 12
 #define SSDGS__SOURCES 512
-#define SSDGS__NEAR 256         /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
-#define SSDGS__SOFT 0.02        /* in length units; distances are sqrt(r^2 + soft^2) */
+#define SSDGS__NEAR \
+    256 /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
+#define SSDGS__SOFT 0.02           /* in length units; distances are sqrt(r^2 + soft^2) */
 #define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
 
 /* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
@@ -3241,7 +3516,11 @@ static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
     return levels;
 }
 
-typedef struct ssdgs__node_job { const ssdgs_frame *frame; ssdgs__node *nodes; size_t count; } ssdgs__node_job;
+typedef struct ssdgs__node_job {
+    const ssdgs_frame *frame;
+    ssdgs__node *nodes;
+    size_t count;
+} ssdgs__node_job;
 
 /* Grows a node by one of its parts, whose flux is not 0. */
 static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
@@ -3327,7 +3606,8 @@ static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle
     }
     for (s = 0; s < lanes; s++) {
         ssdgs_real distance2 = 0;
-        for (c = 0; c < 3; c++) distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
+        for (c = 0; c < 3; c++)
+            distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
         reach2 = distance2 > reach2 ? distance2 : reach2;
     }
     return SSDGS__SQRT(reach2);
@@ -3353,7 +3633,8 @@ typedef struct ssdgs__gather {
 static void ssdgs__gather_flush(ssdgs__gather *g) {
     int s;
     for (s = 0; s < SSDGS__BLOCK; s += 16)
-        if (g->groups >> s / 16 & 1) g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
+        if (g->groups >> s / 16 & 1)
+            g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
     g->count = 0;
 }
 
@@ -3374,18 +3655,20 @@ static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
 
 typedef struct ssdgs__transport_job {
     const ssdgs_frame *frame;
-    const ssdgs__node *nodes;   /* (lights, node_count) where the light enters */
+    const ssdgs__node *nodes; /* (lights, node_count) where the light enters */
     size_t node_count;
-    int blocks;                 /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
-    ssdgs_real *sources;        /* (slots, SSDGS__SOURCES, 4) */
-    ssdgs_real *sums;           /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
-    unsigned char *known;       /* (lights, blocks) masks of groups of 16 whose sums are there: for as long as lights rest */
+    int blocks; /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
+    ssdgs_real *sources; /* (slots, SSDGS__SOURCES, 4) */
+    ssdgs_real *sums;    /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
+    unsigned char
+        *known; /* (lights, blocks) masks of groups of 16 whose sums are there: for as long as lights rest */
 } ssdgs__transport_job;
 
-/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r), r their distance.
-   The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for all of the block or for a group. */
-static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x, int groups,
-                                   ssdgs_real *sums) {
+/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r),
+   r their distance. The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for
+   all of the block or for a group. */
+static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x,
+                                   int groups, ssdgs_real *sums) {
     const ssdgs_frame *frame = job->frame;
     const size_t n = (size_t)frame->gaussians.count;
     const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
@@ -3403,7 +3686,8 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     g.sums = sums;
     g.groups = groups;
     g.scale[0] = soft * soft;
-    g.scale[1] = (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    g.scale[1] =
+        (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
     memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
     for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
         const size_t at = stack[--depth];
@@ -3411,7 +3695,8 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         const ssdgs__node *node = nodes + first[level] + at;
         size_t part;
         if (!(node->flux > 0)) continue;
-        if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+        if (ssdgs__is_far(node, middle, reach))
+            ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
         else if (level) {
             for (part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
                 stack[depth] = part;
@@ -3427,13 +3712,15 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         reach = ssdgs__reach(x + s, 16, middle);
         for (i = 0; i < leaf_count; i++) {
             const ssdgs__node *node = nodes + leaves[i];
-            if (ssdgs__is_far(node, middle, reach)) ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+            if (ssdgs__is_far(node, middle, reach))
+                ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
             else ssdgs__gather_leaf(&g, leaves[i]);
         }
         ssdgs__gather_flush(&g);
     }
     for (k = 0; k < SSDGS__LENGTHS; k++) {
-        const ssdgs_real scale = (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
+        const ssdgs_real scale =
+            (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
         for (s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
     }
 }
@@ -3449,11 +3736,13 @@ static void ssdgs__transport_task(void *data, int slot) {
     const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
     ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
     int block, light, s, k;
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++) {
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+         block++) {
         const size_t first = (size_t)block * SSDGS__BLOCK;
         int seen = 0;
         for (s = 0; s < SSDGS__BLOCK; s++) {
-            const size_t at = first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
+            const size_t at =
+                first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
             for (k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
             seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
         }
@@ -3465,7 +3754,8 @@ static void ssdgs__transport_task(void *data, int slot) {
             for (k = 0; k < SSDGS__LENGTHS; k++)
                 for (s = 0; s < SSDGS__BLOCK; s++)
                     if (groups >> s / 16 & 1)
-                        job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] = sums[k * SSDGS__BLOCK + s];
+                        job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] =
+                            sums[k * SSDGS__BLOCK + s];
             job->known[at] = (unsigned char)(job->known[at] | groups);
         }
     }
@@ -3480,8 +3770,10 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     job.frame = frame;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     blocks = (size_t)job.blocks * (size_t)frame->light_count;
-    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real, (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
-    SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real, blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
+    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real,
+                   (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
+                   blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
     job.nodes = (const ssdgs__node *)frame->memory->nodes.memory;
     job.node_count = first[ssdgs__levels((size_t)frame->gaussians.count, first)];
@@ -3498,14 +3790,17 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
 
 /* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks: geometry, both networks, colour ==== */
 
-/* How a block's memory is laid out, in values. What the backward asks for again: the Gaussians' channels and, per light, the
-   geometry, the cues and the layers' outputs. Scratch, one per slot: the networks' inputs, cheaper made again than kept. */
+/* How a block's memory is laid out, in values. What the backward asks for again: the Gaussians' channels and,
+   per light, the geometry, the cues and the layers' outputs. Scratch, one per slot: the networks' inputs,
+   cheaper made again than kept. */
 typedef struct ssdgs__block_layout {
-    int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers, widest;
+    int scattering[SSDGS_MAX_LAYERS + 1], shadow[SSDGS_MAX_LAYERS + 1], scattering_layers, shadow_layers,
+        widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
-    size_t gauss, lights, size;                                          /* within the block */
-    size_t inputs, pairs, outs, lobe;                                    /* scratch of both directions */
-    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility, scratch; /* and of the backward */
+    size_t gauss, lights, size;                                                    /* within the block */
+    size_t inputs, pairs, outs, lobe; /* scratch of both directions */
+    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility,
+        scratch; /* and of the backward */
 } ssdgs__block_layout;
 
 /* Rows of all layers' outputs. */
@@ -3521,8 +3816,10 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     const size_t b = SSDGS__BLOCK;
     int i;
     memset(&l, 0, sizeof l);
-    if (frame->terms & SSDGS_SCATTERING_TERM) l.scattering_layers = ssdgs__network_sizes(&frame->settings, 0, l.scattering);
-    if (frame->terms & SSDGS_SHADOW_TERM) l.shadow_layers = ssdgs__network_sizes(&frame->settings, 1, l.shadow);
+    if (frame->terms & SSDGS_SCATTERING_TERM)
+        l.scattering_layers = ssdgs__network_sizes(&frame->settings, 0, l.scattering);
+    if (frame->terms & SSDGS_SHADOW_TERM)
+        l.shadow_layers = ssdgs__network_sizes(&frame->settings, 1, l.shadow);
     for (i = 0; i <= SSDGS_MAX_LAYERS; i++) {
         l.widest = l.scattering[i] > l.widest ? l.scattering[i] : l.widest;
         l.widest = l.shadow[i] > l.widest ? l.shadow[i] : l.widest;
@@ -3534,7 +3831,8 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
     l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
     l.lights = b * SSDGS_CHANNELS;
-    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count : 1); /* only the backward asks again */
+    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count
+                                                                : 1); /* only the backward asks again */
     l.pairs = b * (size_t)(l.widest + 1);
     l.outs = l.pairs + b * (size_t)((l.widest + 1) / 2);
     l.lobe = l.outs + b * SSDGS__OUTS;
@@ -3552,7 +3850,9 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
 }
 
 /* Raw parameters of the angular form and deferred weights, within what neither over- nor underflows. */
-static ssdgs_real ssdgs__angular_raw(ssdgs_real raw) { return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw; }
+static ssdgs_real ssdgs__angular_raw(ssdgs_real raw) {
+    return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
+}
 
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     const ssdgs_settings *s = &frame->settings;
@@ -3591,8 +3891,10 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
         for (i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
         if (k.angular) {
             const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
-            for (i = 0; i < 2; i++) b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
-            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j])) * ssdgs__softplus_scalar(step);
+            for (i = 0; i < 2; i++)
+                b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j])) *
+                    ssdgs__softplus_scalar(step);
         } else if (k.deferred) {
             b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
             b[9] = ssdgs__exp_scalar(sharpness[0]);
@@ -3609,7 +3911,8 @@ static ssdgs_result ssdgs__lightings(const ssdgs_frame *frame, ssdgs__lighting *
     ssdgs_context *context = frame->context;
     int light;
     SSDGS__RESERVE(frame->memory->lightings, *lightings, ssdgs__lighting, frame->light_count + 1);
-    for (light = 0; light < frame->light_count; light++) (*lightings)[light] = ssdgs__lighting_of(frame, light);
+    for (light = 0; light < frame->light_count; light++)
+        (*lightings)[light] = ssdgs__lighting_of(frame, light);
     return SSDGS_OK;
 }
 
@@ -3620,7 +3923,8 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
     ssdgs__global_groups(&frame->settings, first);
     for (j = 0; j < SSDGS_ASG_COUNT; j++) {
         const ssdgs_real *d = dbasis + 12 * j, *sharpness = frame->gaussians.asg_sharpness + 2 * j;
-        ssdgs_real q[4], r[9], dr[9], inverse = ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
+        ssdgs_real q[4], r[9], dr[9],
+            inverse = ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
         ssdgs_real *out = frame->global_gradient + first[SSDGS__ASG_SHARPNESS] + 2 * j;
         for (i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
         ssdgs__rotation_backward_scalar(frame->global_gradient + 4 * j, q, inverse, dr);
@@ -3628,18 +3932,21 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
             const ssdgs_real s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
             /* angular: 1 / (10 s), d = -(1 - s) / (10 s) */
             out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s
-                : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
+                                                              : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
         }
         if (frame->settings.asg == SSDGS_ASG_ANGULAR) {
             const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)),
-                s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
-            frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] = d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
+                             s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
+            frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] =
+                d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
         }
     }
 }
 
-/* A network's weights in bf16 pairs along the inputs, layer after layer; returns where the next network's go. */
-static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_real *weights, uint32_t *packed) {
+/* A network's weights in bf16 pairs along the inputs, layer after layer; returns where the next network's
+   go. */
+static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_real *weights,
+                                     uint32_t *packed) {
     int layer, row, i, half;
     for (layer = 0; layer < layers; layer++) {
         for (row = 0; row < sizes[layer + 1]; row++)
@@ -3673,12 +3980,12 @@ static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     lists->shadows_kept = 0;
 }
 
-/* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that are 0 in the
-   whole block are left out of the sums, which changes no bit. With packed weights the products run in bf16; pairs is their
-   working memory. */
-static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                   const uint32_t *packed, uint32_t *pairs, ssdgs__row_lists *lists, const ssdgs_real *inputs,
-                                   ssdgs_real *outputs) {
+/* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that
+   are 0 in the whole block are left out of the sums, which changes no bit. With packed weights the products
+   run in bf16; pairs is their working memory. */
+static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers,
+                                   const ssdgs_real *weights, const uint32_t *packed, uint32_t *pairs,
+                                   ssdgs__row_lists *lists, const ssdgs_real *inputs, ssdgs_real *outputs) {
     ssdgs__product p;
     int layer;
     memset(&p, 0, sizeof p);
@@ -3715,8 +4022,8 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
     }
 }
 
-/* A layer's gradient in a slot, made for adding block after block: per output, the weights' with zeros up to a multiple of 16,
-   then 16 partial sums of the bias's. */
+/* A layer's gradient in a slot, made for adding block after block: per output, the weights' with zeros up to
+   a multiple of 16, then 16 partial sums of the bias's. */
 static size_t ssdgs__padded(int inputs) { return ((size_t)inputs + 15) / 16 * 16; }
 
 static size_t ssdgs__slot_gradient_size(const int *sizes, int layers) {
@@ -3726,13 +4033,14 @@ static size_t ssdgs__slot_gradient_size(const int *sizes, int layers) {
     return size;
 }
 
-/* The slots' gradients of a network, stride apart, summed up in the order of its parameters: each row with number % parts ==
-   part. */
-static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slots, size_t stride, int count, int part, int parts,
-                             ssdgs_real *gradient) {
+/* The slots' gradients of a network, stride apart, summed up in the order of its parameters: each row with
+   number % parts == part. */
+static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slots, size_t stride, int count,
+                             int part, int parts, ssdgs_real *gradient) {
     int layer, row, slot, lane;
     for (layer = 0; layer < layers; layer++) {
-        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = ssdgs__padded(sizes[layer]);
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1],
+                     padded = ssdgs__padded(sizes[layer]);
         for (row = part; row < sizes[layer + 1]; row += parts) {
             const ssdgs_real *from = slots + (size_t)row * (padded + 16);
             ssdgs_real *to = gradient + (size_t)row * in, bias = 0;
@@ -3748,10 +4056,12 @@ static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slo
     }
 }
 
-/* d holds dL/d(outputs) and ends as dL/d(inputs), the first `asked` rows of it, in d or spare: that one is returned. Adds to the
-   slot's gradient unless that is NULL. Neurons that are 0 in the whole block have no part in it. */
-static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers, const ssdgs_real *weights,
-                                           const ssdgs_real *inputs, const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
+/* d holds dL/d(outputs) and ends as dL/d(inputs), the first `asked` rows of it, in d or spare: that one is
+   returned. Adds to the slot's gradient unless that is NULL. Neurons that are 0 in the whole block have no
+   part in it. */
+static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers,
+                                           const ssdgs_real *weights, const ssdgs_real *inputs,
+                                           const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
                                            ssdgs_real *transposed, ssdgs__row_lists *lists, int asked,
                                            ssdgs_real *slot_gradient) {
     const ssdgs_real *layer_in = layers > 1 ? outputs : inputs;
@@ -3763,7 +4073,8 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
     }
     if (slot_gradient) slot_gradient += ssdgs__slot_gradient_size(sizes, layers);
     for (layer = layers - 1; layer >= 0; layer--) {
-        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1], padded = ssdgs__padded(sizes[layer]);
+        const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1],
+                     padded = ssdgs__padded(sizes[layer]);
         uint16_t *list = outs == lists->in ? lists->out : lists->in;
         const int live_in = layer ? k->live_rows(layer_in, sizes[layer], list) : asked;
         ssdgs_real *swap = d;
@@ -3816,19 +4127,22 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
 typedef struct ssdgs__input {
     int row, dims, levels; /* levels < 0: copied */
     ssdgs_real scale;
-    size_t from;          /* in the light's part, or for the Gaussian's own rows in gauss */
+    size_t from; /* in the light's part, or for the Gaussian's own rows in gauss */
     int of_gaussian;
 } ssdgs__input;
 
-static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, ssdgs__input inputs[7]) {
+static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
+                         ssdgs__input inputs[7]) {
     const size_t b = SSDGS__BLOCK;
     const int scaled = shadow ? frame->settings.residual_shadow : frame->settings.depth_cue;
     const ssdgs_real inverse_unit = 1 / frame->settings.length_unit;
     int n = 0, row = 0;
-#define SSDGS__INPUT(width, depth, factor, place, own)                                                                   \
-    do {                                                                                                                 \
-        inputs[n].row = row, inputs[n].dims = (width), inputs[n].levels = (depth), inputs[n].scale = (factor);           \
-        inputs[n].from = (place), inputs[n++].of_gaussian = (own), row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
+#define SSDGS__INPUT(width, depth, factor, place, own) \
+    do { \
+        inputs[n].row = row, inputs[n].dims = (width), inputs[n].levels = (depth), \
+        inputs[n].scale = (factor); \
+        inputs[n].from = (place), inputs[n++].of_gaussian = (own), \
+        row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
     } while (0)
     SSDGS__INPUT(3, shadow ? 3 : 4, scaled ? inverse_unit : 1, b * SSDGS_POSITION, 1);
     if (!shadow) SSDGS__INPUT(3, frame->settings.view_octaves, 1, b * SSDGS__WO, 0);
@@ -3842,7 +4156,8 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
     return n;
 }
 
-/* How many of the scattering network's inputs pass a gradient on: all before the light pass's cues, which are held fixed. */
+/* How many of the scattering network's inputs pass a gradient on: all before the light pass's cues, which are
+   held fixed. */
 static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layout *l) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, 0, in);
@@ -3852,8 +4167,8 @@ static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layo
     return l->scattering[0];
 }
 
-static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow, const ssdgs_real *gauss,
-                                 const ssdgs_real *part, ssdgs_real *activations) {
+static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
+                                 const ssdgs_real *gauss, const ssdgs_real *part, ssdgs_real *activations) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
     int i;
@@ -3862,25 +4177,31 @@ static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_la
         ssdgs_real *to = activations + (size_t)in[i].row * SSDGS__BLOCK;
         const int centred = in[i].of_gaussian && in[i].levels >= 0;
         if (in[i].levels < 0) memcpy(to, from, (size_t)in[i].dims * SSDGS__BLOCK * sizeof *to);
-        else frame->context->k->encode(to, from, centred ? frame->settings.centre : NULL, in[i].scale, in[i].dims, in[i].levels);
+        else
+            frame->context->k->encode(to, from, centred ? frame->settings.centre : NULL, in[i].scale,
+                                      in[i].dims, in[i].levels);
     }
 }
 
-/* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the light pass's cues are held fixed. */
+/* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the light pass's cues are
+   held fixed. */
 static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
-                                          const ssdgs_real *activations,
-                                          const ssdgs_real *dinputs, ssdgs_real *dgauss, ssdgs_real *drows,
-                                              ssdgs_real *dvisibility) {
+                                          const ssdgs_real *activations, const ssdgs_real *dinputs,
+                                          ssdgs_real *dgauss, ssdgs_real *drows, ssdgs_real *dvisibility) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
     int i, s;
     for (i = 0; i < n; i++) {
         const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
-        ssdgs_real *to = in[i].of_gaussian ? dgauss + in[i].from : in[i].from == l->visibility ? dvisibility : drows + in[i].from;
+        ssdgs_real *to = in[i].of_gaussian             ? dgauss + in[i].from
+                         : in[i].from == l->visibility ? dvisibility
+                                                       : drows + in[i].from;
         if (!in[i].of_gaussian && in[i].from >= l->cue) continue;
-        if (in[i].levels >= 0) frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
-                in[i].levels);
-        else for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
+        if (in[i].levels >= 0)
+            frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
+                                               in[i].levels);
+        else
+            for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
     }
 }
 
@@ -3889,12 +4210,12 @@ typedef struct ssdgs__shade_job {
     ssdgs__block_layout layout;
     int blocks;
     size_t slot_stride, slot_shadow; /* slots: the scattering network's gradient, then the shadow network's */
-    ssdgs__lighting *lightings; /* per light */
-    ssdgs_real *shadow_logit;   /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
+    ssdgs__lighting *lightings;      /* per light */
+    ssdgs_real *shadow_logit; /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
-    uint64_t *counts;           /* per slot: multiplications done, those of all neurons, shadows kept */
+    uint64_t *counts;            /* per slot: multiplications done, those of all neurons, shadows kept */
     const ssdgs_real *transport; /* of ssdgs__transport_job, or NULL */
-    uint32_t *packed[2];        /* bf16 weights of the scattering and the shadow network, or NULL */
+    uint32_t *packed[2];         /* bf16 weights of the scattering and the shadow network, or NULL */
     ssdgs_real *activations, *scratch, *slots, *lane_slots;
 } ssdgs__shade_job;
 
@@ -3904,8 +4225,10 @@ static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
     return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
 }
 
-/* The shadow network's outputs for the Gaussians of a block, if all of them are known; it does not see the camera. */
-static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK], ssdgs_real *shadow) {
+/* The shadow network's outputs for the Gaussians of a block, if all of them are known; it does not see the
+   camera. */
+static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
+                                ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
     int s;
     if (!job->shadow_known) return 0;
@@ -3915,7 +4238,8 @@ static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const si
     return 1;
 }
 
-static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK], const ssdgs_real *shadow) {
+static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
+                               const ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
     int s;
     for (s = 0; job->shadow_known && s < SSDGS__BLOCK; s++) {
@@ -3937,15 +4261,16 @@ static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t
         for (c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, ssdgs_real *memory,
-                               ssdgs_real *scratch) {
+static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
+                               ssdgs_real *memory, ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const size_t n = (size_t)frame->gaussians.count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
     uint32_t *pairs = (uint32_t *)(void *)(scratch + l->pairs);
-    const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
+    const int rest = frame->shaded_count - block * SSDGS__BLOCK,
+              live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
     int light, s, i, c;
     for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
@@ -3957,31 +4282,35 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
-        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0), *shadow = NULL,
-            *scattering = NULL;
+        ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
+                   *shadow = NULL, *scattering = NULL;
         k->reflect(lighting, gauss, part + l->rows);
         for (s = 0; s < SSDGS__BLOCK; s++) {
             const size_t of_light = n * (size_t)light + at[s];
             part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
-            part[l->cue + (size_t)s] = lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
+            part[l->cue + (size_t)s] =
+                lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
             for (i = 0; job->transport && i < SSDGS__LENGTHS; i++) /* in units of the irradiance of its own */
                 part[l->transport + (size_t)(i * SSDGS__BLOCK + s)] =
-                    job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK +
-                                   at[s] % SSDGS__BLOCK] / part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
+                    job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS +
+                                    (size_t)i) *
+                                       SSDGS__BLOCK +
+                                   at[s] % SSDGS__BLOCK] /
+                    part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
         }
         if (l->shadow_layers) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;
             if (!ssdgs__shadow_recall(job, light, at, shadow)) {
                 ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, job->packed[1], pairs, lists,
-                                       inputs, part + l->shadow_at);
+                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow,
+                                       job->packed[1], pairs, lists, inputs, part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
             } else lists->shadows_kept += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, job->packed[0], pairs,
-                                   lists, inputs, part + l->scattering_at);
+            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering,
+                                   job->packed[0], pairs, lists, inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
@@ -3999,7 +4328,8 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         }
     }
     if (frame->layer_count) {
-        for (i = 0; i < 3; i++) ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
+        for (i = 0; i < 3; i++)
+            ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
         for (s = 0; s < live; s++) {
             ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
             to[0] = frame->views[0].depth[at[s]];
@@ -4016,13 +4346,16 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
                 o[c * SSDGS__BLOCK] = ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s]);
             color[c] = o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
-            for (i = 0; i < frame->layer_count; i++) { /* whose products with the lobes must be finite as well */
+            for (i = 0; i < frame->layer_count;
+                 i++) { /* whose products with the lobes must be finite as well */
                 const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
                 black |= !(value <= (ssdgs_real)1e30 && value >= (ssdgs_real)-1e30);
             }
         }
-        for (i = 0; i < frame->layer_count && black; i++) memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
-        for (c = 0; c < SSDGS__OUTS && black; c++) color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
+        for (i = 0; i < frame->layer_count && black; i++)
+            memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
+        for (c = 0; c < SSDGS__OUTS && black; c++)
+            color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
         color[3] = (ssdgs_real)black;
         if (!frame->diffuse) continue;
         {
@@ -4035,21 +4368,23 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
                 frame->scattering[4 * g + (size_t)c] = o[(6 + c) * SSDGS__BLOCK];
                 frame->normal[4 * g + (size_t)c] = ssdgs__finite(r[3 * c + 2]) ? r[3 * c + 2] : 0;
             }
-            frame->shadow[4 * g] = frame->light_count ? o[9 * SSDGS__BLOCK] / (ssdgs_real)frame->light_count : 1;
+            frame->shadow[4 * g] =
+                frame->light_count ? o[9 * SSDGS__BLOCK] / (ssdgs_real)frame->light_count : 1;
             frame->shadow[4 * g + 1] = frame->views[0].depth[g];
             frame->shadow[4 * g + 2] = 0;
         }
     }
 }
 
-
-
-/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, as training leaves them. */
+/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, as training leaves
+   them. */
 static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
     const ssdgs_frame *frame = job->frame;
-    ssdgs_real *const planes[6] = {frame->color, frame->diffuse, frame->specular, frame->scattering, frame->normal, frame->shadow};
+    ssdgs_real *const planes[6] = {frame->color,      frame->diffuse, frame->specular,
+                                   frame->scattering, frame->normal,  frame->shadow};
     const int begin = ssdgs__slot_begin(job->blocks, slot), end = ssdgs__slot_begin(job->blocks, slot + 1);
-    const size_t n = (size_t)frame->gaussians.count, last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
+    const size_t n = (size_t)frame->gaussians.count,
+                 last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
     size_t from, g;
     int p;
     if (begin == end) return;
@@ -4057,7 +4392,8 @@ static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
     for (g = begin ? from : 0; g < last; g++) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
         if (frame->seen[g] != SSDGS_GLIMPSED) continue;
-        for (p = 0; p < (frame->diffuse ? 6 : 1); p++) memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
+        for (p = 0; p < (frame->diffuse ? 6 : 1); p++)
+            memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
         for (p = 0; p < frame->layer_count; p++)
             memcpy(ssdgs__layer(frame, p) + 4 * g, ssdgs__layer(frame, p) + 4 * from, 4 * sizeof(ssdgs_real));
     }
@@ -4068,9 +4404,11 @@ static void ssdgs__shade_task(void *data, int slot) {
     ssdgs__row_lists lists;
     int block;
     ssdgs__row_lists_fill(&lists);
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++)
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+         block++)
         ssdgs__shade_block(job, block, &lists,
-                           job->activations + job->layout.size * (size_t)(job->frame->training ? block : slot),
+                           job->activations +
+                               job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
     if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
     job->counts[3 * slot] = lists.multiplied;
@@ -4091,9 +4429,10 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     }
     if (frame->options.bf16 && context->bf16 && !frame->training) {
         SSDGS__RESERVE(frame->memory->packed, job->packed[0], uint32_t, frame->model->global_count);
-        job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers, frame->gaussians.scattering,
-                                             job->packed[0]);
-        ssdgs__pack_weights(job->layout.shadow, job->layout.shadow_layers, frame->gaussians.shadow, job->packed[1]);
+        job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers,
+                                             frame->gaussians.scattering, job->packed[0]);
+        ssdgs__pack_weights(job->layout.shadow, job->layout.shadow_layers, frame->gaussians.shadow,
+                            job->packed[1]);
     }
     return SSDGS_OK;
 }
@@ -4118,7 +4457,8 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     if (result) return result;
     SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real,
                    job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
-    if (job.layout.shadow_layers && !frame->training) { /* room from the first frame on, use from the second */
+    if (job.layout.shadow_layers &&
+        !frame->training) { /* room from the first frame on, use from the second */
         const size_t pairs = (size_t)frame->gaussians.count * (size_t)frame->light_count;
         const int lights_kept = frame->view_count > 1 && frame->views[1].kept;
         SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
@@ -4141,25 +4481,29 @@ static ssdgs_real *ssdgs__layer_gradient(const ssdgs_frame *frame, int layer) {
 }
 
 /* (n, 4) of the Gaussians `at` -> rows (3, BLOCK), 0 where none is. */
-static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__BLOCK], int live, ssdgs_real *rows) {
+static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__BLOCK], int live,
+                                 ssdgs_real *rows) {
     int s, c;
     for (s = 0; s < SSDGS__BLOCK; s++)
         for (c = 0; c < 3; c++) rows[c * SSDGS__BLOCK + s] = s < live ? from[4 * at[s] + (size_t)c] : 0;
 }
 
-static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists, int slot) {
+static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
+                                        int slot) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__block_layout *l = &job->layout;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
     ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *inputs = scratch + l->inputs;
-    ssdgs_real *dgauss = scratch + l->dgauss, *drows = scratch + l->drows,
-        *dcolor = scratch + l->dcolor;
-    ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
+    ssdgs_real *dgauss = scratch + l->dgauss, *drows = scratch + l->drows, *dcolor = scratch + l->dcolor;
+    ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet,
+               *dnet2 = scratch + l->dnet2;
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
-    ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse, *dlobe = scratch + l->lobe;
+    ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse,
+               *dlobe = scratch + l->lobe;
     ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK, dresidual[3 * SSDGS__BLOCK];
-    const int rest = frame->shaded_count - block * SSDGS__BLOCK, live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
+    const int rest = frame->shaded_count - block * SSDGS__BLOCK,
+              live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
     int light, s, c;
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
@@ -4168,17 +4512,22 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     if (frame->layer_count) {
         ssdgs_real rows[3 * SSDGS__BLOCK];
         for (c = 0; c < 3; c++)
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live, dlobe + 3 * c * SSDGS__BLOCK);
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live,
+                                 dlobe + 3 * c * SSDGS__BLOCK);
         ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
-        memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK, SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
+        memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK,
+               SSDGS__BLOCK * sizeof *rows);                                /* depth is the projection's */
         memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
     for (light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
         const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
-        const ssdgs_real *scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
-        ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16, *dinputs;
+        const ssdgs_real *scattering =
+            part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
+        ssdgs_real *lane_sums =
+                       job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16,
+                   *dinputs;
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
         if (lighting->deferred) {
@@ -4186,25 +4535,27 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
-            for (s = 0; s < SSDGS__BLOCK; s++) dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
+            for (s = 0; s < SSDGS__BLOCK; s++)
+                dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
-                           lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor, dgauss, drows,
-                           dshadow, dnet, dvisibility);
+                           lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor,
+                           dgauss, drows, dshadow, dnet, dvisibility);
         for (s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            dinputs = ssdgs__network_backward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
-                                              part + l->scattering_at, dnet, dnet2,
-                                              scratch + l->transposed, lists, ssdgs__inputs_asked(frame, l),
-                                              frame->frozen[0] ? NULL : slot_gradient);
+            dinputs = ssdgs__network_backward(
+                k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
+                part + l->scattering_at, dnet, dnet2, scratch + l->transposed, lists,
+                ssdgs__inputs_asked(frame, l), frame->frozen[0] ? NULL : slot_gradient);
             ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
             dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
-                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed, lists, l->shadow[0],
+                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed,
+                                              lists, l->shadow[0],
                                               frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
             ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
@@ -4224,7 +4575,8 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
     ssdgs__row_lists_fill(&lists);
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
     memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1); block++)
+    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+         block++)
         ssdgs__shade_backward_block(job, block, &lists, slot);
 }
 
@@ -4234,10 +4586,10 @@ static void ssdgs__sum_slots_task(void *data, int part) {
     ssdgs_frame *frame = job->frame;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&frame->settings, first);
-    ssdgs__sum_slots(l->scattering, l->scattering_layers, job->slots, job->slot_stride, SSDGS__SLOTS, part, SSDGS__SLOTS,
-                     frame->global_gradient + first[SSDGS__SCATTERING_NET]);
-    ssdgs__sum_slots(l->shadow, l->shadow_layers, job->slots + job->slot_shadow, job->slot_stride, SSDGS__SLOTS, part,
-                     SSDGS__SLOTS, frame->global_gradient + first[SSDGS__SHADOW_NET]);
+    ssdgs__sum_slots(l->scattering, l->scattering_layers, job->slots, job->slot_stride, SSDGS__SLOTS, part,
+                     SSDGS__SLOTS, frame->global_gradient + first[SSDGS__SCATTERING_NET]);
+    ssdgs__sum_slots(l->shadow, l->shadow_layers, job->slots + job->slot_shadow, job->slot_stride,
+                     SSDGS__SLOTS, part, SSDGS__SLOTS, frame->global_gradient + first[SSDGS__SHADOW_NET]);
 }
 
 /* eye = -R^T t */
@@ -4250,11 +4602,12 @@ static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
         }
 }
 
-/* Overwrites gradient and the networks' part of global_gradient, without layers the ASG's too; adds to light_gradient and
-   view_gradient. */
+/* Overwrites gradient and the networks' part of global_gradient, without layers the ASG's too; adds to
+   light_gradient and view_gradient. */
 static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const size_t n = frame->gaussians.stride * SSDGS_CHANNELS, lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
+    const size_t n = frame->gaussians.stride * SSDGS_CHANNELS,
+                 lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
     ssdgs_real sums[SSDGS__LANE_SUMS];
     ssdgs__shade_job job;
     size_t i;
@@ -4262,7 +4615,8 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
-    job.slot_stride = job.slot_shadow + ssdgs__slot_gradient_size(job.layout.shadow, job.layout.shadow_layers);
+    job.slot_stride =
+        job.slot_shadow + ssdgs__slot_gradient_size(job.layout.shadow, job.layout.shadow_layers);
     job.activations = (ssdgs_real *)frame->memory->activations.memory;
     SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
     SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
@@ -4273,8 +4627,9 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     for (slot = 0; slot < SSDGS__SLOTS; slot++)
         for (light = 0; light < frame->light_count; light++)
             for (i = 0; i < SSDGS__LANE_SUMS; i++) {
-                const ssdgs_real *row = job.lane_slots + ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) *
-                    16;
+                const ssdgs_real *row =
+                    job.lane_slots +
+                    ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) * 16;
                 ssdgs_real sum = 0;
                 for (lane = 0; lane < 16; lane++) sum += row[lane];
                 sums[i] += sum;
@@ -4288,11 +4643,13 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
 /* ==== >>composite  eq. 1 and its backward over tiles ==== */
 
 /* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes or come from them. */
-static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count, ssdgs_real *const planes[]) {
+static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count,
+                              ssdgs_real *const planes[]) {
     int micro, row, c;
     for (micro = 0; micro < 16; micro++)
         for (row = 0; row < 4; row++) {
-            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row, inside = tile->width - x;
+            const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row,
+                      inside = tile->width - x;
             const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
             if (inside <= 0 || y >= tile->height) continue;
             for (c = 0; c < count; c++) {
@@ -4321,10 +4678,12 @@ static void ssdgs__tile_load(const ssdgs__tile *tile, const ssdgs_real *plane, i
 
 /* Blended, layer 0 is the colour. */
 static ssdgs_real *ssdgs__layer_plane(const ssdgs_frame *frame, int layer, int c) {
-    return frame->layer_pixels + (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)(3 * layer + c);
+    return frame->layer_pixels +
+           (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)(3 * layer + c);
 }
 
-static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer, const ssdgs_real *values) {
+static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer,
+                                      const ssdgs_real *values) {
     ssdgs_real *planes[3];
     int c;
     if (!frame->layer_pixels) return;
@@ -4339,12 +4698,15 @@ typedef struct ssdgs__composite_job {
     ssdgs__lighting *lightings; /* NULL: without the layers */
 } ssdgs__composite_job;
 
-/* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all along the gap behind a veil,
-   until the next fall is nearer than `thick`, and from there goes straight to what there was before that. */
-static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance, ssdgs_real thick) {
+/* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all
+   along the gap behind a veil, until the next fall is nearer than `thick`, and from there goes straight to
+   what there was before that. */
+static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
+                                              ssdgs_real thick) {
     const int tile = (y >> 4) * map->tiles_x + (x >> 4);
-    const ssdgs_real *falls = map->falls +
-        ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) * SSDGS__FALL_VALUES;
+    const ssdgs_real *falls =
+        map->falls + ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) *
+                         SSDGS__FALL_VALUES;
     ssdgs_real left, begin;
     int level = 0, i;
     if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
@@ -4359,11 +4721,13 @@ static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x
 
 /* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
 static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias) {
-    const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1), half = (ssdgs_real)0.5;
+    const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1),
+                     half = (ssdgs_real)0.5;
     ssdgs_real t[3], u, w, inverse_z, distance, row[2];
     int i, x, y;
     for (i = 0; i < 3; i++)
-        t[i] = map->view[4 * i] * at[0] + map->view[4 * i + 1] * at[1] + map->view[4 * i + 2] * at[2] + map->view[4 * i + 3];
+        t[i] = map->view[4 * i] * at[0] + map->view[4 * i + 1] * at[1] + map->view[4 * i + 2] * at[2] +
+               map->view[4 * i + 3];
     if (!(t[2] > map->near_plane)) return -1;
     inverse_z = map->orthographic ? 1 : 1 / t[2];
     u = map->fx * t[0] * inverse_z + map->cx - half;
@@ -4378,14 +4742,15 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u -= (ssdgs_real)x;
     w -= (ssdgs_real)y;
     for (i = 0; i < 2; i++)
-        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance, bias) + u * ssdgs__passed(map, x + 1, y + i, distance, bias);
+        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance, bias) +
+                 u * ssdgs__passed(map, x + 1, y + i, distance, bias);
     return (1 - w) * row[0] + w * row[1];
 }
 
-/* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at their depth. Where
-   no map knows it, that of their Gaussians. */
-static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light, const ssdgs__tile *tile,
-                                    const ssdgs_real *layers, ssdgs_real *sight) {
+/* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at
+   their depth. Where no map knows it, that of their Gaussians. */
+static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
+                                    const ssdgs__tile *tile, const ssdgs_real *layers, ssdgs_real *sight) {
     const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
     const ssdgs_real bias = (frame->settings.light_bias + rounding) * frame->settings.length_unit;
     int first = 1, i, c, view; /* views are in the order of lights */
@@ -4400,10 +4765,14 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         z = depth[0] / depth[32];
         x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
         y = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
-        for (c = 0; c < 3; c++) at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
-        for (view = first; view < frame->view_count && frame->views[view].light == light && passed < 0; view++)
+        for (c = 0; c < 3; c++)
+            at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
+        for (view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
+             view++)
             if (frame->views[view].falls) passed = ssdgs__passed_to(frame->views + view, at, bias);
-        sight[lane] = passed < 0 ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32] : passed;
+        sight[lane] = passed < 0
+                          ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
+                          : passed;
     }
 }
 
@@ -4412,12 +4781,15 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
-    const int layers = job->lightings && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
+    const int layers =
+        job->lightings && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER],
+        *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
     ssdgs_real sight[SSDGS__TILE_LAYER];
     int layer, light;
-    for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
+    for (layer = 0; layer < layers; layer++)
+        color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
     if (job->lightings && layers == 1 && frame->layer_pixels)
         memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
@@ -4427,7 +4799,8 @@ static void ssdgs__composite_task(void *data, int index) {
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
         const size_t plane = (size_t)tile.width * (size_t)tile.height * (size_t)light;
         if (layers > 1) {
-            for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
+            for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
+                color[layer] = ssdgs__layer(frame, first - 1 + layer);
             if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
             if (frame->visibility_given) ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, sight);
             else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, sight);
@@ -4457,7 +4830,8 @@ static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *c
     for (c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
     job.planes[3] = frame->transmittance;
     job.lightings = lightings;
-    ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task, &job);
+    ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task,
+                    &job);
 }
 
 static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
@@ -4475,7 +4849,8 @@ typedef struct ssdgs__uncomposite_job {
 } ssdgs__uncomposite_job;
 
 /* The fourth of a walk's first layer: what the gradients' product with the pixel comes to, 1: with T's. */
-static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradient, int layers, int transmittance) {
+static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradient, int layers,
+                                    int transmittance) {
     int micro, lane, layer, c;
     for (micro = 0; micro < 16; micro++)
         for (lane = 0; lane < 16; lane++) {
@@ -4500,7 +4875,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1;
     const int lit = SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
     const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER], sight[SSDGS__TILE_LAYER];
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER],
+        sight[SSDGS__TILE_LAYER];
     ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
     int layer, light, c;
     if (!tile.count) return;
@@ -4508,27 +4884,34 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     for (c = 0; c < 4; c++) ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
     for (layer = 0; layer < (deferred ? SSDGS__LIGHT_LAYER : 1); layer++)
         for (c = 0; c < 3; c++)
-            ssdgs__tile_load(&tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
-                             pixels + layer * SSDGS__TILE_LAYER);
+            ssdgs__tile_load(
+                &tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
+                pixels + layer * SSDGS__TILE_LAYER);
     ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
     for (c = 0; deferred && frame->normal_gradient && c < 4; c++)
         ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c % 3 + 2 * (c / 3),
                          gradient + (c < 3 ? 4 : 3) * SSDGS__TILE_LAYER);
-    for (light = deferred ? frame->light_count - 1 : -1; light >= 0; light--) { /* the first's are walked with the others */
+    for (light = deferred ? frame->light_count - 1 : -1; light >= 0;
+         light--) { /* the first's are walked with the others */
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
         for (layer = 0; layer < SSDGS__PER_LIGHT; layer++)
             for (c = 0; c < 3; c++)
-                ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c, pixels + lit + layer * SSDGS__TILE_LAYER);
+                ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c,
+                                 pixels + lit + layer * SSDGS__TILE_LAYER);
         ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, sight);
         k->highlight_backward(job->lightings + light, &tile, pixels, sight, gradient,
-                              job->highlight_sums + (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
+                              job->highlight_sums +
+                                  (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
         if (!light) continue;
-        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++) color[layer] = ssdgs__layer(frame, first - 1 + layer);
+        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+            color[layer] = ssdgs__layer(frame, first - 1 + layer);
         ssdgs__gradient_product(pixels + lit, gradient + lit, SSDGS__PER_LIGHT, 0);
-        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, pixels + lit, sums, job->stride, first);
+        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, pixels + lit, sums, job->stride,
+                              first);
     }
-    for (layer = 0; layer < layers; layer++) color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
+    for (layer = 0; layer < layers; layer++)
+        color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
     ssdgs__gradient_product(pixels, gradient, layers, 1);
     k->composite_backward(&tile, layers, color, gradient, pixels, sums, job->stride, 0);
 }
@@ -4555,7 +4938,8 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
             if (!v->tile_seen[place]) continue;
             for (i = 0; i < 8; i++) sum[i] += from[i];
             for (layer = 0; layer <= frame->layer_count; layer++) {
-                ssdgs_real *to = (layer ? ssdgs__layer_gradient(frame, layer - 1) : frame->color_gradient) + 4 * g;
+                ssdgs_real *to =
+                    (layer ? ssdgs__layer_gradient(frame, layer - 1) : frame->color_gradient) + 4 * g;
                 for (i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
             }
         }
@@ -4586,8 +4970,10 @@ static void ssdgs__highlight_gradient(ssdgs_frame *frame, const ssdgs__uncomposi
             for (i = 0; i < 9; i++) frame->view_gradient[4 * (i / 3) + i % 3] += sum[6 + i];
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 for (i = 0; i < 2; i++)
-                    frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] += sum[15 + 2 * j + i];
-                frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] += sum[15 + 2 * SSDGS_ASG_COUNT + j];
+                    frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] +=
+                        sum[15 + 2 * j + i];
+                frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] +=
+                    sum[15 + 2 * SSDGS_ASG_COUNT + j];
             }
         }
 }
@@ -4596,7 +4982,8 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
     ssdgs_context *context = frame->context;
     ssdgs_splat_view *v = frame->views;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
-    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK, tiles = (size_t)v->tiles_x * (size_t)v->tiles_y;
+    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK,
+                 tiles = (size_t)v->tiles_x * (size_t)v->tiles_y;
     const size_t sums = tiles * (size_t)frame->light_count * SSDGS__HIGHLIGHT_SUMS;
     ssdgs__uncomposite_job job;
     memset(&job, 0, sizeof job);
@@ -4624,12 +5011,11 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
 static void ssdgs__project_backward_task(void *data, int chunk) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs__projection p = ssdgs__projection_of(frame, frame->views);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count, end = begin + SSDGS__CHUNK < n
-        ? begin + SSDGS__CHUNK : n;
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
+                 end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end,
-                                        frame->splat_gradient, frame->gradient,
-                                        frame->gaussians.stride,
-                                            (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
+                                        frame->splat_gradient, frame->gradient, frame->gaussians.stride,
+                                        (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
 }
 
 static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
@@ -4649,18 +5035,18 @@ static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) 
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     if (!frame) return SSDGS_ERR_ARGUMENT;
     switch (stage) {
-        case SSDGS_STAGE_PROJECT: return ssdgs__project(frame);
-        case SSDGS_STAGE_SORT: return ssdgs__sort(frame);
-        case SSDGS_STAGE_BIN: return ssdgs__bin(frame);
-        case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
-        case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
-        case SSDGS_STAGE_COMPOSITE: return ssdgs__composite(frame);
+    case SSDGS_STAGE_PROJECT: return ssdgs__project(frame);
+    case SSDGS_STAGE_SORT: return ssdgs__sort(frame);
+    case SSDGS_STAGE_BIN: return ssdgs__bin(frame);
+    case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
+    case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
+    case SSDGS_STAGE_COMPOSITE: return ssdgs__composite(frame);
 #ifndef SSDGS_NO_TRAINER
-        case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
-        case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
-        case SSDGS_STAGE_PROJECT_BACKWARD: return ssdgs__project_backward(frame);
+    case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
+    case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
+    case SSDGS_STAGE_PROJECT_BACKWARD: return ssdgs__project_backward(frame);
 #endif
-        default: return SSDGS_ERR_ARGUMENT;
+    default: return SSDGS_ERR_ARGUMENT;
     }
 }
 
@@ -4669,7 +5055,7 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     int stage;
     for (stage = first; stage <= last; stage++) {
         const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
-            : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+                                                      : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
         if (result) return result;
     }
     return SSDGS_OK;
@@ -4690,7 +5076,8 @@ static void ssdgs__rows_task(void *data, int index) {
     const size_t plane = (size_t)w * (size_t)h;
     int x, y, c;
     for (y = index * SSDGS__BAND; y < end; y++) {
-        const ssdgs_real *t = transmittance + (size_t)y * (size_t)w, *red = job->planes + (size_t)y * (size_t)w;
+        const ssdgs_real *t = transmittance + (size_t)y * (size_t)w,
+                         *red = job->planes + (size_t)y * (size_t)w;
         ssdgs_real *rgb = job->out + (size_t)y * (size_t)job->stride * 3;
         for (x = 0; n == 3 && x < w; x++, rgb += 3) {
             rgb[0] = red[x] + t[x] * job->background[0];
@@ -4698,7 +5085,8 @@ static void ssdgs__rows_task(void *data, int index) {
             rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
         }
         for (c = 0; n != 3 && c < n; c++) {
-            const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w, background = job->background[c];
+            const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w,
+                             background = job->background[c];
             ssdgs_real *out = job->out + (size_t)y * (size_t)job->stride * (size_t)n + c;
             for (x = 0; x < w; x++) out[x * n] = from[x] + t[x] * background;
         }
@@ -4716,25 +5104,32 @@ static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes
     job.channels = channels;
     job.stride = stride;
     for (c = 0; c < 3; c++) job.background[c] = background ? background[c] : 0;
-    ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task, &job);
+    ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task,
+                    &job);
 }
 
-/* Three planes of a frame whose light is deferred: 0 diffuse, 1 specular, 2 scattering, 3 the normal, 4 S, depth. */
+/* Three planes of a frame whose light is deferred: 0 diffuse, 1 specular, 2 scattering, 3 the normal, 4 S,
+   depth. */
 static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, ssdgs_real *planes) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const ssdgs_real *depth = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0);
     size_t i;
     int light, c;
     for (c = 0; c < 3; c++) {
-        const ssdgs_real *scattering = ssdgs__layer_plane(frame, 0, c), *all = frame->pixels + pixels * (size_t)c;
+        const ssdgs_real *scattering = ssdgs__layer_plane(frame, 0, c),
+                         *all = frame->pixels + pixels * (size_t)c;
         const ssdgs_real *normal = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER + 1, c);
         ssdgs_real *to = planes + pixels * (size_t)c;
         for (i = 0; i < pixels; i++)
-            to[i] = component == 1 ? all[i] - scattering[i] : component == 2 ? scattering[i] : component == 3 ? normal[i]
-                : component == 4 && c == 1 ? depth[i] : 0;
+            to[i] = component == 1             ? all[i] - scattering[i]
+                    : component == 2           ? scattering[i]
+                    : component == 3           ? normal[i]
+                    : component == 4 && c == 1 ? depth[i]
+                                               : 0;
         for (light = 0; light < frame->light_count; light++) {
             const ssdgs_real *shadow = frame->pixel_shadow + pixels * (size_t)light;
-            const ssdgs_real *d = ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c);
+            const ssdgs_real *d =
+                ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c);
             for (i = 0; i < pixels && component < 2; i++) to[i] += (component ? -d[i] : d[i]) * shadow[i];
             for (i = 0; i < pixels && component == 4 && c == 0; i++)
                 to[i] += shadow[i] * (1 - frame->transmittance[i]) / (ssdgs_real)frame->light_count;
@@ -4742,8 +5137,9 @@ static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, s
     }
 }
 
-static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                  const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
+static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                                  int light_count, const ssdgs_render_options *options,
+                                  const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_context *context = model->context;
     ssdgs_frame frame;
     ssdgs_result result;
@@ -4753,20 +5149,23 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
     int stride, c, x, y, finite = 1;
     if (!camera || !image) return ssdgs__null(context, "ssdgs_render", camera ? "image" : "camera");
     result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
-                                image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
-                                    image->depth, 0);
+                                image->diffuse || image->specular || image->scattering || image->normal ||
+                                    image->shadow || image->depth,
+                                0);
     if (result) return result;
     stride = image->stride ? image->stride : camera->width;
-    if (stride < camera->width) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
-                                                   camera->width);
+    if (stride < camera->width)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
+                           camera->width);
     result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     pixels = (size_t)camera->width * (size_t)camera->height;
-    if (image->color) ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
+    if (image->color)
+        ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
     if (image->alpha)
         for (y = 0, i = 0; y < camera->height; y++)
-            for (x = 0; x < camera->width; x++, i++) image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 -
-                frame.transmittance[i];
+            for (x = 0; x < camera->width; x++, i++)
+                image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
     SSDGS__RESERVE(frame.memory->image, planes, ssdgs_real, pixels * 3);
     for (c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
@@ -4798,13 +5197,16 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
         }
         stats->network_work = all > 0 ? done / all : 0;
         stats->instances = frame.views[0].instances;
-        for (i = 0; i < (size_t)frame.shaded_count; i++) stats->blackened += frame.color[4 * frame.shaded[i] + 3] > 0;
-        for (c = 0; c < SSDGS_DIFFUSE; c++) finite = finite && context->k->finite(model->gaussians + (size_t)c * model->capacity,
-                                                                                  (size_t)model->count);
+        for (i = 0; i < (size_t)frame.shaded_count; i++)
+            stats->blackened += frame.color[4 * frame.shaded[i] + 3] > 0;
+        for (c = 0; c < SSDGS_DIFFUSE; c++)
+            finite = finite &&
+                     context->k->finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
         for (i = 0; i < (size_t)model->count && !finite; i++)
             for (c = 0; c < SSDGS_DIFFUSE; c++)
                 if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i]) &&
-                    !(c >= SSDGS_LOG_SCALE && ssdgs__finite(1 / model->gaussians[(size_t)c * model->capacity + i]))) {
+                    !(c >= SSDGS_LOG_SCALE &&
+                      ssdgs__finite(1 / model->gaussians[(size_t)c * model->capacity + i]))) {
                     stats->rejected++;
                     break;
                 }
@@ -4812,17 +5214,21 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                       const ssdgs_render_options *options, const ssdgs_image *image, ssdgs_render_stats *stats) {
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera,
+                                       const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image,
+                                       ssdgs_render_stats *stats) {
     ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!model) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(model->context, "ssdgs_render");
-    return result ? result : ssdgs__leave(model->context, ssdgs__render(model, camera, lights, light_count, options, image, stats));
+    return result ? result
+                  : ssdgs__leave(model->context,
+                                 ssdgs__render(model, camera, lights, light_count, options, image, stats));
 }
 
-SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count,
-                                    const ssdgs_image *image) {
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                                    int light_count, const ssdgs_image *image) {
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
 }
 
@@ -4848,15 +5254,16 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     return out;
 }
 
-/* The bytes of 8192 equal parts of 0 .. 1, the last one half, by the sRGB curve, made for each call: each part has the byte of its
-   middle, 0.2 of a byte from its ends at most. */
+/* The bytes of 8192 equal parts of 0 .. 1, the last one half, by the sRGB curve, made for each call: each
+   part has the byte of its middle, 0.2 of a byte from its ends at most. */
 #define SSDGS__PARTS 8192
 #define SSDGS__PART_SCALE ((ssdgs_real)(SSDGS__PARTS - 0.5))
 
 static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
     ssdgs_real begin[256];
     int byte, at = 0;
-    for (byte = 0; byte < 256; byte++) begin[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
+    for (byte = 0; byte < 256; byte++)
+        begin[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
     ssdgs__srgb_decode_scalar(begin, begin, 256);
     for (byte = 0; byte < 256; byte++) {
         const int end = byte < 255 ? (int)(begin[byte] * SSDGS__PART_SCALE + (ssdgs_real)0.5) : SSDGS__PARTS;
@@ -4884,8 +5291,8 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
     }
 }
 
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format, void *pixels,
-                               ptrdiff_t pitch) {
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                               ssdgs_format format, void *pixels, ptrdiff_t pitch) {
     const int red = format == SSDGS_BGRA8 ? 2 : 0;
     unsigned char bytes[SSDGS__PARTS];
     const unsigned char *table = transfer == SSDGS_TRANSFER_SRGB ? bytes : NULL;
@@ -4906,9 +5313,12 @@ SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, 
     }
 }
 
-/* The sRGB curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most up to 1. */
+/* The sRGB curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most
+   up to 1. */
 enum { SSDGS__LINES_FIRST = (127 - 13) << 6, SSDGS__LINES = 30 << 6 };
-typedef struct ssdgs__line { ssdgs_real at, slope; } ssdgs__line;
+typedef struct ssdgs__line {
+    ssdgs_real at, slope;
+} ssdgs__line;
 
 static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
     enum { OCTAVE = 64, POINTS = OCTAVE + 16 };
@@ -4925,7 +5335,8 @@ static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
         for (i = 0; i < OCTAVE; i++) {
             const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
             lines[begin + i].slope = slope;
-            lines[begin + i].at = begin ? encoded[i] - slope * from[i] : 0; /* the curve is straight from 0 on to beyond the first octave */
+            lines[begin + i].at = begin ? encoded[i] - slope * from[i]
+                                        : 0; /* the curve is straight from 0 on to beyond the first octave */
         }
     }
 }
@@ -4955,12 +5366,15 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
     if (lines) ssdgs__lines_make(curve);
     for (i = 0; i < pixels; i++, color += 3, stored += 3) {
         const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-        for (c = 0; c < 3; c++) stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];
+        for (c = 0; c < 3; c++)
+            stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];
     }
 }
 
 #ifndef SSDGS_NO_TRAINER
-typedef struct ssdgs__loss_values { double loss, l1, ssim, mse; } ssdgs__loss_values;
+typedef struct ssdgs__loss_values {
+    double loss, l1, ssim, mse;
+} ssdgs__loss_values;
 
 typedef struct ssdgs__loss_job {
     const ssdgs__kernels *k;
@@ -4985,13 +5399,16 @@ static size_t ssdgs__padded_at(const ssdgs__loss_job *job, int channel, int y) {
 static void ssdgs__loss_pad_task(void *data, int index) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
     const int channel = index / job->bands, band = index % job->bands, w = job->width;
-    const int begin = band ? band * SSDGS__BAND : -5, end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
+    const int begin = band ? band * SSDGS__BAND : -5,
+              end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
     int y, x, p;
     for (y = begin; y < end; y++)
         for (p = 0; p < 5; p++) {
-            const ssdgs_real *from = (p ? job->target : job->image) + (size_t)channel * (size_t)w * (size_t)job->height +
-                (size_t)(y > 0 ? y : 0) * (size_t)w;
-            const ssdgs_real outside = p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
+            const ssdgs_real *from = (p ? job->target : job->image) +
+                                     (size_t)channel * (size_t)w * (size_t)job->height +
+                                     (size_t)(y > 0 ? y : 0) * (size_t)w;
+            const ssdgs_real outside =
+                p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
             const int inside = y >= 0 && y < job->height && p < 2;
             ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
             for (x = 0; x < 16; x++) to[x] = outside;
@@ -5010,8 +5427,8 @@ static void ssdgs__loss_task(void *data, int index) {
         const size_t at = ssdgs__padded_at(job, channel, y);
         ssdgs_real sums[3];
         job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride,
-                         job->scratch + (size_t)index * 5 * job->stride,
-                         job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, sums);
+                         job->scratch + (size_t)index * 5 * job->stride, job->padded[2] + at,
+                         job->padded[3] + at, job->padded[4] + at, sums);
         for (i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
     }
 }
@@ -5024,16 +5441,18 @@ static void ssdgs__loss_backward_task(void *data, int index) {
     int y;
     for (y = begin; y < end; y++) {
         const size_t at = ssdgs__padded_at(job, channel, y);
-        job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch, job->padded[2] + at,
-                                  job->padded[3] + at, job->padded[4] + at, job->by_l1, job->by_ssim, row);
+        job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch,
+                                  job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, job->by_l1,
+                                  job->by_ssim, row);
         memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row,
                (size_t)job->width * sizeof *row);
     }
 }
 
 /* image, target, gradient: (3, h, w) stored values. gradient may be NULL. */
-static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, const ssdgs_real *image, const ssdgs_real *target,
-                                int width, int height, ssdgs_real dssim, ssdgs_real *gradient, ssdgs__loss_values *values) {
+static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, const ssdgs_real *image,
+                                const ssdgs_real *target, int width, int height, ssdgs_real dssim,
+                                ssdgs_real *gradient, ssdgs__loss_values *values) {
     ssdgs__loss_job job;
     const double pixels = 3.0 * width * height;
     double sum[3] = {0, 0, 0};
@@ -5076,18 +5495,16 @@ static double ssdgs__psnr(double mse) { return mse > 1e-10 ? -10 * log10(mse) : 
 /* Linear sRGB to CIE XYZ relative to the white point, and back. Rows sum to 1. */
 static const double ssdgs__flip_to_xyz[9] = {
     10135552.0 / 23359437, 8788810.0 / 23359437, 4435075.0 / 23359437,
-    2613072.0 / 12288897, 8788810.0 / 12288897, 887015.0 / 12288897,
-    1425312.0 / 80288307, 8788810.0 / 80288307, 70074185.0 / 80288307
-};
-static const double ssdgs__flip_to_rgb[9] = {
-    3.080341988280, -1.537398969489, -0.542943018792,
-    -0.921178396165, 1.875929983695, 0.045248412470,
-    0.052881292876, -0.204011206124, 1.151129913248
-};
+    2613072.0 / 12288897,  8788810.0 / 12288897, 887015.0 / 12288897,
+    1425312.0 / 80288307,  8788810.0 / 80288307, 70074185.0 / 80288307};
+static const double ssdgs__flip_to_rgb[9] = {3.080341988280,  -1.537398969489, -0.542943018792,
+                                             -0.921178396165, 1.875929983695,  0.045248412470,
+                                             0.052881292876,  -0.204011206124, 1.151129913248};
 
 static void ssdgs__flip_transform(const double matrix[9], const double v[3], double result[3]) {
     int i;
-    for (i = 0; i < 3; i++) result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
+    for (i = 0; i < 3; i++)
+        result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
 }
 
 /* Linear sRGB to CIELAB with Hunt's adjustment: chroma counts less where it is dark. */
@@ -5096,7 +5513,8 @@ static void ssdgs__flip_lab(const double rgb[3], double lab[3]) {
     double f[3];
     int i;
     ssdgs__flip_transform(ssdgs__flip_to_xyz, rgb, f);
-    for (i = 0; i < 3; i++) f[i] = f[i] > delta * delta * delta ? pow(f[i], 1.0 / 3) : f[i] / (3 * delta * delta) + 4.0 / 29;
+    for (i = 0; i < 3; i++)
+        f[i] = f[i] > delta * delta * delta ? pow(f[i], 1.0 / 3) : f[i] / (3 * delta * delta) + 4.0 / 29;
     lab[0] = 116 * f[1] - 16;
     lab[1] = 0.01 * lab[0] * 500 * (f[0] - f[1]);
     lab[2] = 0.01 * lab[0] * 200 * (f[1] - f[2]);
@@ -5106,7 +5524,11 @@ static double ssdgs__flip_hyab(const double p[3], const double q[3]) {
     return fabs(p[0] - q[0]) + sqrt((p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
 }
 
-enum { SSDGS__FLIP_COLOR_RADIUS = 10, SSDGS__FLIP_FEATURE_RADIUS = 9, SSDGS__FLIP_TAPS = 21 }; /* 3 sigma of the widest */
+enum {
+    SSDGS__FLIP_COLOR_RADIUS = 10,
+    SSDGS__FLIP_FEATURE_RADIUS = 9,
+    SSDGS__FLIP_TAPS = 21
+}; /* 3 sigma of the widest */
 
 /* Taps of a Gaussian (order 0), its first or second derivative: positive ones sum to 1, negative ones to -1.
    Returns what the positive ones summed to before. */
@@ -5118,21 +5540,24 @@ static double ssdgs__flip_kernel(int order, double sigma, int radius, ssdgs_real
         raw[i] = exp(-0.5 * x * x) * (order == 0 ? 1 : order == 1 ? -x : x * x - 1);
         *(raw[i] > 0 ? &positive : &negative) += fabs(raw[i]);
     }
-    for (i = 0; i <= 2 * radius; i++) taps[i] = (ssdgs_real)(raw[i] / (raw[i] > 0 ? positive : raw[i] < 0 ? negative : 1));
+    for (i = 0; i <= 2 * radius; i++)
+        taps[i] = (ssdgs_real)(raw[i] / (raw[i] > 0 ? positive : raw[i] < 0 ? negative : 1));
     return positive;
 }
 
-/* output += weight x input filtered by across along the rows and down along the columns; the border pixels go on for ever.
-   scratch holds a plane and a row with its borders. */
-static void ssdgs__flip_filter(const ssdgs_real *input, int width, int height, const ssdgs_real *across, const ssdgs_real *down,
-                               int radius, double weight, ssdgs_real *scratch, ssdgs_real *output) {
+/* output += weight x input filtered by across along the rows and down along the columns; the border pixels go
+   on for ever. scratch holds a plane and a row with its borders. */
+static void ssdgs__flip_filter(const ssdgs_real *input, int width, int height, const ssdgs_real *across,
+                               const ssdgs_real *down, int radius, double weight, ssdgs_real *scratch,
+                               ssdgs_real *output) {
     const size_t w = (size_t)width;
     ssdgs_real *row = scratch + w * (size_t)height;
     int x, y, k;
     for (y = 0; y < height; y++) {
         const ssdgs_real *from = input + w * (size_t)y;
         ssdgs_real *to = scratch + w * (size_t)y;
-        for (x = -radius; x < width + radius; x++) row[x + radius] = from[x < 0 ? 0 : x < width ? x : width - 1];
+        for (x = -radius; x < width + radius; x++)
+            row[x + radius] = from[x < 0 ? 0 : x < width ? x : width - 1];
         for (x = 0; x < width; x++) to[x] = 0;
         for (k = 0; k <= 2 * radius; k++) {
             for (x = 0; x < width; x++) to[x] += across[k] * row[x + k];
@@ -5142,21 +5567,25 @@ static void ssdgs__flip_filter(const ssdgs_real *input, int width, int height, c
         ssdgs_real *to = output + w * (size_t)y;
         for (k = 0; k <= 2 * radius; k++) {
             const int source = y + k - radius;
-            const ssdgs_real *from = scratch + w * (size_t)(source < 0 ? 0 : source < height ? source : height - 1);
+            const ssdgs_real *from = scratch + w * (size_t)(source < 0        ? 0
+                                                            : source < height ? source
+                                                                              : height - 1);
             const ssdgs_real tap = (ssdgs_real)weight * down[k];
             for (x = 0; x < width; x++) to[x] += tap * from[x];
         }
     }
 }
 
-/* Fills five planes: what the eye resolves of an image's colours (Hunt-adjusted L, a, b), how strong its edges and points
-   are. scratch holds four planes and a row. */
-static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ssdgs_real *planes, ssdgs_real *scratch) {
-    const double degree = 3840 * 3.14159265358979323846 / 180; /* px per degree: 0.7 m before a 0.7 m wide 4K monitor */
+/* Fills five planes: what the eye resolves of an image's colours (Hunt-adjusted L, a, b), how strong its
+   edges and points are. scratch holds four planes and a row. */
+static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ssdgs_real *planes,
+                              ssdgs_real *scratch) {
+    const double degree =
+        3840 * 3.14159265358979323846 / 180; /* px per degree: 0.7 m before a 0.7 m wide 4K monitor */
     const double pi2 = 9.86960440108935861883;
     /* Contrast sensitivity of the three opponent channels; the last is a sum of two Gaussians. */
-    static const double amplitude[4] = { 1, 1, 34.1, 13.5 }, spread[4] = { 0.0047, 0.0053, 0.04, 0.025 };
-    static const int channel[4] = { 0, 1, 2, 2 };
+    static const double amplitude[4] = {1, 1, 34.1, 13.5}, spread[4] = {0.0047, 0.0053, 0.04, 0.025};
+    static const int channel[4] = {0, 1, 2, 2};
     const size_t pixels = (size_t)width * (size_t)height;
     ssdgs_real *opponent = scratch + pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS;
     ssdgs_real taps[4][SSDGS__FLIP_TAPS], smooth[SSDGS__FLIP_TAPS];
@@ -5175,12 +5604,16 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
         opponent[2 * pixels + p] = (ssdgs_real)(xyz[1] - xyz[2]);
     }
 
-    ssdgs__flip_kernel(0, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS, smooth); /* half of 0.082 degrees, peak to trough */
-    for (k = 1; k <= 2; k++) { /* edges, points: length of the two derivatives; L and a are free to hold them */
+    ssdgs__flip_kernel(0, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS,
+                       smooth); /* half of 0.082 degrees, peak to trough */
+    for (k = 1; k <= 2;
+         k++) { /* edges, points: length of the two derivatives; L and a are free to hold them */
         ssdgs__flip_kernel(k, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS, taps[0]);
         memset(planes, 0, 2 * pixels * sizeof *planes);
-        ssdgs__flip_filter(opponent, width, height, taps[0], smooth, SSDGS__FLIP_FEATURE_RADIUS, 1, scratch, planes);
-        ssdgs__flip_filter(opponent, width, height, smooth, taps[0], SSDGS__FLIP_FEATURE_RADIUS, 1, scratch, planes + pixels);
+        ssdgs__flip_filter(opponent, width, height, taps[0], smooth, SSDGS__FLIP_FEATURE_RADIUS, 1, scratch,
+                           planes);
+        ssdgs__flip_filter(opponent, width, height, smooth, taps[0], SSDGS__FLIP_FEATURE_RADIUS, 1, scratch,
+                           planes + pixels);
         for (p = 0; p < pixels; p++) {
             const double dx = (double)planes[p], dy = (double)planes[pixels + p];
             planes[(size_t)(2 + k) * pixels + p] = (ssdgs_real)sqrt(dx * dx + dy * dy);
@@ -5188,13 +5621,15 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
     }
 
     for (i = 0; i < 4; i++) { /* a spread b is a Gaussian of sigma sqrt(b / 2) / pi degrees */
-        const double sum = ssdgs__flip_kernel(0, sqrt(spread[i] / (2 * pi2)) * degree, SSDGS__FLIP_COLOR_RADIUS, taps[i]);
+        const double sum =
+            ssdgs__flip_kernel(0, sqrt(spread[i] / (2 * pi2)) * degree, SSDGS__FLIP_COLOR_RADIUS, taps[i]);
         gain[i] = i < 2 ? 1 : amplitude[i] / sqrt(spread[i]) * sum * sum;
     }
     memset(planes, 0, 3 * pixels * sizeof *planes);
     for (i = 0; i < 4; i++) {
-        ssdgs__flip_filter(opponent + (size_t)channel[i] * pixels, width, height, taps[i], taps[i], SSDGS__FLIP_COLOR_RADIUS,
-                           i < 2 ? 1 : gain[i] / (gain[2] + gain[3]), scratch, planes + (size_t)channel[i] * pixels);
+        ssdgs__flip_filter(opponent + (size_t)channel[i] * pixels, width, height, taps[i], taps[i],
+                           SSDGS__FLIP_COLOR_RADIUS, i < 2 ? 1 : gain[i] / (gain[2] + gain[3]), scratch,
+                           planes + (size_t)channel[i] * pixels);
     }
     for (p = 0; p < pixels; p++) {
         xyz[1] = (double)planes[p];
@@ -5208,17 +5643,19 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
 }
 
 /* Mean LDR-FLIP error of two (h,w,3) images of sRGB-encoded values, clamped to [0,1]. */
-static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference, int width,
-                                int height, double *flip) {
-    static const double green[3] = { 0, 1, 0 }, blue[3] = { 0, 0, 1 }; /* the largest difference there is */
+static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
+                                int width, int height, double *flip) {
+    static const double green[3] = {0, 1, 0}, blue[3] = {0, 0, 1}; /* the largest difference there is */
     double lab[2][3], largest, knee, sum = 0;
     ssdgs_real *planes; /* five of each image, four and a row of scratch */
     size_t pixels, bytes, p;
     int i;
 
     *flip = 0;
-    if (!ssdgs__product_fits((size_t)width, (size_t)height, &pixels) || pixels > SIZE_MAX / sizeof *planes / 32 ||
-        !ssdgs__product_fits(14 * pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS, sizeof *planes, &bytes))
+    if (!ssdgs__product_fits((size_t)width, (size_t)height, &pixels) ||
+        pixels > SIZE_MAX / sizeof *planes / 32 ||
+        !ssdgs__product_fits(14 * pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS, sizeof *planes,
+                             &bytes))
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "FLIP: %d x %d pixels are too many", width, height);
     planes = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!planes) return SSDGS_ERR_MEMORY;
@@ -5247,8 +5684,9 @@ static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image,
     return SSDGS_OK;
 }
 
-static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
-                                   int width, int height, ssdgs_metrics *metrics) {
+static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *image,
+                                   const ssdgs_real *reference, int width, int height,
+                                   ssdgs_metrics *metrics) {
     ssdgs__buffer planes = {0, 0}, memory = {0, 0};
     ssdgs__loss_values values;
     ssdgs_result result;
@@ -5267,7 +5705,8 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
                 const ssdgs_real x = (c < 3 ? image : reference)[3 * i + c % 3];
                 p[pixels * c + i] = x > 0 ? (x < 1 ? x : 1) : 0;
             }
-        result = ssdgs__loss(context, &memory, p, p + 3 * pixels, width, height, (ssdgs_real)0.2, NULL, &values);
+        result =
+            ssdgs__loss(context, &memory, p, p + 3 * pixels, width, height, (ssdgs_real)0.2, NULL, &values);
     }
     if (!result) result = ssdgs__flip(context, image, reference, width, height, &metrics->flip);
     if (!result) {
@@ -5279,20 +5718,23 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
-                                     int width, int height, ssdgs_metrics *metrics) {
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
+                                     const ssdgs_real *reference, int width, int height,
+                                     ssdgs_metrics *metrics) {
     ssdgs_result result;
     if (!context) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(context, "ssdgs_compare");
-    return result ? result : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
+    return result ? result
+                  : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
 }
 #endif /* SSDGS_NO_TRAINER */
 
 /* ==== >>ply  model files, files at large ==== */
 
-/* A model is one PLY file: element vertex with the Gaussians, then the settings, the ASG bases and the weights. One table of
-   properties drives both ways. Reading: the header is matched against the table, a survey finds where each element lies and
-   that all of it is there, then the rows of known elements are read and mended. */
+/* A model is one PLY file: element vertex with the Gaussians, then the settings, the ASG bases and the
+   weights. One table of properties drives both ways. Reading: the header is matched against the table, a
+   survey finds where each element lies and that all of it is there, then the rows of known elements are read
+   and mended. */
 
 #ifndef SSDGS_NO_STDIO
 #include <errno.h>
@@ -5309,15 +5751,24 @@ int fsync(int file); /* hidden by -std=c99 */
 #endif
 #endif
 
-enum { SSDGS__PLY_VERTEX = 0, SSDGS__PLY_SETTINGS, SSDGS__PLY_BASIS, SSDGS__PLY_SCATTERING, SSDGS__PLY_SHADOW, SSDGS__PLY_KINDS };
-static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {
-    "vertex", "ssdgs_settings", "asg_basis", "scattering_weight", "shadow_weight"
-};
-
-/* A row is an array of 32-bit words: floats, as bits, or the integers of the settings when they are written. A vertex has the
-   model's planes first, then what only other programs use; settings lie as in their struct; globals at 4 x group. */
 enum {
-    SSDGS__PLY_NORMAL = SSDGS_CHANNELS, SSDGS__PLY_DC = SSDGS_CHANNELS + 3, SSDGS__PLY_RGB = SSDGS_CHANNELS + 6,
+    SSDGS__PLY_VERTEX = 0,
+    SSDGS__PLY_SETTINGS,
+    SSDGS__PLY_BASIS,
+    SSDGS__PLY_SCATTERING,
+    SSDGS__PLY_SHADOW,
+    SSDGS__PLY_KINDS
+};
+static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {"vertex", "ssdgs_settings", "asg_basis",
+                                                               "scattering_weight", "shadow_weight"};
+
+/* A row is an array of 32-bit words: floats, as bits, or the integers of the settings when they are written.
+   A vertex has the model's planes first, then what only other programs use; settings lie as in their struct;
+   globals at 4 x group. */
+enum {
+    SSDGS__PLY_NORMAL = SSDGS_CHANNELS,
+    SSDGS__PLY_DC = SSDGS_CHANNELS + 3,
+    SSDGS__PLY_RGB = SSDGS_CHANNELS + 6,
     SSDGS__PLY_WORDS = SSDGS_CHANNELS + 9
 };
 typedef char ssdgs__ply_settings_fit[sizeof(ssdgs_settings) / sizeof(int) <= SSDGS__PLY_WORDS ? 1 : -1];
@@ -5332,29 +5783,43 @@ typedef struct ssdgs__ply_field {
 
 #define SSDGS__V(stem, count, word) {SSDGS__PLY_VERTEX, stem, count, word, 0},
 #define SSDGS__I(member) {SSDGS__PLY_SETTINGS, #member, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1},
-#define SSDGS__R(stem, count, member) {SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0},
+#define SSDGS__R(stem, count, member) \
+    {SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0},
 #define SSDGS__G(kind, stem, count, group) {kind, stem, count, 4 * group, 0},
-static const ssdgs__ply_field ssdgs__ply_fields[] = { /* in the order of the file; red, green, blue are only read */
-    SSDGS__V("x", 0, SSDGS_POSITION) SSDGS__V("y", 0, SSDGS_POSITION + 1) SSDGS__V("z", 0, SSDGS_POSITION + 2)
-    SSDGS__V("nx", 0, SSDGS__PLY_NORMAL) SSDGS__V("ny", 0, SSDGS__PLY_NORMAL + 1) SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2)
-    SSDGS__V("f_dc_", 3, SSDGS__PLY_DC) SSDGS__V("opacity", 0, SSDGS_OPACITY)
-    SSDGS__V("scale_", 3, SSDGS_LOG_SCALE) SSDGS__V("rot_", 4, SSDGS_ROTATION)
-    SSDGS__V("kd_", 3, SSDGS_DIFFUSE) SSDGS__V("ks_", 3, SSDGS_SPECULAR) SSDGS__V("ksss_", 3, SSDGS_SCATTERING)
-    SSDGS__V("alpha_asg_", SSDGS_ASG_COUNT, SSDGS_ASG_WEIGHT) SSDGS__V("local_q_", 4, SSDGS_FRAME)
-    SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT, SSDGS_MATERIAL)
-    SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2)
-    SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked) SSDGS__I(transfer) SSDGS__I(dipole) SSDGS__I(asg)
-    SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
-    SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(view_octaves) SSDGS__I(light_octaves)
-    SSDGS__I(shadow_layers) SSDGS__I(shadow_width)
-    SSDGS__I(light_blur) SSDGS__I(light_map_size) SSDGS__R("light_bias", 0, light_bias)
-    SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R("eta", 0, eta)
-    SSDGS__R("centre_", 3, centre) SSDGS__R("length_unit", 0, length_unit) SSDGS__R("light_scale", 0, light_scale)
-    SSDGS__R("origin_", 3, origin)
-    SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS) SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS)
-    SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA)
-    SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET) SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)
-};
+static const ssdgs__ply_field ssdgs__ply_fields[] =
+    {/* in the order of the file; red, green, blue are only read */
+     SSDGS__V("x", 0, SSDGS_POSITION) SSDGS__V("y", 0, SSDGS_POSITION + 1)
+         SSDGS__V("z", 0, SSDGS_POSITION + 2) SSDGS__V("nx", 0, SSDGS__PLY_NORMAL) SSDGS__V(
+             "ny", 0, SSDGS__PLY_NORMAL + 1) SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2)
+             SSDGS__V("f_dc_", 3, SSDGS__PLY_DC) SSDGS__V("opacity", 0, SSDGS_OPACITY) SSDGS__V(
+                 "scale_", 3, SSDGS_LOG_SCALE) SSDGS__V("rot_", 4, SSDGS_ROTATION)
+                 SSDGS__V("kd_", 3, SSDGS_DIFFUSE) SSDGS__V("ks_", 3, SSDGS_SPECULAR) SSDGS__V(
+                     "ksss_", 3, SSDGS_SCATTERING) SSDGS__V("alpha_asg_", SSDGS_ASG_COUNT, SSDGS_ASG_WEIGHT)
+                     SSDGS__V("local_q_", 4, SSDGS_FRAME) SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT,
+                                                                   SSDGS_MATERIAL)
+                         SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V(
+                             "blue", 0, SSDGS__PLY_RGB + 2) SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked)
+                             SSDGS__I(transfer) SSDGS__I(dipole)
+                                 SSDGS__I(asg) SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(
+                                     transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
+                                     SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(
+                                         view_octaves) SSDGS__I(light_octaves) SSDGS__I(shadow_layers)
+                                         SSDGS__I(shadow_width) SSDGS__I(light_blur) SSDGS__I(light_map_size)
+                                             SSDGS__R("light_bias", 0, light_bias)
+                                                 SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R(
+                                                     "eta", 0, eta) SSDGS__R("centre_", 3, centre)
+                                                     SSDGS__R("length_unit", 0, length_unit) SSDGS__R(
+                                                         "light_scale", 0, light_scale) SSDGS__R("origin_", 3,
+                                                                                                 origin)
+                                                         SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS)
+                                                             SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2,
+                                                                      SSDGS__ASG_SHARPNESS)
+                                                                 SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0,
+                                                                          SSDGS__ASG_SIGMA)
+                                                                     SSDGS__G(SSDGS__PLY_SCATTERING, "value",
+                                                                              0, SSDGS__SCATTERING_NET)
+                                                                         SSDGS__G(SSDGS__PLY_SHADOW, "value",
+                                                                                  0, SSDGS__SHADOW_NET)};
 #undef SSDGS__V
 #undef SSDGS__I
 #undef SSDGS__R
@@ -5367,7 +5832,8 @@ typedef struct ssdgs__ply_cursor { /* walks an element's properties: zero it, th
 } ssdgs__ply_cursor;
 
 static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
-    const ssdgs__ply_field *const end = ssdgs__ply_fields + sizeof ssdgs__ply_fields / sizeof *ssdgs__ply_fields;
+    const ssdgs__ply_field *const end =
+        ssdgs__ply_fields + sizeof ssdgs__ply_fields / sizeof *ssdgs__ply_fields;
     size_t length;
     if (cursor->field && cursor->index + 1 < cursor->field->count) {
         cursor->index++;
@@ -5380,20 +5846,23 @@ static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
     cursor->word = cursor->field->word + cursor->index;
     length = strlen(cursor->field->stem);
     memcpy(cursor->name, cursor->field->stem, length + 1);
-    if (cursor->field->count) cursor->name[length] = (char)('0' + cursor->index), cursor->name[length + 1] = 0;
+    if (cursor->field->count)
+        cursor->name[length] = (char)('0' + cursor->index), cursor->name[length + 1] = 0;
     return 1;
 }
 
 /* Where a setting lies: an int or a ssdgs_real. */
 static unsigned char *ssdgs__ply_setting(ssdgs_settings *settings, const ssdgs__ply_cursor *cursor) {
-    return (unsigned char *)settings + (size_t)cursor->field->word * sizeof(int) + (size_t)cursor->index * sizeof(ssdgs_real);
+    return (unsigned char *)settings + (size_t)cursor->field->word * sizeof(int) +
+           (size_t)cursor->index * sizeof(ssdgs_real);
 }
 
 /* Where anything else lies. */
 static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const ssdgs__ply_cursor *cursor) {
     const size_t width = cursor->field->count ? (size_t)cursor->field->count : 1;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
-    if (cursor->field->kind == SSDGS__PLY_VERTEX) return model->gaussians + (size_t)cursor->word * model->capacity + row;
+    if (cursor->field->kind == SSDGS__PLY_VERTEX)
+        return model->gaussians + (size_t)cursor->word * model->capacity + row;
     ssdgs__global_groups(&model->settings, first);
     return model->globals + first[cursor->field->word / 4] + row * width + (size_t)cursor->index;
 }
@@ -5401,10 +5870,12 @@ static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const s
 /* Rows of anything but the vertices. */
 static size_t ssdgs__ply_rows(const ssdgs_settings *settings, int kind) {
     if (kind == SSDGS__PLY_SETTINGS) return 1;
-    return kind == SSDGS__PLY_BASIS ? SSDGS_ASG_COUNT : ssdgs__network_count(settings, kind == SSDGS__PLY_SHADOW);
+    return kind == SSDGS__PLY_BASIS ? SSDGS_ASG_COUNT
+                                    : ssdgs__network_count(settings, kind == SSDGS__PLY_SHADOW);
 }
 
-/* The float nearest to x, as bits, which can be tested whatever -ffast-math assumes. Only what is in range is cast. */
+/* The float nearest to x, as bits, which can be tested whatever -ffast-math assumes. Only what is in range is
+   cast. */
 static uint32_t ssdgs__ply_bits(double x) {
     uint64_t wide, size;
     uint32_t bits;
@@ -5413,7 +5884,8 @@ static uint32_t ssdgs__ply_bits(double x) {
     size = wide & UINT64_C(0x7fffffffffffffff);
     bits = (uint32_t)((wide ^ size) >> 32);
     if (size > UINT64_C(0x7ff0000000000000)) return bits | 0x7fc00000u;
-    if (size > UINT64_C(0x47efffffe0000000)) return bits | (size < UINT64_C(0x47effffff0000000) ? 0x7f7fffffu : 0x7f800000u);
+    if (size > UINT64_C(0x47efffffe0000000))
+        return bits | (size < UINT64_C(0x47effffff0000000) ? 0x7f7fffffu : 0x7f800000u);
     single = (float)x;
     memcpy(&bits, &single, sizeof bits);
     return bits;
@@ -5432,18 +5904,33 @@ static int ssdgs__ply_finite(uint32_t bits) { return (bits & 0x7f800000u) != 0x7
 /* ---- reading ---- */
 
 enum { /* limits of a header */
-    SSDGS__PLY_MAX_HEADER = 1 << 20, SSDGS__PLY_MAX_ELEMENTS = 64, SSDGS__PLY_MAX_PROPERTIES = 1024
+       SSDGS__PLY_MAX_HEADER = 1 << 20,
+       SSDGS__PLY_MAX_ELEMENTS = 64,
+       SSDGS__PLY_MAX_PROPERTIES = 1024
 };
-enum { SSDGS__PLY_UINT8 = 1, SSDGS__PLY_UINT16 = 3, SSDGS__PLY_FLOAT32 = 6, SSDGS__PLY_FLOAT64 = 7, SSDGS__PLY_TYPES = 8 }; /* 0, 2, 4 are signed */
+enum {
+    SSDGS__PLY_UINT8 = 1,
+    SSDGS__PLY_UINT16 = 3,
+    SSDGS__PLY_FLOAT32 = 6,
+    SSDGS__PLY_FLOAT64 = 7,
+    SSDGS__PLY_TYPES = 8
+}; /* 0, 2, 4 are signed */
 static const char *const ssdgs__ply_types[SSDGS__PLY_TYPES][2] = {
-    {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"}, {"ushort", "uint16"},
-    {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}
-};
+    {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"},   {"ushort", "uint16"},
+    {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}};
 static const unsigned char ssdgs__ply_sizes[SSDGS__PLY_TYPES] = {1, 1, 2, 2, 4, 4, 4, 8};
 
-typedef enum ssdgs__ply_format { SSDGS__PLY_UNKNOWN = 0, SSDGS__PLY_ASCII, SSDGS__PLY_LITTLE, SSDGS__PLY_BIG } ssdgs__ply_format;
+typedef enum ssdgs__ply_format {
+    SSDGS__PLY_UNKNOWN = 0,
+    SSDGS__PLY_ASCII,
+    SSDGS__PLY_LITTLE,
+    SSDGS__PLY_BIG
+} ssdgs__ply_format;
 
-typedef struct ssdgs__ply_token { const unsigned char *text; size_t length; } ssdgs__ply_token;
+typedef struct ssdgs__ply_token {
+    const unsigned char *text;
+    size_t length;
+} ssdgs__ply_token;
 
 typedef struct ssdgs__ply_property {
     ssdgs__ply_token name;
@@ -5454,10 +5941,10 @@ typedef struct ssdgs__ply_property {
 typedef struct ssdgs__ply_element {
     ssdgs__ply_token name;
     size_t count;
-    int kind;                  /* -1 = skipped */
-    int first, properties;     /* in ssdgs__ply.properties */
-    int lists;                 /* 1: some are lists */
-    uint64_t present;          /* words that the properties give */
+    int kind;              /* -1 = skipped */
+    int first, properties; /* in ssdgs__ply.properties */
+    int lists;             /* 1: some are lists */
+    uint64_t present;      /* words that the properties give */
     const unsigned char *data;
 } ssdgs__ply_element;
 
@@ -5465,7 +5952,7 @@ typedef struct ssdgs__ply {
     ssdgs_context *context;
     const char *name; /* of the file, for messages */
     const unsigned char *begin, *at, *end;
-    double origin[3]; /* to be taken from positions */
+    double origin[3];  /* to be taken from positions */
     double color_unit; /* of red, green and blue: by their type */
     ssdgs__ply_format format;
     int newline, line, element_count, property_count;
@@ -5505,8 +5992,8 @@ static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
     return token.length > 0;
 }
 
-/* A decimal number, nan or inf, whatever the locale. Seventeen digits count; powers of ten are exact, so the error stays near
-   1e-16. */
+/* A decimal number, nan or inf, whatever the locale. Seventeen digits count; powers of ten are exact, so the
+   error stays near 1e-16. */
 static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
     static const char *const words[3] = {"nan", "inf", "infinity"};
     const unsigned char *p = token.text, *const end = p + token.length;
@@ -5553,14 +6040,16 @@ static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
     return p == end;
 }
 
-/* The next header line, split at blanks: the number of tokens found (at most 6), -1 when the header does not go on. */
+/* The next header line, split at blanks: the number of tokens found (at most 6), -1 when the header does not
+   go on. */
 static int ssdgs__ply_line(ssdgs__ply *ply, ssdgs__ply_token tokens[6]) {
     const unsigned char *p = ply->at, *line = p, *end = ply->end;
     int count = 0;
     if (end - ply->begin > SSDGS__PLY_MAX_HEADER) end = ply->begin + SSDGS__PLY_MAX_HEADER;
     while (p < end && *p != ply->newline && (ply->newline || (*p != '\r' && *p != '\n'))) p++;
     if (p == end) return -1;
-    if (!ply->newline) { /* the first line decides between CR, LF and CRLF: a CR must not swallow a data byte 10 */
+    if (!ply->newline) { /* the first line decides between CR, LF and CRLF: a CR must not swallow a data byte
+                            10 */
         if (*p == '\r' && p + 1 < end && p[1] == '\n') p++;
         ply->newline = *p;
     }
@@ -5571,13 +6060,16 @@ static int ssdgs__ply_line(ssdgs__ply *ply, ssdgs__ply_token tokens[6]) {
 }
 
 static ssdgs_result ssdgs__ply_refuse(const ssdgs__ply *ply, const char *text) {
-    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: PLY header, line %d: %s", ply->name, ply->line, text);
+    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: PLY header, line %d: %s", ply->name, ply->line,
+                       text);
 }
 
 static int ssdgs__ply_type(ssdgs__ply_token token) {
     int type = SSDGS__PLY_TYPES - 1;
     for (; type >= 0; type--)
-        if (ssdgs__ply_is(token, ssdgs__ply_types[type][0]) || ssdgs__ply_is(token, ssdgs__ply_types[type][1])) break;
+        if (ssdgs__ply_is(token, ssdgs__ply_types[type][0]) ||
+            ssdgs__ply_is(token, ssdgs__ply_types[type][1]))
+            break;
     return type;
 }
 
@@ -5586,12 +6078,15 @@ static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_tok
     int i;
     if (ply->element_count == SSDGS__PLY_MAX_ELEMENTS) return ssdgs__ply_refuse(ply, "more than 64 elements");
     element->name = tokens[1];
-    if (!ssdgs__ply_count(tokens[2], &element->count)) return ssdgs__ply_refuse(ply, "the count is not a number");
+    if (!ssdgs__ply_count(tokens[2], &element->count))
+        return ssdgs__ply_refuse(ply, "the count is not a number");
     for (i = 0; i < ply->element_count; i++)
-        if (ssdgs__ply_same(ply->elements[i].name, element->name)) return ssdgs__ply_refuse(ply, "the second of its name");
+        if (ssdgs__ply_same(ply->elements[i].name, element->name))
+            return ssdgs__ply_refuse(ply, "the second of its name");
     element->first = ply->property_count;
     element->kind = SSDGS__PLY_KINDS - 1;
-    while (element->kind >= 0 && !ssdgs__ply_is(element->name, ssdgs__ply_kinds[element->kind])) element->kind--;
+    while (element->kind >= 0 && !ssdgs__ply_is(element->name, ssdgs__ply_kinds[element->kind]))
+        element->kind--;
     if (element->kind >= 0) ply->known[element->kind] = element;
     ply->element_count++;
     return SSDGS_OK;
@@ -5603,20 +6098,27 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
     ssdgs__ply_cursor cursor;
     int i;
     if (ply->element_count == 0) return ssdgs__ply_refuse(ply, "a property before any element");
-    if (ply->property_count == SSDGS__PLY_MAX_PROPERTIES) return ssdgs__ply_refuse(ply, "more than 1024 properties");
+    if (ply->property_count == SSDGS__PLY_MAX_PROPERTIES)
+        return ssdgs__ply_refuse(ply, "more than 1024 properties");
     property->name = tokens[list ? 4 : 2];
     property->type = ssdgs__ply_type(tokens[list ? 3 : 1]);
     property->list = list ? ssdgs__ply_type(tokens[2]) : -1;
     property->word = -1;
     if (property->type < 0 || (list && property->list < 0)) return ssdgs__ply_refuse(ply, "unknown type");
-    if (property->list >= SSDGS__PLY_FLOAT32) return ssdgs__ply_refuse(ply, "a list's count must be an integer");
+    if (property->list >= SSDGS__PLY_FLOAT32)
+        return ssdgs__ply_refuse(ply, "a list's count must be an integer");
     for (i = element->first; i < ply->property_count; i++)
-        if (ssdgs__ply_same(ply->properties[i].name, property->name)) return ssdgs__ply_refuse(ply, "the second of its name");
+        if (ssdgs__ply_same(ply->properties[i].name, property->name))
+            return ssdgs__ply_refuse(ply, "the second of its name");
     for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
         if (!ssdgs__ply_is(property->name, cursor.name)) continue;
         if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB) {
-            if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 && property->type != SSDGS__PLY_UINT16) continue;
-            ply->color_unit = property->type == SSDGS__PLY_UINT8 ? 255 : property->type == SSDGS__PLY_UINT16 ? 65535 : 1;
+            if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 &&
+                property->type != SSDGS__PLY_UINT16)
+                continue;
+            ply->color_unit = property->type == SSDGS__PLY_UINT8    ? 255
+                              : property->type == SSDGS__PLY_UINT16 ? 65535
+                                                                    : 1;
         }
         property->word = cursor.word;
         element->present |= (uint64_t)1 << cursor.word;
@@ -5634,14 +6136,17 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: not a PLY file", ply->name);
     while (result == SSDGS_OK) {
         const int count = ssdgs__ply_line(ply, tokens);
-        if (count < 0) return ssdgs__ply_refuse(ply, ply->end - ply->begin > SSDGS__PLY_MAX_HEADER
-                                                         ? "the header's end does not follow within 1 MiB" : "the file ends within the header");
+        if (count < 0)
+            return ssdgs__ply_refuse(ply, ply->end - ply->begin > SSDGS__PLY_MAX_HEADER
+                                              ? "the header's end does not follow within 1 MiB"
+                                              : "the file ends within the header");
         if (count && (ssdgs__ply_is(tokens[0], "comment") || ssdgs__ply_is(tokens[0], "obj_info"))) continue;
         if (count == 3 && ssdgs__ply_is(tokens[0], "format") && ply->format == SSDGS__PLY_UNKNOWN) {
             if (ssdgs__ply_is(tokens[1], "ascii")) ply->format = SSDGS__PLY_ASCII;
             if (ssdgs__ply_is(tokens[1], "binary_little_endian")) ply->format = SSDGS__PLY_LITTLE;
             if (ssdgs__ply_is(tokens[1], "binary_big_endian")) ply->format = SSDGS__PLY_BIG;
-            if (!ply->format || !ssdgs__ply_is(tokens[2], "1.0")) return ssdgs__ply_refuse(ply, "unknown format");
+            if (!ply->format || !ssdgs__ply_is(tokens[2], "1.0"))
+                return ssdgs__ply_refuse(ply, "unknown format");
         } else if (count == 3 && ssdgs__ply_is(tokens[0], "element")) {
             result = ssdgs__ply_add_element(ply, tokens);
         } else if (count == 5 && ssdgs__ply_is(tokens[0], "property") && ssdgs__ply_is(tokens[1], "list")) {
@@ -5657,8 +6162,8 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
     return result;
 }
 
-/* One number less an origin as float bits, or the count of a list; neither = step over it. 0 when the file ends or holds something
-   else. */
+/* One number less an origin as float bits, or the count of a list; neither = step over it. 0 when the file
+   ends or holds something else. */
 static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t *bits, size_t *count) {
     const int size = ssdgs__ply_sizes[type], moved = origin < 0 || origin > 0;
     uint64_t raw = 0, negative;
@@ -5698,12 +6203,14 @@ static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, ui
         size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
         if (property->list < 0) {
             const int wanted = words && property->word >= 0;
-            const int position = wanted && element->kind == SSDGS__PLY_VERTEX && property->word < SSDGS_ROTATION;
+            const int position =
+                wanted && element->kind == SSDGS__PLY_VERTEX && property->word < SSDGS_ROTATION;
             good = ssdgs__ply_scalar(ply, property->type, position ? ply->origin[property->word] : 0,
                                      wanted ? &words[property->word] : NULL, NULL);
             continue;
         }
-        good = ssdgs__ply_scalar(ply, property->list, 0, NULL, &count) && count <= (size_t)(ply->end - ply->at) / size;
+        good = ssdgs__ply_scalar(ply, property->list, 0, NULL, &count) &&
+               count <= (size_t)(ply->end - ply->at) / size;
         for (; good && count; count--) good = ssdgs__ply_scalar(ply, property->type, 0, NULL, NULL);
     }
     return good;
@@ -5717,7 +6224,7 @@ static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
         ssdgs__ply_element *element = ply->elements + e;
         const ssdgs__ply_property *property = ply->properties + element->first;
         const size_t left = (size_t)(ply->end - ply->at) + (size_t)ascii; /* the last line may lack its end */
-        size_t least = 0, row; /* bytes of a row */
+        size_t least = 0, row;                                            /* bytes of a row */
         int fits;
         for (i = 0; i < element->properties; i++, property++)
             least += ascii ? 2 : ssdgs__ply_sizes[property->list < 0 ? property->type : property->list];
@@ -5725,9 +6232,12 @@ static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
         if (!least) continue;
         fits = element->count <= left / least;
         if (fits && !ascii && !element->lists) ply->at += element->count * least;
-        else for (row = 0; fits && row < element->count; row++) fits = ssdgs__ply_row(ply, element, NULL);
-        if (!fits) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %d of %d is cut short or has a broken list",
-                                      ply->name, e + 1, ply->element_count);
+        else
+            for (row = 0; fits && row < element->count; row++) fits = ssdgs__ply_row(ply, element, NULL);
+        if (!fits)
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
+                               "%s: element %d of %d is cut short or has a broken list", ply->name, e + 1,
+                               ply->element_count);
     }
     return SSDGS_OK;
 }
@@ -5737,9 +6247,12 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s", ply->name,
-                               ssdgs__ply_kinds[kind], cursor.name, kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
-                               cursor.word <= SSDGS_OPACITY ? ": these are no Gaussian splats, but a point cloud or a mesh" : "");
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
+                               ply->name, ssdgs__ply_kinds[kind], cursor.name,
+                               kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
+                                       cursor.word <= SSDGS_OPACITY
+                                   ? ": these are no Gaussian splats, but a point cloud or a mesh"
+                                   : "");
     }
     return SSDGS_OK;
 }
@@ -5750,11 +6263,16 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     ssdgs_result result;
     uint32_t words[SSDGS__PLY_WORDS];
     enum { ADDED = 7 };
-    static const struct { size_t at; int index; double before; } added[ADDED] = { /* settings of later files, and what held before them */
-        {offsetof(ssdgs_settings, transport), 0, 0}, {offsetof(ssdgs_settings, view_octaves), 0, 4},
+    static const struct {
+        size_t at;
+        int index;
+        double before;
+    } added[ADDED] = {
+        /* settings of later files, and what held before them */
+        {offsetof(ssdgs_settings, transport), 0, 0},     {offsetof(ssdgs_settings, view_octaves), 0, 4},
         {offsetof(ssdgs_settings, light_octaves), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
-        {offsetof(ssdgs_settings, origin), 0, 0}, {offsetof(ssdgs_settings, origin), 1, 0}, {offsetof(ssdgs_settings, origin), 2, 0}
-    };
+        {offsetof(ssdgs_settings, origin), 0, 0},        {offsetof(ssdgs_settings, origin), 1, 0},
+        {offsetof(ssdgs_settings, origin), 2, 0}};
     int i, next = 0;
     memset(words, 0, sizeof words);
     for (i = 0; i <= ADDED; i++) {
@@ -5766,19 +6284,23 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     }
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
-        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers", ply->name);
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers",
+                           ply->name);
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
         const double value = ssdgs__ply_value(words[cursor.word]);
         const ssdgs_real real = (ssdgs_real)value;
         int integer;
-        if (!ssdgs__ply_finite(words[cursor.word]) || (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s makes no sense", ply->name, cursor.name);
+        if (!ssdgs__ply_finite(words[cursor.word]) ||
+            (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s makes no sense", ply->name,
+                               cursor.name);
         integer = cursor.field->integer ? (int)value : 0;
         if (cursor.field->integer) memcpy(ssdgs__ply_setting(settings, &cursor), &integer, sizeof integer);
         else memcpy(ssdgs__ply_setting(settings, &cursor), &real, sizeof real);
     }
     if (settings->version < 1 || settings->version > SSDGS_VERSION)
-        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name, settings->version);
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name,
+                           settings->version);
     settings->version = SSDGS_VERSION;
     ply->context->subject = ply->name;
     ply->context->subject_number = -1;
@@ -5796,12 +6318,14 @@ static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
     return ssdgs__ply_bits(color > 20 ? color : log(expm1(color)));
 }
 
-/* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite, infinity, NaN. */
+/* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite,
+   infinity, NaN. */
 static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
     const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, twenty = 0x41a00000u, one = 0x3f800000u;
     int i, k;
     for (i = 0; i < planes; i++) {
-        const int clamped = i >= SSDGS_LOG_SCALE && i <= SSDGS_OPACITY; /* scales and opacity may be infinite */
+        const int clamped =
+            i >= SSDGS_LOG_SCALE && i <= SSDGS_OPACITY; /* scales and opacity may be infinite */
         if ((words[i] & ~sign) >= infinity + (uint32_t)clamped) return stats->dropped++, 0;
     }
     for (i = SSDGS_LOG_SCALE; i <= SSDGS_OPACITY; i++) {
@@ -5823,10 +6347,12 @@ static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats)
 }
 
 /* Fills the model's arrays from an element's rows. */
-static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model *model, ssdgs_load_stats *stats) {
+static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model *model,
+                                         ssdgs_load_stats *stats) {
     static const char bad[] = "%s: %s %z is not %s";
     ssdgs__ply_element *element = ply->known[kind];
-    const int dc = (int)(element->present >> SSDGS__PLY_DC & 1), plain = kind == SSDGS__PLY_VERTEX && stats->plain;
+    const int dc = (int)(element->present >> SSDGS__PLY_DC & 1),
+              plain = kind == SSDGS__PLY_VERTEX && stats->plain;
     size_t row, kept = 0;
     ply->at = element->data;
     if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
@@ -5835,14 +6361,19 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
         ssdgs__ply_cursor cursor;
         int i;
         if (!ssdgs__ply_row(ply, element, words))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row, "a number");
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row,
+                               "a number");
         for (i = 0; i < 3 && plain; i++)
-            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit);
-        if (kind == SSDGS__PLY_VERTEX && !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats)) continue;
+            words[SSDGS_DIFFUSE + i] =
+                ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit);
+        if (kind == SSDGS__PLY_VERTEX &&
+            !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats))
+            continue;
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
             if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
             if (!ssdgs__ply_finite(words[cursor.word]))
-                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row, "finite");
+                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind],
+                                   row, "finite");
             *ssdgs__ply_cell(model, kept, &cursor) = (ssdgs_real)ssdgs__ply_value(words[cursor.word]);
         }
         kept++;
@@ -5851,7 +6382,8 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     return SSDGS_OK;
 }
 
-/* An origin for doubles of others that lie a thousand times their box away from 0, where floats of them would be coarse. */
+/* An origin for doubles of others that lie a thousand times their box away from 0, where floats of them would
+   be coarse. */
 static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
@@ -5872,14 +6404,17 @@ static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
             high[i] = x > high[i] ? x : high[i];
         }
     }
-    for (i = 0; i < 3 && row && doubles == 3; i++) far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
+    for (i = 0; i < 3 && row && doubles == 3; i++)
+        far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
     for (i = 0; i < 3 && far_away; i++)
-        ply->origin[i] = (double)(settings->origin[i] = (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
+        ply->origin[i] = (double)(settings->origin[i] =
+                                      (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
 }
 
 static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
     int i;
-    for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name); i++) {}
+    for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name);
+         i++) {}
     return i < element->properties;
 }
 
@@ -5894,11 +6429,14 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     vertex = ply->known[SSDGS__PLY_VERTEX];
     if (!vertex) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: no element vertex", ply->name);
     if (vertex->count > SSDGS__MAX_GAUSSIANS)
-        return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name, vertex->count);
+        return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name,
+                           vertex->count);
 
     if (ssdgs__ply_has(ply, vertex, "packed_position"))
-        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: a compressed PLY (packed_position): convert it to a plain one, with "
-                           "splat-transform say", ply->name);
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
+                           "%s: a compressed PLY (packed_position): convert it to a plain one, with "
+                           "splat-transform say",
+                           ply->name);
 
     ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
     stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
@@ -5910,41 +6448,54 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
         settings.pixel_variance = (ssdgs_real)0.3; /* as other programs trained it */
-        color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1) ? SSDGS__PLY_DC : SSDGS__PLY_RGB;
+        color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1)
+                    ? SSDGS__PLY_DC
+                    : SSDGS__PLY_RGB;
         result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, color, color + 3);
     } else { /* the published implementation keeps the rest elsewhere */
         settings = ssdgs_settings_published();
     }
-    if (!result) result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
+    if (!result)
+        result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
     if (!result && !ours) ssdgs__ply_find_origin(ply, &settings);
     for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
-        const size_t expected = ssdgs__ply_rows(&settings, kind), rows = ply->known[kind] ? ply->known[kind]->count : 0;
+        const size_t expected = ssdgs__ply_rows(&settings, kind),
+                     rows = ply->known[kind] ? ply->known[kind]->count : 0;
         if (rows != expected && (ours || ply->known[kind]))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s has %z rows, the settings need %z%s", ply->name,
-                               ssdgs__ply_kinds[kind], rows, expected, ply->known[kind] ? "" : ": has another program dropped it?");
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
+                               "%s: element %s has %z rows, the settings need %z%s", ply->name,
+                               ssdgs__ply_kinds[kind], rows, expected,
+                               ply->known[kind] ? "" : ": has another program dropped it?");
         if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
     }
     if (!result) result = ssdgs__model_create(ply->context, &settings, (int)vertex->count, out);
     for (kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
-        if (kind != SSDGS__PLY_SETTINGS && ply->known[kind]) result = ssdgs__ply_read_rows(ply, kind, *out, stats);
+        if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
+            result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     return result;
 }
 
 /* Notes what a model will not do that its user may expect. */
 static void ssdgs__ply_tell(const ssdgs_model *model, const char *name, const ssdgs_load_stats *stats) {
     ssdgs_context *context = model->context;
-    if (stats->dropped) ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite", name,
-                                    stats->dropped, stats->dropped + model->count);
+    if (stats->dropped)
+        ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite",
+                    name, stats->dropped, stats->dropped + model->count);
     if (!model->count) ssdgs__note(context, "%s: holds no Gaussians: its pictures are empty", name);
     else if (model->settings.baked)
-        ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing", name);
+        ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing",
+                    name);
     if (stats->untrained)
-        ssdgs__note(context, "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it is not drawn as it "
-                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the original file", name);
+        ssdgs__note(context,
+                    "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it "
+                    "is not drawn as it "
+                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the "
+                    "original file",
+                    name);
 }
 
-static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size, ssdgs_model **out,
-                                    ssdgs_load_stats *stats) {
+static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size,
+                                    ssdgs_model **out, ssdgs_load_stats *stats) {
     ssdgs_load_stats own;
     ssdgs_result result = SSDGS_ERR_MEMORY;
     ssdgs__ply *ply = (ssdgs__ply *)ssdgs__allocate(context, sizeof *ply);
@@ -5970,8 +6521,8 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size, ssdgs_model **out,
-                                               ssdgs_load_stats *stats) {
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size,
+                                               ssdgs_model **out, ssdgs_load_stats *stats) {
     ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
@@ -5985,7 +6536,8 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
 
 #ifndef SSDGS_NO_STDIO
 
-/* What is no regular file is not read, since that may never end, and not replaced: a folder, a device, a pipe. */
+/* What is no regular file is not read, since that may never end, and not replaced: a folder, a device, a
+   pipe. */
 static int ssdgs__irregular(const char *path) {
 #ifdef _WIN32
     const DWORD kind = GetFileAttributesA(path);
@@ -5997,7 +6549,8 @@ static int ssdgs__irregular(const char *path) {
 }
 
 /* Reads a whole file in pieces; what the system says of its size is a hint. */
-static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes, size_t *size) {
+static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes,
+                                     size_t *size) {
     const uint64_t limit = (uint64_t)8 << 30;
     unsigned char *buffer = NULL, *larger;
     size_t room = 0, used = 0;
@@ -6026,7 +6579,8 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
             used += fread(buffer + used, 1, room - used, file);
         }
     }
-    if (!result && ferror(file)) result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be read (errno %d)", path, errno);
+    if (!result && ferror(file))
+        result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be read (errno %d)", path, errno);
     fclose(file);
     if (result) {
         ssdgs__release(context, buffer);
@@ -6037,7 +6591,8 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out, ssdgs_load_stats *stats) {
+SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
+                                        ssdgs_load_stats *stats) {
     unsigned char *bytes = NULL;
     size_t size;
     ssdgs_result result;
@@ -6061,7 +6616,8 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
 #define SSDGS__SYNC(file) _commit(file)
 #define SSDGS__CLOSE(file) _close(file)
 #define SSDGS__UNLINK(path) _unlink(path)
-#define SSDGS__RENAME(from, to) (MoveFileExA(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) ? 0 : -1)
+#define SSDGS__RENAME(from, to) \
+    (MoveFileExA(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) ? 0 : -1)
 #define SSDGS__PROCESS() ((unsigned long)_getpid())
 #else
 #define SSDGS__OPEN_NEW(path) open(path, O_WRONLY | O_CREAT | O_EXCL, 0666)
@@ -6093,26 +6649,32 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     writer->context = context;
     writer->path = path;
     writer->file = -1;
-    if (ssdgs__irregular(path)) return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
+    if (ssdgs__irregular(path))
+        return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
     writer->temporary = (char *)ssdgs__allocate(context, room + SSDGS__WRITER_BUFFER);
     if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
     writer->buffer = (unsigned char *)writer->temporary + room;
     errno = EEXIST;
-    for (attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST; attempt++) { /* a crash may have left that name */
-        snprintf(writer->temporary, room, "%s.tmp.%lx.%lx.%d", path, SSDGS__PROCESS(), (unsigned long)(size_t)context, attempt);
+    for (attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST;
+         attempt++) { /* a crash may have left that name */
+        snprintf(writer->temporary, room, "%s.tmp.%lx.%lx.%d", path, SSDGS__PROCESS(),
+                 (unsigned long)(size_t)context, attempt);
         writer->file = SSDGS__OPEN_NEW(writer->temporary);
     }
-    if (writer->file < 0) writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be created (errno %d)", path, errno);
+    if (writer->file < 0)
+        writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be created (errno %d)", path, errno);
     return writer->result;
 }
 
 static void ssdgs__writer_flush(ssdgs__writer *writer) {
     size_t done = 0;
     while (!writer->result && done < writer->used) {
-        const ptrdiff_t wrote = (ptrdiff_t)SSDGS__WRITE(writer->file, writer->buffer + done, writer->used - done);
+        const ptrdiff_t wrote =
+            (ptrdiff_t)SSDGS__WRITE(writer->file, writer->buffer + done, writer->used - done);
         if (wrote > 0) done += (size_t)wrote;
         else if (wrote == 0 || errno != EINTR)
-            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be written (errno %d)", writer->path, errno);
+            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be written (errno %d)",
+                                         writer->path, errno);
     }
     writer->used = 0;
 }
@@ -6134,10 +6696,12 @@ static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
     if (writer->file >= 0) {
         int failed;
         ssdgs__writer_flush(writer);
-        failed = !writer->result && SSDGS__SYNC(writer->file) != 0 && errno != EINVAL; /* some file systems cannot */
+        failed = !writer->result && SSDGS__SYNC(writer->file) != 0 &&
+                 errno != EINVAL; /* some file systems cannot */
         failed |= SSDGS__CLOSE(writer->file) != 0;
         if (!writer->result && (failed || SSDGS__RENAME(writer->temporary, writer->path) != 0))
-            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be finished (errno %d)", writer->path, errno);
+            writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be finished (errno %d)",
+                                         writer->path, errno);
         if (writer->result) SSDGS__UNLINK(writer->temporary);
 #ifndef _WIN32
         else { /* the new name should survive a power cut too; no harm if that cannot be had */
@@ -6155,7 +6719,9 @@ static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
     return writer->result;
 }
 
-static void ssdgs__writer_text(ssdgs__writer *writer, const char *text) { ssdgs__writer_put(writer, text, strlen(text)); }
+static void ssdgs__writer_text(ssdgs__writer *writer, const char *text) {
+    ssdgs__writer_put(writer, text, strlen(text));
+}
 
 static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
     unsigned char bytes[4];
@@ -6172,8 +6738,9 @@ static int ssdgs__has_origin(const ssdgs_settings *s) {
 
 static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)raw : log1p(exp((double)raw)); }
 
-/* What other programs show: the normal, and as f_dc the look under a training set's average light. That light is 1 at the
-   object and comes from anywhere above the surface: c_d / pi x 1/2, and c_sss x 0.02, a typical f_sss. */
+/* What other programs show: the normal, and as f_dc the look under a training set's average light. That light
+   is 1 at the object and comes from anywhere above the surface: c_d / pi x 1/2, and c_sss x 0.02, a typical
+   f_sss. */
 static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *words) {
     const ssdgs_settings *settings = &model->settings;
     const ssdgs_real *gaussian = model->gaussians + row;
@@ -6191,8 +6758,10 @@ static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *word
     for (i = 0; i < 3; i++) {
         const double diffuse = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_DIFFUSE + i) * stride]);
         const double scattering = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_SCATTERING + i) * stride]);
-        double color = settings->baked ? diffuse : (settings->terms & SSDGS_DIFFUSE_TERM ? diffuse * 0.15915494309189535 : 0) +
-                                                   (settings->terms & SSDGS_SCATTERING_TERM ? scattering * 0.02 : 0);
+        double color = settings->baked
+                           ? diffuse
+                           : (settings->terms & SSDGS_DIFFUSE_TERM ? diffuse * 0.15915494309189535 : 0) +
+                                 (settings->terms & SSDGS_SCATTERING_TERM ? scattering * 0.02 : 0);
         if (settings->transfer == SSDGS_TRANSFER_SRGB) color = (double)ssdgs_srgb_encode((ssdgs_real)color);
         words[SSDGS__PLY_DC + i] = ssdgs__ply_bits((color - 0.5) / SSDGS__PLY_HARMONIC);
     }
@@ -6246,19 +6815,24 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
     for (kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
-        rows[kind] = kind == SSDGS__PLY_VERTEX ? (size_t)model->count : ssdgs__ply_rows(&model->settings, kind);
+        rows[kind] =
+            kind == SSDGS__PLY_VERTEX ? (size_t)model->count : ssdgs__ply_rows(&model->settings, kind);
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
             const int position = kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION;
-            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int"
-                     : position && ssdgs__has_origin(&model->settings) ? "double" : "float", cursor.name);
+            snprintf(line, sizeof line, "property %s %s\n",
+                     cursor.field->integer                             ? "int"
+                     : position && ssdgs__has_origin(&model->settings) ? "double"
+                                                                       : "float",
+                     cursor.name);
             ssdgs__writer_text(&writer, line);
         }
     }
     ssdgs__writer_text(&writer, "end_header\n");
     for (kind = 0; kind < SSDGS__PLY_KINDS; kind++)
-        for (row = 0; row < rows[kind] && !writer.result; row++) ssdgs__ply_write_row(model, kind, row, &writer);
+        for (row = 0; row < rows[kind] && !writer.result; row++)
+            ssdgs__ply_write_row(model, kind, row, &writer);
     return ssdgs__writer_close(&writer);
 }
 
@@ -6273,14 +6847,17 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
 #ifndef SSDGS_NO_TRAINER
 /* ==== >>trainer  schedule, one photograph forward and backward, Adam ==== */
 
-static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {SSDGS_POSITION, SSDGS_ROTATION, SSDGS_LOG_SCALE, SSDGS_OPACITY,
-    SSDGS_DIFFUSE, SSDGS_SPECULAR, SSDGS_SCATTERING, SSDGS_FRAME, SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
-static const char *const ssdgs__group_names[SSDGS__GROUPS] = {"position", "rotation", "log scale", "opacity", "diffuse colour",
-    "specular colour",
-    "scattering colour", "shading frame", "ASG weight", "material", "ASG basis", "ASG sharpness", "ASG sigma",
-        "scattering network", "shadow network"};
+static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {
+    SSDGS_POSITION,   SSDGS_ROTATION, SSDGS_LOG_SCALE,  SSDGS_OPACITY,  SSDGS_DIFFUSE, SSDGS_SPECULAR,
+    SSDGS_SCATTERING, SSDGS_FRAME,    SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
+static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
+    "position",       "rotation",           "log scale",         "opacity",
+    "diffuse colour", "specular colour",    "scattering colour", "shading frame",
+    "ASG weight",     "material",           "ASG basis",         "ASG sharpness",
+    "ASG sigma",      "scattering network", "shadow network"};
 
-/* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light shift. */
+/* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light
+   shift. */
 typedef struct ssdgs__correction {
     double value[9], mean[9], square[9];
     int steps[2]; /* Adam's clocks of the camera, of the light */
@@ -6289,29 +6866,31 @@ typedef struct ssdgs__correction {
 struct ssdgs_trainer {
     ssdgs_context *context;
     ssdgs_model *model;
-    uint64_t arrangement;     /* the model's, that the planes below belong to */
+    uint64_t arrangement; /* the model's, that the planes below belong to */
     ssdgs_train_options options;
     ssdgs_photo *photos;
     ssdgs__correction *corrections;
-    unsigned char *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
-    ssdgs_real *magnify;        /* per photograph: what makes up for an object small in the picture, 1 for others */
+    unsigned char
+        *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
+    ssdgs_real *magnify; /* per photograph: what makes up for an object small in the picture, 1 for others */
     int photo_count;
-    uint32_t *order;          /* the photographs in this pass's order */
-    size_t stride;            /* of the planes below: the model's capacity */
+    uint32_t *order;           /* the photographs in this pass's order */
+    size_t stride;             /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
-    ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly it was seen */
+    ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly
+                                    it was seen */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
-    double extent;            /* 1.1 x the cameras' radius */
-    int outlines;             /* photographs show where the object ends */
-    int backdrop, filled;     /* they do not, but show options.background around it; or surfaces, everywhere */
-    double unit;              /* the bounds' longest side */
-    double start_size;        /* of random points, 0 without */
+    double extent;        /* 1.1 x the cameras' radius */
+    int outlines;         /* photographs show where the object ends */
+    int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
+    double unit;          /* the bounds' longest side */
+    double start_size;    /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
-    int running;              /* in ssdgs_trainer_run() */
+    int running; /* in ssdgs_trainer_run() */
 };
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
@@ -6377,9 +6956,11 @@ static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) 
     return o->iterations < 60000 ? iteration * (60000.0 / o->iterations) : (double)iteration;
 }
 
-/* Terms in use at time t, and per group whether it learns. Deferred lobes have no basis that could be frozen. */
+/* Terms in use at time t, and per group whether it learns. Deferred lobes have no basis that could be
+   frozen. */
 static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int learns[SSDGS__GROUPS]) {
-    double scattering = 9e3, specular = 16e3, freeze_scattering = 13e3, thaw_scattering = 20e3, thaw_asg = 20e3;
+    double scattering = 9e3, specular = 16e3, freeze_scattering = 13e3, thaw_scattering = 20e3,
+           thaw_asg = 20e3;
     int terms = SSDGS_DIFFUSE_TERM, i;
     const int joint = o->schedule == SSDGS_SCHEDULE_JOINT, merged = o->schedule == SSDGS_SCHEDULE_MERGED;
     if (o->schedule == SSDGS_SCHEDULE_SWAPPED) {
@@ -6409,23 +6990,25 @@ static int ssdgs__resets(const ssdgs_train_options *o, int iteration) {
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
     const double x = t < from ? 0 : t > from + over ? 1 : (t - from) / over;
     return rate.start > 0 && rate.end > 0 ? exp(log((double)rate.start) * (1 - x) + log((double)rate.end) * x)
-        : (double)rate.start * (1 - x) + (double)rate.end * x;
+                                          : (double)rate.start * (1 - x) + (double)rate.end * x;
 }
 
 static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double t) {
     const ssdgs_train_options *o = &trainer->options;
     const double whole = o->iterations > 60000 ? o->iterations : 60e3;
     switch (group) {
-        case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->position, 0, whole, t);
-        case SSDGS__G_ROTATION: return ssdgs__decay(o->rotation, 0, whole, t);
-        case SSDGS__G_SCALE: return ssdgs__decay(o->scale, 0, whole, t);
-        case SSDGS__G_OPACITY: return ssdgs__decay(o->opacity, 0, whole, t);
-        case SSDGS__G_DIFFUSE: case SSDGS__G_SPECULAR: case SSDGS__G_SCATTERING: return ssdgs__decay(o->color, 0, whole, t);
-        case SSDGS__G_FRAME: return ssdgs__decay(o->frame, 40e3, 50e3, t);
-        case SSDGS__G_MATERIAL: return ssdgs__decay(o->material, 50e3, 50e3, t);
-        case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return ssdgs__decay(o->scattering, 50e3, 50e3, t);
-        case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return ssdgs__decay(o->shadow, 50e3, 50e3, t);
-        default: return ssdgs__decay(o->asg, 40e3, 50e3, t);
+    case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->position, 0, whole, t);
+    case SSDGS__G_ROTATION: return ssdgs__decay(o->rotation, 0, whole, t);
+    case SSDGS__G_SCALE: return ssdgs__decay(o->scale, 0, whole, t);
+    case SSDGS__G_OPACITY: return ssdgs__decay(o->opacity, 0, whole, t);
+    case SSDGS__G_DIFFUSE:
+    case SSDGS__G_SPECULAR:
+    case SSDGS__G_SCATTERING: return ssdgs__decay(o->color, 0, whole, t);
+    case SSDGS__G_FRAME: return ssdgs__decay(o->frame, 40e3, 50e3, t);
+    case SSDGS__G_MATERIAL: return ssdgs__decay(o->material, 50e3, 50e3, t);
+    case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return ssdgs__decay(o->scattering, 50e3, 50e3, t);
+    case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return ssdgs__decay(o->shadow, 50e3, 50e3, t);
+    default: return ssdgs__decay(o->asg, 40e3, 50e3, t);
     }
 }
 
@@ -6434,20 +7017,23 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
 /* A stored value, 3: alpha. */
 static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, size_t pixel, int c) {
     return photo->format == SSDGS_PIXELS_RGBA8
-        ? (ssdgs_real)(1.0 / 255) * (ssdgs_real)((const uint8_t *)photo->pixels)[4 * pixel + (size_t)c]
-        : (ssdgs_real)(1.0 / 65535) * (ssdgs_real)((const uint16_t *)photo->pixels)[4 * pixel + (size_t)c];
+               ? (ssdgs_real)(1.0 / 255) * (ssdgs_real)((const uint8_t *)photo->pixels)[4 * pixel + (size_t)c]
+               : (ssdgs_real)(1.0 / 65535) *
+                     (ssdgs_real)((const uint16_t *)photo->pixels)[4 * pixel + (size_t)c];
 }
 
 /* A pixel's stored values on the background. */
-static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real background[3], size_t pixel, ssdgs_real value[3]) {
+static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real background[3], size_t pixel,
+                               ssdgs_real value[3]) {
     const ssdgs_real alpha = ssdgs__photo_value(photo, pixel, 3);
     int c;
-    for (c = 0; c < 3; c++) value[c] = alpha * ssdgs__photo_value(photo, pixel, c) + (1 - alpha) * background[c];
+    for (c = 0; c < 3; c++)
+        value[c] = alpha * ssdgs__photo_value(photo, pixel, c) + (1 - alpha) * background[c];
 }
 
 /* Those of pixels begin .. end, as planes. */
-static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin, size_t end,
-                                ssdgs_real *planes) {
+static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin,
+                                size_t end, ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     ssdgs_real value[3];
     size_t i, c;
@@ -6480,7 +7066,8 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
         }
 }
 
-static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdgs_camera *camera, ssdgs_light *light) {
+static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdgs_camera *camera,
+                           ssdgs_light *light) {
     double e[9], jacobian[9];
     int i, j, l;
     *camera = photo->camera;
@@ -6492,19 +7079,22 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdg
             for (l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
             camera->view[4 * i + j] = (ssdgs_real)sum;
         }
-        if (light->kind == SSDGS_LIGHT_POINT) light->position[i] = (ssdgs_real)((double)photo->light.position[i] + value[6 + i]);
+        if (light->kind == SSDGS_LIGHT_POINT)
+            light->position[i] = (ssdgs_real)((double)photo->light.position[i] + value[6 + i]);
     }
 }
 
 /* dL/d(view) of the corrected camera -> dL/d(t', w). */
-static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[9], const ssdgs_real dview[12], double d[6]) {
+static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[9],
+                                    const ssdgs_real dview[12], double d[6]) {
     double e[9], jacobian[9], de[9], m[9], delta[3];
     int i, j, l;
     ssdgs__rotate_by(value + 3, e, jacobian);
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
             de[3 * i + j] = 0;
-            for (l = 0; l < 4; l++) de[3 * i + j] += (double)dview[4 * i + l] * (double)photo->camera.view[4 * j + l];
+            for (l = 0; l < 4; l++)
+                de[3 * i + j] += (double)dview[4 * i + l] * (double)photo->camera.view[4 * j + l];
         }
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
@@ -6521,23 +7111,25 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
     }
 }
 
-#define SSDGS__PIXELS 1024 /* of an exposure task */
+#define SSDGS__PIXELS 1024               /* of an exposure task */
 #define SSDGS__CLIPPED (ssdgs_real)0.999 /* stored values beyond may have been more */
 
 typedef struct ssdgs__exposure_job {
     ssdgs_frame *frame;
     const ssdgs_photo *photo;
     const ssdgs_real *background; /* stored values */
-    ssdgs_real *image, *slope, *lift, *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
+    ssdgs_real *image, *slope, *lift,
+        *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
 } ssdgs__exposure_job;
 
-/* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 - T),
-   image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u encode'(u). A photograph's
-   1 may stand for anything brighter, so there encode(u) is at most 1. */
+/* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 -
+   T), image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u
+   encode'(u). A photograph's 1 may stand for anything brighter, so there encode(u) is at most 1. */
 static void ssdgs__exposure_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
     const ssdgs_frame *frame = job->frame;
-    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height, begin = (size_t)index * SSDGS__PIXELS;
+    const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height,
+                 begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
     const ssdgs_real *t = frame->transmittance + begin;
     ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
@@ -6546,12 +7138,15 @@ static void ssdgs__exposure_task(void *data, int index) {
     ssdgs__photo_planes(job->photo, job->background, begin, begin + n, job->target);
     for (c = 0; c < 3; c++) {
         const size_t at = pixels * (size_t)c + begin;
-        for (i = 0; i < n; i++) straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
+        for (i = 0; i < n; i++)
+            straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
         for (i = n; i < n + 16; i++) straight[i] = 0;
-        if (frame->settings.transfer == SSDGS_TRANSFER_SRGB) frame->context->k->srgb_encode(stored, slope, straight, n);
+        if (frame->settings.transfer == SSDGS_TRANSFER_SRGB)
+            frame->context->k->srgb_encode(stored, slope, straight, n);
         for (i = 0; i < n; i++) {
             const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
-            const ssdgs_real rendered = linear ? straight[i] : stored[i], shown = ssdgs__photo_value(job->photo, begin + i, c);
+            const ssdgs_real rendered = linear ? straight[i] : stored[i],
+                             shown = ssdgs__photo_value(job->photo, begin + i, c);
             const int clipped = shown > SSDGS__CLIPPED && rendered > shown;
             const ssdgs_real s = clipped ? shown : rendered, d = clipped ? 0 : linear ? 1 : slope[i];
             job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
@@ -6595,18 +7190,20 @@ static void ssdgs__normals_task(void *data, int index) {
     for (y = begin > 0 ? begin - 1 : 0; y <= end && y < h; y++)
         for (x = 0; x < w; x++) {
             const size_t at = (size_t)y * (size_t)w + (size_t)x;
-            if (alpha[at] >= SSDGS__SOLID) rows[(size_t)(y - begin + 1) * job->stride + 16 + (size_t)x] = depth[at] / alpha[at];
+            if (alpha[at] >= SSDGS__SOLID)
+                rows[(size_t)(y - begin + 1) * job->stride + 16 + (size_t)x] = depth[at] / alpha[at];
         }
     for (y = begin; y < end; y++) {
-        frame->context->k->depth_normals(&frame->camera, rows + (size_t)(y - begin + 1) * job->stride + 16, job->stride, y,
-                                         job->weight, out);
+        frame->context->k->depth_normals(&frame->camera, rows + (size_t)(y - begin + 1) * job->stride + 16,
+                                         job->stride, y, job->weight, out);
         for (c = 0; c < 4; c++)
-            memcpy(frame->normal_gradient + ((size_t)c * (size_t)h + (size_t)y) * (size_t)w, out + (size_t)c * job->stride,
-                   (size_t)w * sizeof *out);
+            memcpy(frame->normal_gradient + ((size_t)c * (size_t)h + (size_t)y) * (size_t)w,
+                   out + (size_t)c * job->stride, (size_t)w * sizeof *out);
     }
 }
 
-/* The gradient of weight x the mean of alpha - N . n, N the blended normals, n those of the blended depth, held fixed. */
+/* The gradient of weight x the mean of alpha - N . n, N the blended normals, n those of the blended depth,
+   held fixed. */
 static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     ssdgs_context *context = frame->context;
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
@@ -6626,9 +7223,9 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
 
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
-                                          const ssdgs_camera *camera,
-                                          const ssdgs_light *light, const ssdgs_real background[3], int terms,
-                                          const int frozen[2], ssdgs_real dssim, ssdgs_real normal_weight,
+                                          const ssdgs_camera *camera, const ssdgs_light *light,
+                                          const ssdgs_real background[3], int terms, const int frozen[2],
+                                          ssdgs_real dssim, ssdgs_real normal_weight,
                                           ssdgs__loss_values *values) {
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
@@ -6648,8 +7245,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     job.slope = job.image + pixels * 3;
     job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
-    result = ssdgs__loss(context, &frame->memory->loss, job.image, job.target, camera->width, camera->height, dssim,
-                         frame->pixel_gradient, values);
+    result = ssdgs__loss(context, &frame->memory->loss, job.image, job.target, camera->width, camera->height,
+                         dssim, frame->pixel_gradient, values);
     if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
     result = ssdgs__normals_loss(frame, normal_weight);
@@ -6695,11 +7292,12 @@ static void ssdgs__adam_task(void *data, int index) {
     while (r + 1 < job->range + job->ranges && r[1].first_chunk <= (size_t)index) r++;
     begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
     n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
-    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate, r->correct_mean,
-                 r->correct_square, r->epsilon);
+    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate,
+                 r->correct_mean, r->correct_square, r->epsilon);
 }
 
-static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - beta^steps), the power by squaring */
+static ssdgs_real ssdgs__bias_correction(double beta,
+                                         int steps) { /* 1 / (1 - beta^steps), the power by squaring */
     double power = 1, square = beta;
     int n;
     for (n = steps; n; n >>= 1, square *= square)
@@ -6707,9 +7305,9 @@ static ssdgs_real ssdgs__bias_correction(double beta, int steps) { /* 1 / (1 - b
     return (ssdgs_real)(1 / (1 - power));
 }
 
-static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, ssdgs_real *parameter,
-                            const ssdgs_real *gradient,
-                            ssdgs_real *mean, ssdgs_real *square, size_t n, double epsilon) {
+static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t,
+                            ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean,
+                            ssdgs_real *square, size_t n, double epsilon) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     const double rate = ssdgs__group_rate(trainer, group, t);
     r->parameter = parameter;
@@ -6728,17 +7326,19 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
 }
 
-/* Which terms a group serves: it rests while none of them is in use. Where light is deferred an ASG weight is how soft shadows are. */
+/* Which terms a group serves: it rests while none of them is in use. Where light is deferred an ASG weight is
+   how soft shadows are. */
 static int ssdgs__group_used(int group, int terms, int asg) {
     switch (group) {
-        case SSDGS__G_DIFFUSE: return terms & SSDGS_DIFFUSE_TERM;
-        case SSDGS__G_SPECULAR: return terms & SSDGS_SPECULAR_TERM;
-        case SSDGS__G_ASG_WEIGHT: return terms & (SSDGS_SPECULAR_TERM | (asg == SSDGS_ASG_DEFERRED ? SSDGS_SHADOW_TERM : 0));
-        case SSDGS__G_SCATTERING: return terms & SSDGS_SCATTERING_TERM;
-        case SSDGS__G_MATERIAL: return terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM);
-        case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return terms & SSDGS_SHADOW_TERM;
-        case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return terms & SSDGS_SCATTERING_TERM;
-        default: return group < SSDGS__PLANE_GROUPS || terms & SSDGS_SPECULAR_TERM;
+    case SSDGS__G_DIFFUSE: return terms & SSDGS_DIFFUSE_TERM;
+    case SSDGS__G_SPECULAR: return terms & SSDGS_SPECULAR_TERM;
+    case SSDGS__G_ASG_WEIGHT:
+        return terms & (SSDGS_SPECULAR_TERM | (asg == SSDGS_ASG_DEFERRED ? SSDGS_SHADOW_TERM : 0));
+    case SSDGS__G_SCATTERING: return terms & SSDGS_SCATTERING_TERM;
+    case SSDGS__G_MATERIAL: return terms & (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM);
+    case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return terms & SSDGS_SHADOW_TERM;
+    case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return terms & SSDGS_SCATTERING_TERM;
+    default: return group < SSDGS__PLANE_GROUPS || terms & SSDGS_SPECULAR_TERM;
     }
 }
 
@@ -6760,15 +7360,14 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
         if (!learns[group] || !ssdgs__group_used(group, terms, model->settings.asg)) continue;
         if (shared >= 0) {
             const size_t at = first[shared], n = first[shared + 1] - at;
-            if (n) ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
-                                   trainer->global_mean + at,
-                                   trainer->global_square + at, n, epsilon);
+            if (n)
+                ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
+                                trainer->global_mean + at, trainer->global_square + at, n, epsilon);
         } else {
             for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
-                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at, trainer->mean + at,
-                                trainer->square + at,
-                                (size_t)model->count, epsilon);
+                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at,
+                                trainer->mean + at, trainer->square + at, (size_t)model->count, epsilon);
             }
         }
     }
@@ -6776,8 +7375,9 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     for (i = 0; i < job.ranges; i++)
         if (job.range[i].bad)
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
-                               "iteration %d refused: the gradient of %s, element %z, is not finite", trainer->iteration,
-                               ssdgs__group_names[job.range[i].group], job.range[i].bad - 1);
+                               "iteration %d refused: the gradient of %s, element %z, is not finite",
+                               trainer->iteration, ssdgs__group_names[job.range[i].group],
+                               job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
     for (group = 0; group < SSDGS__GROUPS; group++)
         trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms, model->settings.asg);
@@ -6785,17 +7385,22 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
 }
 
 /* Radians across the picture's width, its centre on the axis. */
-static double ssdgs__view_angle(const ssdgs_camera *camera) { return 2 * atan(0.5 * camera->width / (double)camera->fx); }
+static double ssdgs__view_angle(const ssdgs_camera *camera) {
+    return 2 * atan(0.5 * camera->width / (double)camera->fx);
+}
 
-/* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the picture's width. */
-static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate, double unit, double angle) {
+/* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the
+   picture's width. */
+static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate,
+                                   double unit, double angle) {
     const int steps = ++c->steps[part];
     int i;
     for (i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double g = gradient[i];
         c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
         c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
-        c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * c->mean[i] * (double)ssdgs__bias_correction(0.9, steps) /
+        c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * c->mean[i] *
+                       (double)ssdgs__bias_correction(0.9, steps) /
                        (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
     }
 }
@@ -6804,7 +7409,8 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
 static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], double w, double seen[3]) {
     int i, j;
     for (i = 0; i < 3; i++)
-        for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++) seen[i] += (double)camera->view[4 * i + j] * world[j];
+        for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++)
+            seen[i] += (double)camera->view[4 * i + j] * world[j];
 }
 
 static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
@@ -6812,8 +7418,8 @@ static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
     for (i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common, to first order: the scene
-   would follow, and its photographs look the same. */
+/* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common,
+   to first order: the scene would follow, and its photographs look the same. */
 static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
     double centre[3], p[3], x[3], y[3], move[3] = {0, 0, 0}, turn[3] = {0, 0, 0};
     int i, j, l, pass;
@@ -6846,12 +7452,16 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 #define SSDGS__STATISTICS 4
 #define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
-#define SSDGS__HALVED 0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
+#define SSDGS__HALVED \
+    0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
 #define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
 
-static void ssdgs__rearranged(ssdgs_trainer *trainer) { trainer->arrangement = ++trainer->model->arrangement; }
+static void ssdgs__rearranged(ssdgs_trainer *trainer) {
+    trainer->arrangement = ++trainer->model->arrangement;
+}
 
-/* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move: all or nothing. */
+/* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move:
+   all or nothing. */
 static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
@@ -6860,9 +7470,11 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     const size_t n = (size_t)model->count, old[3] = {model->capacity, trainer->stride, trainer->stride};
     size_t capacity, bytes, i, c;
     if (trainer->mean && count <= model->capacity) return SSDGS_OK;
-    capacity = count <= model->capacity ? model->capacity : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
-    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) return ssdgs__fail(context, SSDGS_ERR_LIMIT,
-            "%z Gaussians", capacity);
+    capacity = count <= model->capacity
+                   ? model->capacity
+                   : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
     statistics = (ssdgs_real *)ssdgs__allocate(context, SSDGS__STATISTICS * capacity * sizeof(ssdgs_real));
     for (i = 0; i < 3; i++) grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
     if (!statistics || !grown[0] || !grown[1] || !grown[2]) {
@@ -6871,8 +7483,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
         return SSDGS_ERR_MEMORY;
     }
     for (i = 0; i < 3; i++) {
-        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++) memcpy(grown[i] + c * capacity, *planes[i] + c * old[i],
-                n * sizeof(ssdgs_real));
+        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++)
+            memcpy(grown[i] + c * capacity, *planes[i] + c * old[i], n * sizeof(ssdgs_real));
         ssdgs__release(context, *planes[i]);
         *planes[i] = grown[i];
     }
@@ -6900,7 +7512,10 @@ static double ssdgs__normal(uint64_t key, uint64_t counter) {
     return sum;
 }
 
-typedef struct ssdgs__ranked { ssdgs_real value; uint32_t index; } ssdgs__ranked;
+typedef struct ssdgs__ranked {
+    ssdgs_real value;
+    uint32_t index;
+} ssdgs__ranked;
 
 static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest first, then by index */
     const ssdgs__ranked *x = (const ssdgs__ranked *)a, *y = (const ssdgs__ranked *)b;
@@ -6919,8 +7534,8 @@ static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count,
     ssdgs__rearranged(trainer);
 }
 
-/* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it is small, two
-   samples of it, smaller, if it is large. */
+/* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it
+   is small, two samples of it, smaller, if it is large. */
 static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
     const ssdgs_train_options *o = &trainer->options;
     const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
@@ -6929,8 +7544,11 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
     int longest = 0, half, c, j;
     ssdgs__copy_gaussian(p, stride, to, from);
     for (c = 1; c < 3; c++)
-        if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] > p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from]) longest = c;
-    if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <= log((double)o->densify_size * trainer->extent))
+        if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] >
+            p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from])
+            longest = c;
+    if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <=
+                      log((double)o->densify_size * trainer->extent))
         return; /* the copy is the clone */
     for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
     ssdgs__rotation_scalar(raw, q, r);
@@ -6946,14 +7564,18 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
             *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
         }
         for (c = 0; c < 3; c++)
-            for (j = 0; j < 3; j++) p[(size_t)(SSDGS_POSITION + c) * stride + at] += (ssdgs_real)((double)r[3 * c + j] * offset[j]);
+            for (j = 0; j < 3; j++)
+                p[(size_t)(SSDGS_POSITION + c) * stride + at] +=
+                    (ssdgs_real)((double)r[3 * c + j] * offset[j]);
         if (halve) { /* together as opaque as the whole */
             ssdgs_real *opacity = p + (size_t)SSDGS_OPACITY * stride + at;
-            const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) / (2 * SSDGS__HALF); /* -ln(1 - opacity) */
+            const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) /
+                                (2 * SSDGS__HALF); /* -ln(1 - opacity) */
             *opacity = (ssdgs_real)log(expm1(veil));
         }
     }
-    for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
 }
 
 typedef struct ssdgs__outlines_job {
@@ -6962,13 +7584,16 @@ typedef struct ssdgs__outlines_job {
     unsigned char *outside;      /* per Gaussian */
 } ssdgs__outlines_job;
 
-/* Whether so many photographs are more than a share of all and, as one may be wrong, more than one of eight or more. */
+/* Whether so many photographs are more than a share of all and, as one may be wrong, more than one of eight
+   or more. */
 static int ssdgs__several(int photographs, int all, double share) {
     return photographs > (all < 8 ? 0 : 1) && photographs > share * all;
 }
 
-/* Whether a camera has a place in the picture: 0 no, 1 yes, 2 yes and its photograph is transparent there and around. */
-static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent, const ssdgs_real x[3]) {
+/* Whether a camera has a place in the picture: 0 no, 1 yes, 2 yes and its photograph is transparent there and
+   around. */
+static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent,
+                               const ssdgs_real x[3]) {
     const int reach = (camera->width + 127) / 128;
     ssdgs_real t[3], u, v;
     int c, i;
@@ -6981,7 +7606,12 @@ static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *cam
     v = camera->fy * t[1] / t[2] + camera->cy;
     if (!(u >= 0 && v >= 0 && u < (ssdgs_real)camera->width && v < (ssdgs_real)camera->height)) return 0;
     for (i = 0; i < 5 && transparent; i++) { /* the centre and beside it */
-        const int px = (int)u + (i == 1 ? reach : i == 2 ? -reach : 0), py = (int)v + (i == 3 ? reach : i == 4 ? -reach : 0);
+        const int px = (int)u + (i == 1   ? reach
+                                 : i == 2 ? -reach
+                                          : 0),
+                  py = (int)v + (i == 3   ? reach
+                                 : i == 4 ? -reach
+                                          : 0);
         if (px < 0 || py < 0 || px >= camera->width || py >= camera->height) continue;
         if (ssdgs__photo_alpha(photo, (size_t)py * (size_t)camera->width + (size_t)px)) return 1;
     }
@@ -6997,7 +7627,8 @@ static void ssdgs__outlines_task(void *data, int chunk) {
     size_t i;
     int photo;
     for (i = begin; i < end; i++) {
-        const ssdgs_real x[3] = {position[i], position[trainer->stride + i], position[2 * trainer->stride + i]};
+        const ssdgs_real x[3] = {position[i], position[trainer->stride + i],
+                                 position[2 * trainer->stride + i]};
         int seen = 0, outside = 0;
         for (photo = 0; photo < trainer->photo_count; photo++) {
             const int outlines = trainer->transparent[photo] == 2;
@@ -7026,7 +7657,8 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
     job.trainer = trainer;
     job.cameras = cameras;
     job.outside = outside;
-    ssdgs__parallel(context, (trainer->model->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK, ssdgs__outlines_task, &job);
+    ssdgs__parallel(context, (trainer->model->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK, ssdgs__outlines_task,
+                    &job);
     ssdgs__release(context, cameras);
     return SSDGS_OK;
 }
@@ -7036,20 +7668,24 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count;
-    const double largest_size = 0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
+    const double largest_size =
+        0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
     /* opacities were reset since the last control: weights say little */
-    const int before = trainer->iteration - 1, last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
+    const int before = trainer->iteration - 1,
+              last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
     const int recovering = last > before - o->densify_every && ssdgs__resets(o, last);
     ssdgs__ranked *candidates;
     uint64_t *order;
     unsigned char *drop;
-    size_t i, kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n), added, room;
+    size_t i, kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n),
+              added, room;
     ssdgs_real *p;
     ssdgs_result result;
     int c;
     /* two lists of n candidates; at most 2 n Gaussians' order, a plane of them; what is dropped */
-    candidates = (ssdgs__ranked *)ssdgs__allocate(context, n * (2 * sizeof *candidates + 2 * sizeof *order + 2 * sizeof *p + 1) + 1);
+    candidates = (ssdgs__ranked *)ssdgs__allocate(
+        context, n * (2 * sizeof *candidates + 2 * sizeof *order + 2 * sizeof *p + 1) + 1);
     if (!candidates) return SSDGS_ERR_MEMORY;
     order = (uint64_t *)(void *)(candidates + 2 * n);
     drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
@@ -7066,7 +7702,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
         }
-        drop[i] = drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size) ||
+        drop[i] = drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint ||
+                  (double)size > log(largest_size) ||
                   (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
@@ -7074,7 +7711,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         shadow = trainer->half_shadow[i] / trainer->screen_count[i];
         pull = !(gradient < o->densify_gradient);
         if (!pull && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
-        candidates[wanted].value = pull ? gradient : -1 / shadow; /* below 0: to be halved, after the others */
+        candidates[wanted].value =
+            pull ? gradient : -1 / shadow; /* below 0: to be halved, after the others */
         candidates[wanted++].index = (uint32_t)i;
         pulled += (size_t)pull;
     }
@@ -7086,9 +7724,11 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     wanted = wanted - pulled < halved ? wanted : pulled + halved;
     room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
     if (wanted > room || n - dropped > (size_t)o->max_gaussians) {
-        /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth at a time */
+        /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
+           at a time */
         ssdgs__ranked *least = candidates + n;
-        const size_t over = n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
+        const size_t over =
+            n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
         const size_t more = wanted > room ? wanted - room : 0;
         size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
         for (i = 0; i < n; i++)
@@ -7111,10 +7751,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     p = model->gaussians;
     for (i = 0, added = 0; i < wanted; i++)
-        if (!drop[candidates[i].index]) ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
+        if (!drop[candidates[i].index])
+            ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
     for (i = n; i < n + added; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + i] =
-            trainer->square[(size_t)c * trainer->stride + i] = 0;
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            trainer->mean[(size_t)c * trainer->stride + i] =
+                trainer->square[(size_t)c * trainer->stride + i] = 0;
     for (i = 0; i < n + added; i++)
         if (i >= n || !drop[i]) order[kept++] = i;
     ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + 2 * n));
@@ -7135,7 +7777,8 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
 }
 
 static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame, ssdgs_real magnify) {
-    const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2, half_h = magnify * (ssdgs_real)frame->camera.height / 2;
+    const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2,
+                     half_h = magnify * (ssdgs_real)frame->camera.height / 2;
     int i;
     for (i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
@@ -7144,7 +7787,9 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
         trainer->screen_gradient[g] += SSDGS__SQRT(x * x + y * y);
         trainer->screen_count[g] += 1;
         trainer->contribution[g] += d[6];
-        if (d[6] > 1) trainer->half_shadow[g] += 4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
+        if (d[6] > 1)
+            trainer->half_shadow[g] +=
+                4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
     }
 }
 
@@ -7162,14 +7807,17 @@ static double ssdgs__bounds_side(const ssdgs_train_options *o) {
 }
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
-    static const char *const names[12] = {"position", "opacity", "scale", "rotation", "color", "asg", "frame", "material", "shadow",
-        "scattering", "camera_rate", "light_rate"};
-    const ssdgs_rate rates[12] = {o->position, o->opacity, o->scale, o->rotation, o->color, o->asg, o->frame, o->material,
-        o->shadow, o->scattering, o->camera_rate, o->light_rate};
+    static const char *const names[12] = {"position", "opacity",    "scale",       "rotation",
+                                          "color",    "asg",        "frame",       "material",
+                                          "shadow",   "scattering", "camera_rate", "light_rate"};
+    const ssdgs_rate rates[12] = {o->position, o->opacity,    o->scale,       o->rotation,
+                                  o->color,    o->asg,        o->frame,       o->material,
+                                  o->shadow,   o->scattering, o->camera_rate, o->light_rate};
     const ssdgs_real most = (ssdgs_real)1e30;
     int i;
-    if (o->version != SSDGS_VERSION) return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
-            "train options: not made by ssdgs_train_options_default()");
+    if (o->version != SSDGS_VERSION)
+        return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
+                           "train options: not made by ssdgs_train_options_default()");
 #define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", o, field, low, high)
     SSDGS__RANGE(iterations, 1, 100000000);
     SSDGS__RANGE(schedule, 0, SSDGS_SCHEDULE_MERGED);
@@ -7189,19 +7837,23 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: %s = %g, %g: rates must be finite and not negative",
-                               names[i], (double)rates[i].start, (double)rates[i].end);
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                               "train options: %s = %g, %g: rates must be finite and not negative", names[i],
+                               (double)rates[i].start, (double)rates[i].end);
     for (i = 0; i < 3; i++) {
         if (!(o->bounds_min[i] >= -most && o->bounds_max[i] <= most && o->bounds_min[i] < o->bounds_max[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: bounds_min[%d] = %g, bounds_max[%d] = %g: they "
-                               "must be finite and the first below the second", i, (double)o->bounds_min[i], i,
-                               (double)o->bounds_max[i]);
-        if (!ssdgs__finite(o->background[i])) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                "train options: background[%d] is not finite", i);
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                               "train options: bounds_min[%d] = %g, bounds_max[%d] = %g: they "
+                               "must be finite and the first below the second",
+                               i, (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
+        if (!ssdgs__finite(o->background[i]))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: background[%d] is not finite", i);
     }
     if (!(ssdgs__bounds_side(o) >= 2e-15 && ssdgs__bounds_side(o) <= 2e15))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
-                           "2e-15 .. 2e15", ssdgs__bounds_side(o));
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
+                           "2e-15 .. 2e15",
+                           ssdgs__bounds_side(o));
     return SSDGS_OK;
 }
 
@@ -7210,16 +7862,20 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
     int c;
     for (c = 0; c < 3; c++) {
         u[c] = ssdgs__uniform(o->seed, 3 * draw + (uint64_t)c);
-        x[c] = (ssdgs_real)((double)o->bounds_min[c] + u[c] * ((double)o->bounds_max[c] - (double)o->bounds_min[c]));
+        x[c] = (ssdgs_real)((double)o->bounds_min[c] +
+                            u[c] * ((double)o->bounds_max[c] - (double)o->bounds_min[c]));
     }
 }
 
-/* Leaves out the outlines of photographs whose mask or pose must be wrong: of eight or more with outlines those that are transparent
-   where more than a third of the places lie that all but one of these, or nine in ten, show. */
+/* Leaves out the outlines of photographs whose mask or pose must be wrong: of eight or more with outlines
+   those that are transparent where more than a third of the places lie that all but one of these, or nine in
+   ten, show. */
 static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     enum { PLACES = 2048, FEW = 30 };
     const int photos = trainer->photo_count;
-    int *shown = (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos), *refused;
+    int *shown =
+            (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos),
+        *refused;
     int outlined = 0, wrong = 0, first = 0, place, i;
     unsigned char *side;
     if (!shown) return SSDGS_ERR_MEMORY;
@@ -7234,7 +7890,9 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
         ssdgs__draw_place(&trainer->options, (uint64_t)place, u, x);
         for (i = 0; i < photos; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
-            side[i] = trainer->transparent[i] == 2 ? (unsigned char)ssdgs__outline_side(photo, &photo->camera, 1, x) : 0;
+            side[i] = trainer->transparent[i] == 2
+                          ? (unsigned char)ssdgs__outline_side(photo, &photo->camera, 1, x)
+                          : 0;
             seen += side[i] > 0;
             outside += side[i] == 2;
         }
@@ -7251,15 +7909,18 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
         wrong++;
     }
     if (wrong)
-        ssdgs__note(trainer->context, "%d photographs of %d, the first number %d, are transparent where the others show the object: is "
-                    "it their masks or poses that are wrong? Their outlines are not used", wrong, photos, first);
+        ssdgs__note(
+            trainer->context,
+            "%d photographs of %d, the first number %d, are transparent where the others show the object: is "
+            "it their masks or poses that are wrong? Their outlines are not used",
+            wrong, photos, first);
     ssdgs__release(trainer->context, shown);
     return SSDGS_OK;
 }
 
-/* Random points in the bounds; their size is the mean distance to the three nearest that such points have, their normals point
-   away from the centre; in the order of ssdgs__split. Those outside of the object's outlines are left out, and where few
-   would be left others are drawn. */
+/* Random points in the bounds; their size is the mean distance to the three nearest that such points have,
+   their normals point away from the centre; in the order of ssdgs__split. Those outside of the object's
+   outlines are left out, and where few would be left others are drawn. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
@@ -7272,8 +7933,9 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     uint64_t *draws;
     size_t stride, kept = 0, i;
     int round, c;
-    if (o->initial_points < 1) return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points",
-            o->initial_points);
+    if (o->initial_points < 1)
+        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points",
+                           o->initial_points);
     result = ssdgs__trainer_grow(trainer, n);
     if (result) return result;
     draws = (uint64_t *)ssdgs__allocate(trainer->context, n * (sizeof *draws + sizeof(ssdgs_real) + 1));
@@ -7292,8 +7954,10 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             if (!outside[i]) draws[kept++] = draws[i];
     }
     if (!kept) { /* never none */
-        ssdgs__note(trainer->context, "no random point is inside of the outlines, so these are not used: do bounds_min and bounds_max "
-                    "hold the object, are masks and poses right?");
+        ssdgs__note(
+            trainer->context,
+            "no random point is inside of the outlines, so these are not used: do bounds_min and bounds_max "
+            "hold the object, are masks and poses right?");
         trainer->outlines = 0;
         kept = n;
         round = 1;
@@ -7350,7 +8014,9 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
     context = trainer->context;
     context->references++;
     if (!trainer->running) ssdgs__trainer_drop(trainer);
-    else ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_trainer_destroy: the trainer runs, its progress callback must not destroy it");
+    else
+        ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                    "ssdgs_trainer_destroy: the trainer runs, its progress callback must not destroy it");
     ssdgs__leave_and_drop(context);
 }
 
@@ -7358,11 +8024,13 @@ static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
     int j, l;
     for (j = 0; j < 3; j++) {
         centre[j] = 0;
-        for (l = 0; l < 3; l++) centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
+        for (l = 0; l < 3; l++)
+            centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
     }
 }
 
-/* Whether a photograph, of several the one with an index, else -1, can be rendered and compared on a background. */
+/* Whether a photograph, of several the one with an index, else -1, can be rendered and compared on a
+   background. */
 static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo *photo, int index,
                                        const ssdgs_real background[3]) {
     ssdgs_result result;
@@ -7375,14 +8043,16 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     if (!result && photo->format != SSDGS_PIXELS_RGBA8 && photo->format != SSDGS_PIXELS_RGBA16)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
     for (i = 0; i < 3 && !result; i++)
-        if (!ssdgs__finite(background[i])) result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
+        if (!ssdgs__finite(background[i]))
+            result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
     context->subject = NULL;
     return result;
 }
 
 /* ---- whether photographs, cameras and bounds suit each other: notes ---- */
 
-/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds' picture. */
+/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds'
+   picture. */
 typedef struct ssdgs__silhouette {
     int left, right, top, bottom; /* right < left: nothing */
     int whole;                    /* not cut by the picture's border, so that its middle is known */
@@ -7399,9 +8069,11 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
         for (c = 0; c < 3; c++) world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
         ssdgs__to_camera(camera, world, 1, seen);
         for (c = 0; c < 2; c++) {
-            const double f = (double)(c ? camera->fy : camera->fx), at = (double)(c ? camera->cy : camera->cx);
+            const double f = (double)(c ? camera->fy : camera->fx),
+                         at = (double)(c ? camera->cy : camera->cx);
             const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
-            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c] : -1e30; /* reaching behind the camera it may be anywhere */
+            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c]
+                                 : -1e30; /* reaching behind the camera it may be anywhere */
             high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
         }
     }
@@ -7415,21 +8087,24 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
             s.shown++;
             s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
         }
-    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 && s.bottom < camera->height - 1;
+    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 &&
+              s.bottom < camera->height - 1;
     return s;
 }
 
-/* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the middles of the silhouettes
-   meet about where the object is; `within` cameras stand within the bounds. */
+/* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the
+   middles of the silhouettes meet about where the object is; `within` cameras stand within the bounds. */
 static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
     ssdgs_context *context = trainer->context;
-    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0}, m[9], cross[3], determinant;
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0}, m[9], cross[3],
+           determinant;
     double shown = 0, outside = 0, half = 0, miss = 0, step;
-    ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(trainer->context,
-                                                                          (size_t)trainer->photo_count * sizeof *silhouettes);
+    ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(
+        trainer->context, (size_t)trainer->photo_count * sizeof *silhouettes);
     int rays = 0, behind = 0, doubtful, i, j, l;
     if (!silhouettes) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < trainer->photo_count; i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
+    for (i = 0; i < trainer->photo_count;
+         i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
         const ssdgs_camera *camera = &trainer->photos[i].camera;
         ssdgs__silhouette *s = silhouettes + i;
         double eye[3], ray[3], d[3], length;
@@ -7483,19 +8158,26 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
     if (doubtful && behind > rays / 2)
         ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes right?");
     else if (doubtful)
-        ssdgs__note(context, "what the photographs show is in no one place, lines of sight to it miss each other by %g where it is %g "
-                    "wide: are the cameras' poses, axes and lenses right?", miss, 2 * half);
+        ssdgs__note(context,
+                    "what the photographs show is in no one place, lines of sight to it miss each other by "
+                    "%g where it is %g "
+                    "wide: are the cameras' poses, axes and lenses right?",
+                    miss, 2 * half);
     if (within)
-        ssdgs__note(context, "%d cameras of %d stand within bounds_min .. bounds_max, which should hold the object alone", within,
-                    trainer->photo_count);
+        ssdgs__note(
+            context,
+            "%d cameras of %d stand within bounds_min .. bounds_max, which should hold the object alone",
+            within, trainer->photo_count);
     if (outside > 0.1 * shown && !doubtful)
-        ssdgs__note(context, "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
+        ssdgs__note(context,
+                    "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
                     (int)(100 * outside / shown));
     if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return SSDGS_OK;
     step = pow(10, floor(log10(half)) - 1);
     for (j = 0; j < 3; j++) x[j] += (double)trainer->model->settings.origin[j];
-    ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g", step * floor((x[0] - half) / step),
-                step * floor((x[1] - half) / step), step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
+    ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g",
+                step * floor((x[0] - half) / step), step * floor((x[1] - half) / step),
+                step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
                 step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));
     return SSDGS_OK;
 }
@@ -7505,13 +8187,14 @@ typedef struct ssdgs__shading {
     double rotation[9]; /* world to camera */
     double eye[3];      /* from the bounds' centre, world */
     double position[3]; /* as given: of the light, or towards it */
-    double shift[2];    /* of the brightness' middle from the silhouette's, in the silhouette's standard deviations */
+    double shift[2];    /* of the brightness' middle from the silhouette's, in the silhouette's standard
+                           deviations */
     double brightness;  /* mean, over the light's intensity */
     int directional;
 } ssdgs__shading;
 
-/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture, less what has the colour of
-   its border. */
+/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture,
+   less what has the colour of its border. */
 static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], ssdgs__shading *s) {
     static const ssdgs_real black[3] = {0, 0, 0};
     const ssdgs_camera *camera = &photo->camera;
@@ -7524,13 +8207,15 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
         for (x = step / 2; x < w; x += step) {
             const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
             const double alpha = ssdgs__photo_alpha(photo, pixel) / 65535.0;
-            const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx, (y + 0.5 - (double)camera->cy) / (double)camera->fy};
+            const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx,
+                                  (y + 0.5 - (double)camera->cy) / (double)camera->fy};
             double value = 0, apart = 0;
             ssdgs_real stored[3];
             ssdgs__photo_pixel(photo, black, pixel, stored);
             for (c = 0; c < 3; c++) {
                 value += (double)stored[c] * (double)stored[c]; /* about linear */
-                apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c])) : apart;
+                apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c]))
+                                                                      : apart;
             }
             if (apart < 0.02) value = 0;
             area += alpha;
@@ -7558,12 +8243,16 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
     return 1;
 }
 
-/* A way to read three numbers as a light's position: axis[c] and sign[c] tell which is the c-th coordinate, then in world or camera
-   axes, from the world's origin or the camera. */
-typedef struct ssdgs__reading { int axis[3], in_camera, from_camera; double sign[3]; } ssdgs__reading;
+/* A way to read three numbers as a light's position: axis[c] and sign[c] tell which is the c-th coordinate,
+   then in world or camera axes, from the world's origin or the camera. */
+typedef struct ssdgs__reading {
+    int axis[3], in_camera, from_camera;
+    double sign[3];
+} ssdgs__reading;
 
 /* Where the light stands from the bounds' centre: its direction in world axes, and its squared distance. */
-static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r, const double centre[3], double direction[3]) {
+static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r, const double centre[3],
+                                double direction[3]) {
     double p[3], distance2 = 0;
     int c, l;
     for (c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
@@ -7577,7 +8266,8 @@ static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r
     return s->directional ? 1 : distance2;
 }
 
-/* The correlation of (n, width) numbers with others, each less their means; *spread: the first ones' standard deviation. */
+/* The correlation of (n, width) numbers with others, each less their means; *spread: the first ones' standard
+   deviation. */
 static double ssdgs__correlation(const double *a, const double *b, int n, int width, double *spread) {
     double ab = 0, aa = 0, bb = 0;
     int i, c;
@@ -7593,11 +8283,12 @@ static double ssdgs__correlation(const double *a, const double *b, int n, int wi
     return ab / sqrt(aa * bb + 1e-30);
 }
 
-/* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright as a whole where the light is
-   on the camera's side. On a floor seen from above only two axes tell of the former. 1 where nothing tells. *facing: how far the lights
-   are on the camera's side, on average, plus twice its error. scratch: (n, 6). */
-static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading, const double centre[3], double *scratch,
-                               double *facing) {
+/* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright
+   as a whole where the light is on the camera's side. On a floor seen from above only two axes tell of the
+   former. 1 where nothing tells. *facing: how far the lights are on the camera's side, on average, plus twice
+   its error. scratch: (n, 6). */
+static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading,
+                               const double centre[3], double *scratch, double *facing) {
     double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
     double sideways = -2, frontal, spread, brightness = 0, front_mean = 0;
     int flat, i, c, l;
@@ -7620,23 +8311,28 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
             }
             for (c = 0; c < 2; c++) {
                 shift[2 * i + c] = s[i].shift[c];
-                for (l = 0, toward[2 * i + c] = 0; l < 3; l++) toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
+                for (l = 0, toward[2 * i + c] = 0; l < 3; l++)
+                    toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
             }
         }
-        if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0)) continue; /* neither a floor nor a ceiling */
+        if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0))
+            continue; /* neither a floor nor a ceiling */
         r = ssdgs__correlation(toward, shift, n, 2, &shown);
         sideways = shown > 0.1 && r > sideways ? r : sideways;
     }
     for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
-    for (i = 0; i < n; i++) bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
+    for (i = 0; i < n; i++)
+        bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
     frontal = ssdgs__correlation(front, bright, n, 1, &spread);
     *facing = front_mean + 2 * spread / sqrt((double)n);
-    if (!(spread > 0.2)) return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
+    if (!(spread > 0.2))
+        return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
     return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
 }
 
-/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. Right captures agree to 0.8 and more,
-   wrong readings to 0.5 or so; on a floor seen from above one that puts the lights below it may agree to 0.86. */
+/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. Right
+   captures agree to 0.8 and more, wrong readings to 0.5 or so; on a floor seen from above one that puts the
+   lights below it may agree to 0.86. */
 static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const double centre[3]) {
     enum { FEW = 6, ENOUGH = 12 };
     static const ssdgs__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
@@ -7644,7 +8340,8 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     ssdgs_context *context = trainer->context;
     const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
     ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
-    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, facing_so, agrees_so, best = 0;
+    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, facing_so, agrees_so,
+           best = 0;
     ssdgs__reading reading, found = as_given;
     int n = 0, contradicts, behind, i, order, signs, way;
     if (!s) return SSDGS_ERR_MEMORY;
@@ -7660,28 +8357,39 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
                 reading.in_camera = way & 1;
                 reading.from_camera = way >> 1;
                 agrees_so = ssdgs__agreement(s, n, &reading, centre, scratch, &facing_so);
-                /* a place beside the camera mixes in the camera's direction, of which much is right in any reading */
-                if (facing_so < -0.1 || agrees_so < best + (reading.from_camera != found.from_camera ? 0.2 : 0)) continue;
+                /* a place beside the camera mixes in the camera's direction, of which much is right in any
+                   reading */
+                if (facing_so < -0.1 ||
+                    agrees_so < best + (reading.from_camera != found.from_camera ? 0.2 : 0))
+                    continue;
                 best = agrees_so;
                 found = reading;
             }
     behind = n >= ENOUGH && agrees < 0.88 && facing < -0.1;
     contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
     if (contradicts)
-        ssdgs__note(context, "the photographs' shading contradicts their lights: its correlation with their directions is %g, and near 1 "
-                    "where these are right", floor(100 * agrees + 0.5) / 100);
+        ssdgs__note(context,
+                    "the photographs' shading contradicts their lights: its correlation with their "
+                    "directions is %g, and near 1 "
+                    "where these are right",
+                    floor(100 * agrees + 0.5) / 100);
     else if (behind)
-        ssdgs__note(context, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
+        ssdgs__note(
+            context,
+            "the lights stand behind the object as most cameras see it: are their axes and signs right?");
     if ((contradicts || behind) && best > 0.7 && best > agrees + 0.03)
-        ssdgs__note(context, "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
+        ssdgs__note(context,
+                    "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
                     axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
-                    axes[found.sign[2] < 0][found.axis[2]], found.in_camera ? "each camera's (right, down, forward)" : "the world's",
+                    axes[found.sign[2] < 0][found.axis[2]],
+                    found.in_camera ? "each camera's (right, down, forward)" : "the world's",
                     found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
     ssdgs__release(context, s);
     return SSDGS_OK;
 }
 
-/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes. radius: of the cameras. */
+/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes.
+   radius: of the cameras. */
 static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radius) {
     ssdgs_context *context = trainer->context;
     const ssdgs_train_options *o = &trainer->options;
@@ -7715,20 +8423,31 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
             within += point && j == 3;
             points += point;
         }
-    if (within) ssdgs__note(context, "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone", within, n);
+    if (within)
+        ssdgs__note(
+            context,
+            "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
+            within, n);
     if (n < 2 || (points && points < n)) return SSDGS_OK;
     if (sqrt(spread) < 0.03 * lit_from)
-        ssdgs__note(context, "all photographs are lit from one place: they do not tell how the object looks in other light");
-    else if (sqrt(apart) < 0.1 * (points && radius > 1e-3 * trainer->unit && radius < away ? radius : away)) /* bounds may be wrong */
-        ssdgs__note(context, "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in all photographs: they do "
-                    "not tell how the object looks in other light", floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
+        ssdgs__note(
+            context,
+            "all photographs are lit from one place: they do not tell how the object looks in other light");
+    else if (sqrt(apart) < 0.1 * (points && radius > 1e-3 * trainer->unit && radius < away
+                                      ? radius
+                                      : away)) /* bounds may be wrong */
+        ssdgs__note(context,
+                    "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in "
+                    "all photographs: they do "
+                    "not tell how the object looks in other light",
+                    floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);
     else return ssdgs__note_shading(trainer, centre);
     return SSDGS_OK;
 }
 
-/* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that the opaque ones beside it
-   lead to, but that times alpha, as stored or as linear light. */
+/* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that
+   the opaque ones beside it lead to, but that times alpha, as stored or as linear light. */
 static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
     double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
     int i, x, y, c, side;
@@ -7741,12 +8460,15 @@ static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
                 const int alpha = ssdgs__photo_alpha(photo, pixel);
                 const double a = alpha / 65535.0;
                 if (alpha < 6554 || alpha > 45875) continue; /* 0.1 .. 0.7 */
-                for (side = 0; side < 4; side++) { /* right and left, next to it and one further */
+                for (side = 0; side < 4; side++) {           /* right and left, next to it and one further */
                     const int step = 1 + side / 2;
-                    const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step, further = side & 1 ? next - 1 : next + 1;
-                    if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880) continue; /* 0.99 */
+                    const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step,
+                                 further = side & 1 ? next - 1 : next + 1;
+                    if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880)
+                        continue; /* 0.99 */
                     for (c = 0; c < 3; c++) {
-                        const double v = (double)ssdgs__photo_value(photo, pixel, c), beside = (double)ssdgs__photo_value(photo, next, c);
+                        const double v = (double)ssdgs__photo_value(photo, pixel, c),
+                                     beside = (double)ssdgs__photo_value(photo, next, c);
                         double n = beside + step * (beside - (double)ssdgs__photo_value(photo, further, c));
                         n = n < 0 ? 0 : n > 1 ? 1 : n;
                         straight += fabs(v - n);
@@ -7759,14 +8481,15 @@ static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
             }
     }
     if (count >= 50 && (times_alpha < 0.5 * straight || times_linear < 0.5 * straight))
-        ssdgs__note(trainer->context, "the photographs' colours look multiplied by alpha, which darkens outlines: they must be straight "
-                    "(divide by alpha, or export without premultiplication)");
+        ssdgs__note(trainer->context, "the photographs' colours look multiplied by alpha, which darkens "
+                                      "outlines: they must be straight "
+                                      "(divide by alpha, or export without premultiplication)");
 }
 
 /* ---- a trainer and its steps ---- */
 
-/* Decides what opaque photographs show around the object: options.background, where most of their borders have about its colour, else
-   surfaces, which fill the pictures. */
+/* Decides what opaque photographs show around the object: options.background, where most of their borders
+   have about its colour, else surfaces, which fill the pictures. */
 static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     const ssdgs_real *background = trainer->options.background;
     double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, same = 0, spread = 0;
@@ -7780,7 +8503,8 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
                 ssdgs_real value[3], apart = 0;
                 ssdgs__photo_pixel(photo, background, (size_t)y * (size_t)w + (size_t)x, value);
                 for (c = 0; c < 3; c++) {
-                    const ssdgs_real d = value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
+                    const ssdgs_real d =
+                        value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
                     apart = d > apart ? d : apart;
                     mean[c] += (double)value[c];
                     square[c] += (double)value[c] * (double)value[c];
@@ -7796,12 +8520,19 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     trainer->backdrop = same >= 0.5 * count;
     trainer->filled = !trainer->backdrop;
     if (trainer->backdrop)
-        ssdgs__note(trainer->context, "too few photographs are transparent around the object, but their borders have the colour of "
-                    "`background`: it is taken for empty, and Gaussians of its colour fade (opacity_fade=0 keeps them)");
+        ssdgs__note(
+            trainer->context,
+            "too few photographs are transparent around the object, but their borders have the colour of "
+            "`background`: it is taken for empty, and Gaussians of its colour fade (opacity_fade=0 keeps "
+            "them)");
     else
-        ssdgs__note(trainer->context, "too few photographs are transparent around the object, and their borders, %g,%g,%g on average%s, "
-                    "are not of the colour of `background`: all that they show is taken for opaque. Where there is a background set "
-                    "`background` to its colour", floor(100 * mean[0] / count + 0.5) / 100, floor(100 * mean[1] / count + 0.5) / 100,
+        ssdgs__note(trainer->context,
+                    "too few photographs are transparent around the object, and their borders, %g,%g,%g on "
+                    "average%s, "
+                    "are not of the colour of `background`: all that they show is taken for opaque. Where "
+                    "there is a background set "
+                    "`background` to its colour",
+                    floor(100 * mean[0] / count + 0.5) / 100, floor(100 * mean[1] / count + 0.5) / 100,
                     floor(100 * mean[2] / count + 0.5) / 100, spread < 0.001 ? " and all alike" : "");
 }
 
@@ -7814,23 +8545,28 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     const int fresh = model->count == 0;
     int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0, i, j;
     if (result) return result;
-    if (model->settings.baked) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                                  "a baked model cannot be trained: it has no reflectance");
-    if (photo_count < 1 || !photos) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-            photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL", photo_count);
+    if (model->settings.baked)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "a baked model cannot be trained: it has no reflectance");
+    if (photo_count < 1 || !photos)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL",
+                           photo_count);
     for (i = 0; i < photo_count; i++) {
         result = ssdgs__photo_check(context, photos + i, i, o->background);
         if (result) return result;
     }
     trainer->photos = (ssdgs_photo *)ssdgs__allocate(context, (size_t)photo_count * sizeof *photos);
-    trainer->corrections = (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
+    trainer->corrections =
+        (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
     trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
     trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
     trainer->magnify = (ssdgs_real *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->magnify);
     trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent || !trainer->magnify ||
-        !trainer->global_mean || !trainer->global_square) return SSDGS_ERR_MEMORY;
+    if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent ||
+        !trainer->magnify || !trainer->global_mean || !trainer->global_square)
+        return SSDGS_ERR_MEMORY;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
     for (i = 0; i < photo_count; i++) {
@@ -7853,7 +8589,9 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (result) return result;
     for (i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
     trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
-    if (empty) ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty, photo_count);
+    if (empty)
+        ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty,
+                    photo_count);
     if (!trainer->outlines && empty < photo_count) ssdgs__judge_background(trainer);
     for (i = 0; i < photo_count; i++) {
         double centre[3];
@@ -7865,7 +8603,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         ssdgs__camera_centre(&photos[i].camera, centre);
         for (j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
         radius = sqrt(d2) > radius ? sqrt(d2) : radius;
-        for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j]; j++) {}
+        for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j];
+             j++) {}
         within += j == 3;
         for (j = 0; j < 3 && !(photos[i].light.intensity[j] > 0); j++) {}
         dark += j == 3;
@@ -7883,7 +8622,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (fresh && !result) { /* the model stays as it was when that fails */
         const ssdgs_settings *s = &model->settings;
         const int scaled = ssdgs__has_unit(s);
-        /* the logarithm of I / d^2 at the object averages 0: few strong lights, or one inside of it, must not darken all others */
+        /* the logarithm of I / d^2 at the object averages 0: few strong lights, or one inside of it, must not
+           darken all others */
         const double nearest2 = 0.25 * trainer->unit * trainer->unit;
         double scale;
         if (scaled) model->settings.length_unit = (ssdgs_real)(0.5 * trainer->unit);
@@ -7943,7 +8683,8 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     if (at == 0)
         for (i = n - 1; i > 0; i--) {
             const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373),
-                                               pass * (uint64_t)n + (uint64_t)i) * (i + 1));
+                                               pass * (uint64_t)n + (uint64_t)i) *
+                                (i + 1));
             const uint32_t swap = trainer->order[i];
             trainer->order[i] = trainer->order[j];
             trainer->order[j] = swap;
@@ -7951,22 +8692,28 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     return (int)trainer->order[at];
 }
 
-/* Adds the gradient of opacity_fade x the sum of opacities / pixels at time t, where outlines are not known. */
+/* Adds the gradient of opacity_fade x the sum of opacities / pixels at time t, where outlines are not
+   known. */
 static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, ssdgs_real *gradient) {
     const size_t n = (size_t)trainer->model->count;
     const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
-    const double fade = !trainer->backdrop || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
+    const double fade =
+        !trainer->backdrop || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
     size_t i;
     for (i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
-        if (a > 0) gradient[i] += (ssdgs_real)(fade * a * (1 - a)); /* one that is no number is not drawn either */
+        if (a > 0)
+            gradient[i] += (ssdgs_real)(fade * a * (1 - a)); /* one that is no number is not drawn either */
     }
 }
 
 /* Whether the Gaussians are where the trainer left them. */
 static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
-    return trainer->arrangement == trainer->model->arrangement ? SSDGS_OK : ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT,
-            "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
+    return trainer->arrangement == trainer->model->arrangement
+               ? SSDGS_OK
+               : ssdgs__fail(
+                     trainer->context, SSDGS_ERR_ARGUMENT,
+                     "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
 }
 
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
@@ -7989,11 +8736,13 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     for (j = 0; j < 3; j++)
         background[j] = o->random_background && (trainer->transparent[photo] || trainer->filled)
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
-                                                         3 * (uint64_t)trainer->iteration + (uint64_t)j) : o->background[j];
+                                                         3 * (uint64_t)trainer->iteration + (uint64_t)j)
+                            : o->background[j];
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    for (j = 0; j < 2; j++) frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
-    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light, background, terms, frozen,
-                                   o->dssim, o->normal_weight, &values);
+    for (j = 0; j < 2; j++)
+        frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
+    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light,
+                                   background, terms, frozen, o->dssim, o->normal_weight, &values);
     if (result) return result;
     ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
     for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
@@ -8001,31 +8750,43 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     moves[1] = o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
     for (j = 0; j < 9 && !result; j++)
         if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
-            result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE, "iteration %d refused: the gradient of photograph %d's %s "
-                                 "is not finite", trainer->iteration, photo, j > 5 ? "light" : "camera");
-    ssdgs__fade(trainer, t, (double)camera.width * camera.height, frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
+            result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
+                                 "iteration %d refused: the gradient of photograph %d's %s "
+                                 "is not finite",
+                                 trainer->iteration, photo, j > 5 ? "light" : "camera");
+    ssdgs__fade(trainer, t, (double)camera.width * camera.height,
+                frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
     if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
     trainer->skipped += result != SSDGS_OK;
     if (!result) {
-        const double shows = (double)o->iterations / trainer->photo_count, wider = shows < 300 ? sqrt(300 / shows) : 1;
+        const double shows = (double)o->iterations / trainer->photo_count,
+                     wider = shows < 300 ? sqrt(300 / shows) : 1;
         const double angle = ssdgs__view_angle(&camera);
-        if (moves[0]) ssdgs__correction_step(correction, gradient, 0,
-                                             wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
-                                             trainer->unit, angle);
-        if (moves[0] && o->position.start > 0) ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
-        if (moves[1]) ssdgs__correction_step(correction, gradient, 1,
-                                             wider * ssdgs__decay(o->light_rate, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
-                                             trainer->unit, angle);
+        if (moves[0])
+            ssdgs__correction_step(correction, gradient, 0,
+                                   wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) *
+                                       (t < 20e3 ? t / 20e3 : 1),
+                                   trainer->unit, angle);
+        if (moves[0] && o->position.start > 0)
+            ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
+        if (moves[1])
+            ssdgs__correction_step(correction, gradient, 1,
+                                   wider * ssdgs__decay(o->light_rate, 0, 60e3, t) *
+                                       (t < 30e3 ? t / 30e3 : 1),
+                                   trainer->unit, angle);
     }
     if (!trainer->iteration && !frame.shaded_count)
-        ssdgs__note(trainer->context, "the first photograph drawn has no Gaussian in view: do the camera's axes, position, near_plane "
-                    "and the bounds suit each other?");
+        ssdgs__note(
+            trainer->context,
+            "the first photograph drawn has no Gaussian in view: do the camera's axes, position, near_plane "
+            "and the bounds suit each other?");
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;
     until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
         ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photo]);
-        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0) result = ssdgs__densify(trainer);
+        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0)
+            result = ssdgs__densify(trainer);
         if (ssdgs__resets(o, trainer->iteration)) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
@@ -8063,29 +8824,36 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
         if ((result && result != SSDGS_ERR_NONFINITE) || bad == 10) break;
         result = SSDGS_OK;
         if (!progress || progress(user, &stats)) continue;
-        result = ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d", trainer->iteration);
+        result = ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d",
+                             trainer->iteration);
         break;
     }
     trainer->running--;
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera, ssdgs_light *light) {
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
+                                             ssdgs_light *light) {
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    if (!camera || !light) return ssdgs__null(trainer->context, "ssdgs_trainer_refined", camera ? "light" : "camera");
+    if (!camera || !light)
+        return ssdgs__null(trainer->context, "ssdgs_trainer_refined", camera ? "light" : "camera");
     if (index < 0 || index >= trainer->photo_count)
-        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "ssdgs_trainer_refined: photograph %d of %d", index, trainer->photo_count);
+        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "ssdgs_trainer_refined: photograph %d of %d",
+                           index, trainer->photo_count);
     ssdgs__correct(trainer->photos + index, trainer->corrections[index].value, camera, light);
     return SSDGS_OK;
 }
 
-SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options, int width, int height) {
+SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
+                                    int width, int height) {
     ssdgs__block_layout layout;
     size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
     ssdgs_frame frame;
     double across, map;
     if (!settings || settings->baked || !options || width < 1 || height < 1 || width > SSDGS__MAX_SIDE ||
-        height > SSDGS__MAX_SIDE || ssdgs__settings_check(NULL, settings) || ssdgs__options_check(NULL, options)) return 0;
+        height > SSDGS__MAX_SIDE || ssdgs__settings_check(NULL, settings) ||
+        ssdgs__options_check(NULL, options))
+        return 0;
     memset(&frame, 0, sizeof frame);
     frame.settings = *settings;
     frame.terms = settings->terms;
@@ -8094,27 +8862,36 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     layout = ssdgs__layout(&frame);
     ssdgs__global_groups(settings, first);
     n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
-    points = options->initial_points > 0 && (size_t)options->initial_points < n ? (size_t)options->initial_points : n;
-    /* tiles of random points, six standard deviations wide, where the bounds fill the image; later about three */
+    points = options->initial_points > 0 && (size_t)options->initial_points < n
+                 ? (size_t)options->initial_points
+                 : n;
+    /* tiles of random points, six standard deviations wide, where the bounds fill the image; later about
+       three */
     across = 6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
     instances = (size_t)((double)points * across * across);
     instances = 2 * n + (instances > 3 * n ? instances : 3 * n);
     per_instance = sizeof(ssdgs_real) * (8 + 4 * layers) + sizeof(ssdgs_tile_entry) + 12;
-    /* parameters and two moments with a quarter of slack, gradients, splat records of two views, activations */
-    per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) + 160;
-    fixed = SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
+    /* parameters and two moments with a quarter of slack, gradients, splat records of two views,
+       activations */
+    per_gaussian = sizeof(ssdgs_real) *
+                       (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) +
+                   160;
+    fixed =
+        SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
         6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     /* a light's map inside of the scene: the more Gaussians the smaller they are */
     map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
     if (settings->light_map_size) map = settings->light_map_size;
-    if (layers > 1) fixed += 6 * SSDGS__FALL_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
+    if (layers > 1)
+        fixed += 6 * SSDGS__FALL_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
 }
 
-static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
-                                    ssdgs_real *image, ssdgs_metrics *metrics) {
+static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo,
+                                    const ssdgs_real background[3], ssdgs_real *image,
+                                    ssdgs_metrics *metrics) {
     ssdgs_context *context = model->context;
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_image out;
@@ -8128,7 +8905,8 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     result = ssdgs__photo_check(context, photo, -1, background);
     if (result) return result;
     pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    if (pixels > SIZE_MAX / 9 / sizeof *rendered) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %z pixels", pixels);
+    if (pixels > SIZE_MAX / 9 / sizeof *rendered)
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %z pixels", pixels);
     rendered = (ssdgs_real *)ssdgs__allocate(context, pixels * 9 * sizeof *rendered);
     if (!rendered) return SSDGS_ERR_MEMORY;
     target = rendered + 3 * pixels;
@@ -8143,21 +8921,25 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
         for (i = 0; i < pixels; i++)
             for (c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
         if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);
-        result = ssdgs__compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
+        result =
+            ssdgs__compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
     }
     ssdgs__release(context, rendered);
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo, const ssdgs_real background[3],
-                                      ssdgs_real *image, ssdgs_metrics *metrics) {
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
+                                      const ssdgs_real background[3], ssdgs_real *image,
+                                      ssdgs_metrics *metrics) {
     ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(model->context, "ssdgs_evaluate");
-    return result ? result : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
+    return result ? result
+                  : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
 }
 
-/* As long as the longest side of a trainer's bounds; where settings have no such unit, of the Gaussians' box. */
+/* As long as the longest side of a trainer's bounds; where settings have no such unit, of the Gaussians'
+   box. */
 static double ssdgs__model_unit(const ssdgs_model *model) {
     double unit = 0;
     int i, c;
@@ -8175,7 +8957,8 @@ static double ssdgs__model_unit(const ssdgs_model *model) {
     return unit;
 }
 
-static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
+static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
+                                        const ssdgs_real background[3], int iterations) {
     static const int frozen[2] = {1, 1};
     ssdgs__correction correction;
     ssdgs__loss_values values;
@@ -8185,8 +8968,11 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo, 
     ssdgs_result result;
     double unit, angle;
     int i, j;
-    if (!photo || !background) return ssdgs__null(model->context, "ssdgs_refine_photo", photo ? "background" : "photo");
-    if (iterations < 0) return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_refine_photo: %d iterations", iterations);
+    if (!photo || !background)
+        return ssdgs__null(model->context, "ssdgs_refine_photo", photo ? "background" : "photo");
+    if (iterations < 0)
+        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_refine_photo: %d iterations",
+                           iterations);
     result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
     memset(&correction, 0, sizeof correction);
@@ -8195,16 +8981,18 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo, 
     for (i = 0; i < iterations; i++) {
         double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
-        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background, model->settings.terms, frozen,
-                                       (ssdgs_real)0.2, 0, &values);
+        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background,
+                                       model->settings.terms, frozen, (ssdgs_real)0.2, 0, &values);
         if (result) return result;
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
         for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
         for (j = 0; j < 9; j++)
-            if (!ssdgs__finite((ssdgs_real)gradient[j])) return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
-                    "refinement: a gradient is not finite");
+            if (!ssdgs__finite((ssdgs_real)gradient[j]))
+                return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
+                                   "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
-        if (light.kind == SSDGS_LIGHT_POINT) ssdgs__correction_step(&correction, gradient, 1, rate, unit, angle);
+        if (light.kind == SSDGS_LIGHT_POINT)
+            ssdgs__correction_step(&correction, gradient, 1, rate, unit, angle);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
     photo->camera = camera;
@@ -8212,11 +9000,13 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo, 
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo, const ssdgs_real background[3], int iterations) {
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
+                                          const ssdgs_real background[3], int iterations) {
     ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(model->context, "ssdgs_refine_photo");
-    return result ? result : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
+    return result ? result
+                  : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
 }
 
 #ifndef SSDGS_NO_STDIO
@@ -8235,7 +9025,8 @@ static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* F
 typedef struct ssdgs__checkpoint_head {
     char magic[8];
     uint32_t byte_order, version, real_size, fused; /* products and sums rounded once: FMA */
-    uint64_t inputs;     /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
+    uint64_t
+        inputs; /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
     double start_size;
@@ -8247,7 +9038,8 @@ typedef ssdgs_result (*ssdgs__visit)(void *user, void *data, size_t size);
 
 static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs__visit visit, void *user) {
     ssdgs_model *model = trainer->model;
-    const size_t n = (size_t)model->count * sizeof(ssdgs_real), globals = model->global_count * sizeof(ssdgs_real);
+    const size_t n = (size_t)model->count * sizeof(ssdgs_real),
+                 globals = model->global_count * sizeof(ssdgs_real);
     ssdgs_real *planes[3], *statistics[SSDGS__STATISTICS], *shared[3];
     ssdgs_result result = SSDGS_OK;
     int i, c;
@@ -8262,16 +9054,20 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     shared[1] = trainer->global_mean;
     shared[2] = trainer->global_square;
     for (i = 0; i < 3 && !result; i++) {
-        for (c = 0; c < SSDGS_CHANNELS && !result; c++) result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
+        for (c = 0; c < SSDGS_CHANNELS && !result; c++)
+            result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
         if (!result) result = visit(user, shared[i], globals);
     }
     for (i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
     if (!result) result = visit(user, trainer->order, (size_t)trainer->photo_count * sizeof *trainer->order);
-    if (!result) result = visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
+    if (!result)
+        result =
+            visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
     return result;
 }
 
-#define SSDGS__SETTINGS_INTS (offsetof(ssdgs_settings, light_map_size) + sizeof(int) - offsetof(ssdgs_settings, terms))
+#define SSDGS__SETTINGS_INTS \
+    (offsetof(ssdgs_settings, light_map_size) + sizeof(int) - offsetof(ssdgs_settings, terms))
 
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
     const ssdgs_settings *s = &trainer->model->settings;
@@ -8286,7 +9082,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
                                offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
     head->inputs = ssdgs__fold(head->inputs, &s->terms, SSDGS__SETTINGS_INTS);
-    head->inputs = ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
+    head->inputs =
+        ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
     for (i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const ssdgs_camera *camera = &photo->camera;
@@ -8309,7 +9106,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
 }
 
 /* Copies what a checkpoint begins with; what is wrong, or NULL. */
-static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t size, ssdgs__checkpoint_head *head) {
+static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t size,
+                                             ssdgs__checkpoint_head *head) {
     memset(head, 0, sizeof *head);
     memcpy(head, bytes, size < sizeof *head ? size : sizeof *head);
     if (memcmp(head->magic, SSDGS__CHECKPOINT_MAGIC, 7)) return "it is not a checkpoint";
@@ -8319,7 +9117,11 @@ static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t 
     return size < sizeof *head + 8 ? "it is cut short" : NULL;
 }
 
-typedef struct ssdgs__checkpoint_io { ssdgs__writer *writer; const unsigned char *bytes; uint64_t hash; } ssdgs__checkpoint_io;
+typedef struct ssdgs__checkpoint_io {
+    ssdgs__writer *writer;
+    const unsigned char *bytes;
+    uint64_t hash;
+} ssdgs__checkpoint_io;
 
 static ssdgs_result ssdgs__checkpoint_write(void *user, void *data, size_t size) {
     ssdgs__checkpoint_io *io = (ssdgs__checkpoint_io *)user;
@@ -8361,7 +9163,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
 /* Whether what Adam and the density control rely on makes sense; Gaussians may be anything, as in a model. */
 static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const unsigned char *at) {
     const size_t planes = (size_t)head->count * SSDGS_CHANNELS, shared = (size_t)head->global_count;
-    const size_t sizes[7] = {planes, shared, planes, shared, planes, shared, (size_t)head->count * SSDGS__STATISTICS};
+    const size_t sizes[7] = {
+        planes, shared, planes, shared, planes, shared, (size_t)head->count * SSDGS__STATISTICS};
     size_t k;
     int part, i, j;
     for (part = 0; part < 7; part++)
@@ -8380,7 +9183,8 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
         memcpy(&c, at, sizeof c);
         for (j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
-                !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0) return 0;
+                !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0)
+                return 0;
         for (j = 0; j < 2; j++)
             if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
     }
@@ -8404,21 +9208,26 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     ssdgs__checkpoint_describe(trainer, &own);
     reason = ssdgs__checkpoint_head_of(bytes, size, &head);
     if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
-                    head.inputs != own.inputs || memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS)))
+                    head.inputs != own.inputs ||
+                    memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS)))
         reason = "it belongs to other options, settings or photographs";
-    if (!reason && (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
-             (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
-             head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 || head.skipped > head.iteration ||
-             !(head.start_size >= 0 && head.start_size < 1e30)))
+    if (!reason &&
+        (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
+         (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
+         head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 ||
+         head.skipped > head.iteration || !(head.start_size >= 0 && head.start_size < 1e30)))
         reason = "its counts are out of range";
     for (i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
-        expected = sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
-                   sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) + 3 * (size_t)head.global_count);
+        expected = sizeof head + 8 +
+                   (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
+                   sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) +
+                                         3 * (size_t)head.global_count);
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
         if (size != expected) reason = "it is cut short or too long";
-        else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8)) reason = "its checksum is wrong";
+        else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8))
+            reason = "its checksum is wrong";
         else if (!ssdgs__checkpoint_sound(&head, bytes + sizeof head)) reason = "its values are out of range";
         else if (ssdgs__settings_check(context, &head.settings)) reason = "its settings are out of range";
     }
@@ -8429,7 +9238,9 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
         if (head.fused != own.fused)
-            ssdgs__note(context, "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
+            ssdgs__note(
+                context,
+                "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
@@ -8462,7 +9273,8 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
     if (!context) return SSDGS_ERR_ARGUMENT;
     result = ssdgs__enter(context, "ssdgs_checkpoint_iteration");
     if (result) return result;
-    if (!path || !iteration) result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
+    if (!path || !iteration)
+        result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
     else result = ssdgs__read_file(context, path, &bytes, &size);
     if (!result) {
         reason = ssdgs__checkpoint_head_of(bytes, size, &head);
@@ -8484,11 +9296,11 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #pragma GCC pop_options
 #endif
 #endif /* SSDGS_IMPLEMENTATION */
-#else /* SSDGS__ISA: the kernels, included once per instruction set */
+#else  /* SSDGS__ISA: the kernels, included once per instruction set */
 
 /* ==== >>kernels  one body for every instruction set ====
-   V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm (except in the double
-   build) and fuse only through VFMA, so a forward and its backward round alike. */
+   V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm
+   (except in the double build) and fuse only through VFMA, so a forward and its backward round alike. */
 
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
 #define SSDGS__NAME(name) ssdgs__##name##_scalar
@@ -8517,7 +9329,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VBITS(m) (m)
 #define VSEL(m, a, b) ((m) ? (a) : (b))
 #define VROUND(a) ssdgs__round(a)
-#define VLDEXP(x, n) ((x) * ssdgs__pow2(n))
+#define VLDEXP(x, n) ((x)*ssdgs__pow2(n))
 #define VEXPONENT(x) ssdgs__exponent(x)
 
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
@@ -8547,8 +9359,10 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VBITS(m) _mm_movemask_ps(m)
 #define VSEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
 #define VROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
-#define VLDEXP(x, n) _mm_castsi128_ps(_mm_add_epi32(_mm_castps_si128(x), _mm_slli_epi32(_mm_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) _mm_cvtepi32_ps(_mm_sub_epi32(_mm_srli_epi32(_mm_castps_si128(x), 23), _mm_set1_epi32(127)))
+#define VLDEXP(x, n) \
+    _mm_castsi128_ps(_mm_add_epi32(_mm_castps_si128(x), _mm_slli_epi32(_mm_cvtps_epi32(n), 23)))
+#define VEXPONENT(x) \
+    _mm_cvtepi32_ps(_mm_sub_epi32(_mm_srli_epi32(_mm_castps_si128(x), 23), _mm_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
 #define SSDGS__NAME(name) ssdgs__##name##_avx2
@@ -8577,8 +9391,12 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VBITS(m) _mm256_movemask_ps(m)
 #define VSEL(m, a, b) _mm256_blendv_ps(b, a, m)
 #define VROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
-#define VLDEXP(x, n) _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x), _mm256_slli_epi32(_mm256_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(x), 23), _mm256_set1_epi32(127)))
+#define VLDEXP(x, n) \
+    _mm256_castsi256_ps( \
+        _mm256_add_epi32(_mm256_castps_si256(x), _mm256_slli_epi32(_mm256_cvtps_epi32(n), 23)))
+#define VEXPONENT(x) \
+    _mm256_cvtepi32_ps( \
+        _mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(x), 23), _mm256_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX512
 #define SSDGS__NAME(name) ssdgs__##name##_avx512
@@ -8606,9 +9424,14 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VAND(m, n) ((__mmask16)((m) & (n)))
 #define VBITS(m) ((int)(m))
 #define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) _mm512_cvtepi32_ps(_mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC))
-#define VLDEXP(x, n) _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
+#define VROUND(a) \
+    _mm512_cvtepi32_ps(_mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC))
+#define VLDEXP(x, n) \
+    _mm512_castsi512_ps( \
+        _mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
+#define VEXPONENT(x) \
+    _mm512_cvtepi32_ps( \
+        _mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_NEON
 #define SSDGS__NAME(name) ssdgs__##name##_neon
@@ -8637,8 +9460,11 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VBITS(m) ((int)vaddvq_u32(vandq_u32(m, vld1q_u32(ssdgs__lane_bits))))
 #define VSEL(m, a, b) vbslq_f32(m, a, b)
 #define VROUND(a) vrndnq_f32(a)
-#define VLDEXP(x, n) vreinterpretq_f32_s32(vaddq_s32(vreinterpretq_s32_f32(x), vshlq_n_s32(vcvtnq_s32_f32(n), 23)))
-#define VEXPONENT(x) vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
+#define VLDEXP(x, n) \
+    vreinterpretq_f32_s32(vaddq_s32(vreinterpretq_s32_f32(x), vshlq_n_s32(vcvtnq_s32_f32(n), 23)))
+#define VEXPONENT(x) \
+    vcvtq_f32_s32( \
+        vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
 #endif
 
 #define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
@@ -8659,8 +9485,8 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
 #define VABS(a) VMAX(a, VNEG(a))
 #define VDOT3(ax, ay, az, bx, by, bz) VFMA(az, bz, VFMA(ay, by, VMUL(ax, bx)))
 
-/* Sums over lanes are sums of sixteen, SSDGS__NV vectors of them, by halves whatever the width: all instruction sets that fuse
-   products and sums give the same bits, and so do all that do not. */
+/* Sums over lanes are sums of sixteen, SSDGS__NV vectors of them, by halves whatever the width: all
+   instruction sets that fuse products and sums give the same bits, and so do all that do not. */
 SSDGS__FI R F(sum)(const V *v) {
     R lane[16];
     int n, i;
@@ -8678,7 +9504,8 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     __m512 abcd = _mm512_add_ps(_mm512_shuffle_f32x4(ab, cd, 0x88), _mm512_shuffle_f32x4(ab, cd, 0xDD));
     abcd = _mm512_add_ps(abcd, _mm512_permute_ps(abcd, 0x4E));
     abcd = _mm512_add_ps(abcd, _mm512_permute_ps(abcd, 0xB1));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm512_castps512_ps128(_mm512_maskz_compress_ps(0x8421, abcd))));
+    _mm_storeu_ps(
+        out, _mm_add_ps(_mm_loadu_ps(out), _mm512_castps512_ps128(_mm512_maskz_compress_ps(0x8421, abcd))));
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
     const __m256 a1 = _mm256_add_ps(a[0], a[1]), b1 = _mm256_add_ps(b[0], b[1]);
     const __m256 c1 = _mm256_add_ps(c[0], c[1]), d1 = _mm256_add_ps(d[0], d[1]);
@@ -8696,7 +9523,8 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     const __m128 d1 = _mm_add_ps(_mm_add_ps(d[0], d[2]), _mm_add_ps(d[1], d[3]));
     const __m128 ab = _mm_add_ps(_mm_unpacklo_ps(a1, b1), _mm_unpackhi_ps(a1, b1));
     const __m128 cd = _mm_add_ps(_mm_unpacklo_ps(c1, d1), _mm_unpackhi_ps(c1, d1));
-    _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab))));
+    _mm_storeu_ps(out,
+                  _mm_add_ps(_mm_loadu_ps(out), _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab))));
 #else
     out[0] += F(sum)(a);
     out[1] += F(sum)(b);
@@ -8715,7 +9543,8 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
     VUNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
 #else
     for (i = 0; i < 16; i++)
-        out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] = in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
+        out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] =
+            in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
 #endif
 }
 
@@ -8725,7 +9554,10 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
 SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
 SSDGS__FI V F(log)(V x) { return log(x); }
-SSDGS__FI void F(sincos)(V x, V *s, V *c) { *s = sin(x); *c = cos(x); }
+SSDGS__FI void F(sincos)(V x, V *s, V *c) {
+    *s = sin(x);
+    *c = cos(x);
+}
 SSDGS__FI V F(atan2_upper)(V y, V x) { return atan2(y, x); }
 SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
@@ -8832,13 +9664,15 @@ SSDGS__FI V F(atan2_upper)(V y, V x) {
 SSDGS__FI V F(sigmoid)(V x) { return VDIV(VSET(1), VADD(VSET(1), VEXP(VNEG(x)))); }
 SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(VABS(x))))); }
 
-/* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the identity. */
+/* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the
+   identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
     V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
     V least = VSET(1e-37), two = VSET(2), one = VSET(1), norm2;
     V inverse = VSEL(VLT(largest, least), VSET(0), VDIV(one, VMAX(largest, least)));
     int i;
-    for (i = 0; i < 4; i++) q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
+    for (i = 0; i < 4; i++)
+        q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
     norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
     norm2 = VDIV(one, VSQRT(norm2));
     for (i = 0; i < 4; i++) q[i] = VMUL(q[i], norm2);
@@ -8874,19 +9708,23 @@ SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V 
 
 /* What both directions need of a projection, per lane. */
 typedef struct F(projection) {
-    V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det, opacity; /* cross = m0 x m1 */
+    V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det,
+        opacity; /* cross = m0 x m1 */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
-SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, const R *g, size_t stride, VM off) {
+SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, const R *g, size_t stride,
+                                VM off) {
     V raw[4];
     int i, j;
     for (i = 0; i < 3; i++) p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
-    for (i = 0; i < 4; i++) raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
+    for (i = 0; i < 4; i++)
+        raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
     for (i = 0; i < 3; i++) {
         V log_scale = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
         p->s[i] = VEXP(VMAX(VSET(-20), VMIN(VSET(20), log_scale)));
-        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]), p->x[0], p->x[1], p->x[2]),
+        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]),
+                             p->x[0], p->x[1], p->x[2]),
                        VSET(k->view[4 * i + 3]));
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
@@ -8894,15 +9732,18 @@ SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, co
     for (i = 0; i < 2; i++) { /* rows of J W */
         V focal = VMUL(VSET(i ? k->fy : k->fx), p->inverse_z);
         V slope = k->orthographic ? VSET(0) : VMUL(p->t[i], p->inverse_z);
-        for (j = 0; j < 3; j++) p->row[i][j] = VMUL(focal, VFNMA(slope, VSET(k->view[8 + j]), VSET(k->view[4 * i + j])));
+        for (j = 0; j < 3; j++)
+            p->row[i][j] = VMUL(focal, VFNMA(slope, VSET(k->view[8 + j]), VSET(k->view[4 * i + j])));
         for (j = 0; j < 3; j++) /* m = J W R S */
-            p->m[i][j] = VMUL(p->s[j], VDOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
+            p->m[i][j] = VMUL(
+                p->s[j], VDOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
     }
     p->a = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
     p->b = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
     p->c = VDOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
     for (i = 0; i < 3; i++) { /* difference of products, its rounding error put back by the fused operation */
-        V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3], v1 = p->m[1][(i + 1) % 3];
+        V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3],
+          v1 = p->m[1][(i + 1) % 3];
         V product = VMUL(u1, v1);
         p->cross[i] = VADD(VFMA(u0, v0, VNEG(product)), VFNMA(u1, v1, product));
     }
@@ -8919,8 +9760,8 @@ SSDGS__FI void F(project_lanes)(F(projection) *p, const ssdgs__projection *k, co
     p->opacity = F(sigmoid)(VMAX(VSET(-20), VMIN(VSET(20), p->opacity)));
 }
 
-SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
-                          R *record, R *depth) {
+SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
+                          size_t end, R *record, R *depth) {
     const V log2e = VSET(1.44269504088896341);
     size_t i;
     for (i = begin; i < end; i += SSDGS__VW) {
@@ -8935,21 +9776,25 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
         x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
         y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
-        reach = VMAX(VSET(0), VMUL(VSET(2 * 0.69314718055994531), VSUB(log2_opacity, VSET(k->log2_threshold))));
+        reach =
+            VMAX(VSET(0), VMUL(VSET(2 * 0.69314718055994531), VSUB(log2_opacity, VSET(k->log2_threshold))));
         ex = VSQRT(VMUL(reach, VADD(p.a, p.h)));
         ey = VSQRT(VMUL(reach, VADD(p.c, p.h)));
         d = k->by_distance ? VSQRT(VDOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
         /* NaN fails every comparison, so nothing that is not finite is drawn */
-        drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)), VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
+        drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)),
+                     VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
         if (!k->orthographic) {
             V back = VSET(0); /* variance along z, of depths */
             for (f = 0; f < 3; f++) {
-                V axis = VMUL(VMUL(p.s[f], p.inverse_z),
-                              VDOT3(VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]), p.r[f], p.r[3 + f], p.r[6 + f]));
+                V axis =
+                    VMUL(VMUL(p.s[f], p.inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]),
+                                                          VSET(k->view[10]), p.r[f], p.r[3 + f], p.r[6 + f]));
                 back = VFMA(axis, axis, back);
             }
-            back = VSEL(VLT(VSET(SSDGS__STEEP), VMUL(VMAX(VABS(p.t[0]), VABS(p.t[1])), p.inverse_z)), back, VSET(0));
+            back = VSEL(VLT(VSET(SSDGS__STEEP), VMUL(VMAX(VABS(p.t[0]), VABS(p.t[1])), p.inverse_z)), back,
+                        VSET(0));
             drawn = VAND(drawn, VLT(back, VSET(SSDGS__BACK * SSDGS__BACK)));
         }
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
@@ -8968,7 +9813,8 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         for (f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
         for (f = 0; f < 8; f += 4)
-            for (l = 0; l < SSDGS__VW; l += 4) F(transpose4)(fields[f] + l, SSDGS__VW, record + (i + (size_t)l) * 8 + f, 8);
+            for (l = 0; l < SSDGS__VW; l += 4)
+                F(transpose4)(fields[f] + l, SSDGS__VW, record + (i + (size_t)l) * 8 + f, 8);
 #else
         for (f = 0; f < 8; f++)
             for (l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = fields[f][l];
@@ -8976,10 +9822,11 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
     }
 }
 
-/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes; view_slot (12) is
-   overwritten. */
-SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin, size_t end,
-                                   const R *splat, R *gradient, size_t gradient_stride, R *view_slot) {
+/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes;
+   view_slot (12) is overwritten. */
+SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride,
+                                   size_t begin, size_t end, const R *splat, R *gradient,
+                                   size_t gradient_stride, R *view_slot) {
     V view_sum[12][SSDGS__NV];
     size_t i;
     int j, l;
@@ -9009,21 +9856,24 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         half_g = VMUL(VSET(0.5), g[3]);
         inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         for (j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
-        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2 u_j.G u_j with u = K m.
-           Of a thin Gaussian K G K and K m as products are differences of large numbers; u = (h m + (m1 x X, X x m0)) / det with
-           X = m0 x m1 is none. */
+        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2
+           u_j.G u_j with u = K m. Of a thin Gaussian K G K and K m as products are differences of large
+           numbers; u = (h m + (m1 x X, X x m0)) / det with X = m0 x m1 is none. */
         for (j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
             const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
-                across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
-            const V u0 = VMUL(VFMA(p.h, p.m[0][j], across0), inverse_det), u1 = VMUL(VFMA(p.h, p.m[1][j], across1), inverse_det);
+                    across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
+            const V u0 = VMUL(VFMA(p.h, p.m[0][j], across0), inverse_det),
+                    u1 = VMUL(VFMA(p.h, p.m[1][j], across1), inverse_det);
             const V gu0 = VFMA(g[2], u0, VMUL(half_g, u1)), gu1 = VFMA(half_g, u0, VMUL(g[4], u1));
-            V dm0 = VMUL(VSET(-2), VFMA(ka, gu0, VMUL(kb, gu1))), dm1 = VMUL(VSET(-2), VFMA(kb, gu0, VMUL(kc, gu1)));
+            V dm0 = VMUL(VSET(-2), VFMA(ka, gu0, VMUL(kb, gu1))),
+              dm1 = VMUL(VSET(-2), VFMA(kb, gu0, VMUL(kc, gu1)));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
-            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i), ds = VMUL(VSET(-2), VFMA(u0, gu0, VMUL(u1, gu1)));
+            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
+              ds = VMUL(VSET(-2), VFMA(u0, gu0, VMUL(u1, gu1)));
             if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
                 const V push0 = VMUL(g[5], VSUB(VMUL(across0, inverse_det0), u0)),
-                    push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), u1));
+                        push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), u1));
                 dm0 = VADD(dm0, push0);
                 dm1 = VADD(dm1, push1);
                 ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));
@@ -9050,11 +9900,14 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         }
         dt[2] = g[7];
         for (l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
-            V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z), slope = VMUL(p.t[l], p.inverse_z);
+            V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z),
+              slope = VMUL(p.t[l], p.inverse_z);
             V w0 = VSET(k->view[4 * l]), w1 = VSET(k->view[4 * l + 1]), w2 = VSET(k->view[4 * l + 2]);
             V dj = VDOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
-            V dj2 = VDOT3(du[l][0], du[l][1], du[l][2], VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]));
-            V dslope = VFNMA(scaled, dj2, VMUL(focal, g[l])); /* slope = t / z stands in J and in the centre */
+            V dj2 =
+                VDOT3(du[l][0], du[l][1], du[l][2], VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]));
+            V dslope =
+                VFNMA(scaled, dj2, VMUL(focal, g[l])); /* slope = t / z stands in J and in the centre */
             dt[l] = VMUL(dslope, p.inverse_z);
             dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
             dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);
@@ -9076,11 +9929,12 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
 
 /* ==== >>bin_kernel  which 4x4 micro-tiles an ellipse touches ==== */
 
-/* The instances of the Gaussians from begin to end, from number `at` on. Of a Gaussian's box they are the tiles with pixels where
-   alpha may reach the threshold, row by row, and their micro-tiles (lanes here). Over the rectangle of a micro-tile's pixel
-   centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on the sides that face the centre: nearest dx with the best dy
-   for it, or nearest dy with the best dx. */
-SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin, int end, uint32_t at) {
+/* The instances of the Gaussians from begin to end, from number `at` on. Of a Gaussian's box they are the
+   tiles with pixels where alpha may reach the threshold, row by row, and their micro-tiles (lanes here). Over
+   the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
+   the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. */
+SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
+                      int end, uint32_t at) {
     const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
     const V zero = VSET(0), side = VSET(3);
     int g, v;
@@ -9102,10 +9956,13 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
             VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])), x1 = VADD(x0, side);
-                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])), y1 = VADD(y0, side);
+                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])),
+                  x1 = VADD(x0, side);
+                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])),
+                  y1 = VADD(y0, side);
                 V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
-                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)), on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
+                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
+                  on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
                 V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
                 V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
                 touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
@@ -9121,8 +9978,9 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
 }
 
 /* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ====
-   The tile's list is taken in batches; in a batch each 4x4 micro-tile runs through the entries that touch it with its pixels in
-   registers. Every walk finds alpha by the same operations in the same order, so all of them take the same decisions. */
+   The tile's list is taken in batches; in a batch each 4x4 micro-tile runs through the entries that touch it
+   with its pixels in registers. Every walk finds alpha by the same operations in the same order, so all of
+   them take the same decisions. */
 
 typedef struct F(batch) {
     R record[SSDGS__BATCH][8];
@@ -9132,7 +9990,7 @@ typedef struct F(batch) {
 } F(batch);
 
 /* Turns the masks of count entries, micro-tiles per entry, into entries per micro-tile. */
-SSDGS__FI void F(batch_transpose)(F(batch) *batch, int count) {
+SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
     int i, micro;
     for (micro = 0; micro < 16; micro++) batch->entries[micro] = 0;
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
@@ -9157,14 +10015,15 @@ SSDGS__FI void F(batch_transpose)(F(batch) *batch, int count) {
 #endif
 }
 
-SSDGS__FI void F(batch_add)(F(batch) *batch, int index, const ssdgs__tile *tile, uint32_t place, unsigned mask) {
+SSDGS__FI void F(batch_add)(F(batch) * batch, int index, const ssdgs__tile *tile, uint32_t place,
+                            unsigned mask) {
     batch->place[index] = place;
     batch->mask[index] = (uint16_t)mask;
     memcpy(batch->record[index], tile->record + (size_t)tile->list[place].gaussian * 8, 8 * sizeof(R));
 }
 
 /* Gathers the list's next entries that touch anything from *from on; returns how many. */
-SSDGS__FI int F(batch_gather)(F(batch) *batch, const ssdgs__tile *tile, uint32_t *from) {
+SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_t *from) {
     int n = 0;
     for (; n < SSDGS__BATCH && *from < tile->count; ++*from) {
         const unsigned mask = tile->seen ? tile->seen[*from] : tile->list[*from].mask;
@@ -9179,14 +10038,17 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
     V p;
     *dx = VSUB(px, VSET(record[0]));
     *dy = VSUB(py, VSET(record[1]));
-    p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy, VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
-    p = VMIN(VSET(record[5]), p); /* of a needle with its centre far away p is a small difference of large terms */
+    p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy,
+             VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
+    p = VMIN(VSET(record[5]),
+             p); /* of a needle with its centre far away p is a small difference of large terms */
     *drawn = VGE(p, log2_threshold);
     *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
 }
 
-/* Within a batch a transmittance runs on below the stop, which keeps the chain of products short; between two, -1 marks it. */
+/* Within a batch a transmittance runs on below the stop, which keeps the chain of products short; between
+   two, -1 marks it. */
 SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
 
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
@@ -9197,10 +10059,11 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
     }
 }
 
-/* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it, and with max_error > 0 whether it must
-   be shaded. A pixel passes over small weights as long as their sum stays within
-   max_error, so what no pixel needs adds up to no more than that in any. */
-SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed, const int thrifty) {
+/* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it, and with max_error >
+   0 whether it must be shaded. A pixel passes over small weights as long as their sum stays within max_error,
+   so what no pixel needs adds up to no more than that in any. */
+SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed,
+                                    const int thrifty) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     const V budget = VSET(tile->max_error), slight = VSET(tile->max_error * SSDGS__SHARE);
     R transmittance[16][16], passed_over[16][16];
@@ -9237,7 +10100,8 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
                     alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
-                    if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget needs everything */
+                    if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget
+                                                        needs everything */
                         const V w = VMUL(alpha, t[v]);
                         const VM light = VGE(slight, w);
                         over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
@@ -9263,13 +10127,14 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
     else F(walk_camera_lanes)(tile, blends, needed, 0);
 }
 
-/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho x cue, solid
-   angle x blend weight. An entry is sampled once everything nearer than its distance - bias is in the transmittance, and takes
-   part in it once its own distance is reached: two batches run along the list, the nearer one leaves what it has met after each
-   of its entries for the other to pick from. */
+/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho
+   x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
+   in the transmittance, and takes part in it once its own distance is reached: two batches run along the
+   list, the nearer one leaves what it has met after each of its entries for the other to pick from. */
 SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
-    R transmittance[16][16], met[16][16], next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
+    R transmittance[16][16], met[16][16],
+        next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
     unsigned char fallen[16][16];
     const int all = flux || tile->falls;
     F(batch) applied, sampled;
@@ -9286,12 +10151,15 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
     memset(fallen, 0, sizeof fallen);
     while (sampling < tile->count || (all && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
-        V lanes[SSDGS__BATCH][3][SSDGS__NV], energy[SSDGS__BATCH][SSDGS__NV]; /* the sums before the lanes are added up */
-        R history[2][SSDGS__BATCH][16]; /* transmittance and met, before the first applied and after each; 63 at most */
+        V lanes[SSDGS__BATCH][3][SSDGS__NV],
+            energy[SSDGS__BATCH][SSDGS__NV]; /* the sums before the lanes are added up */
+        R history[2][SSDGS__BATCH]
+                 [16]; /* transmittance and met, before the first applied and after each; 63 at most */
         int samples = 0, applies = 0;
         while (sampling < tile->count || (all && applying < tile->count)) {
-            const int sample = sampling < tile->count && tile->depth[tile->list[sampling].gaussian] - tile->bias <=
-                                                             tile->depth[tile->list[applying].gaussian];
+            const int sample =
+                sampling < tile->count && tile->depth[tile->list[sampling].gaussian] - tile->bias <=
+                                              tile->depth[tile->list[applying].gaussian];
             F(batch) *batch = sample ? &sampled : &applied;
             const uint32_t place = sample ? sampling : applying;
             const int n = sample ? samples : applies;
@@ -9324,7 +10192,8 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                     V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
                     w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
                     cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
-                    omega[v] = VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
+                    omega[v] =
+                        VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
                 }
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 VSTORE(history[0][0] + v * SSDGS__VW, t[v]);
@@ -9349,8 +10218,8 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                     if (fell) {
                         R from[16];
                         VSTORE(from + v * SSDGS__VW, before);
-                        ssdgs__falls_note(tile, micro, fell, from, history[0][index + 1], applied.record[index][6], next[micro],
-                                          fallen[micro]);
+                        ssdgs__falls_note(tile, micro, fell, from, history[0][index + 1],
+                                          applied.record[index][6], next[micro], fallen[micro]);
                     }
                     if (!cue) continue;
                     b[v] = VFMA(w, distance, b[v]);
@@ -9358,23 +10227,29 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 }
             }
             for (left = sampled.entries[micro]; left; left &= left - 1) {
-                const int index = ssdgs__lowest_bit(left), then = ssdgs__highest_bit((entries & nearer[index]) << 1);
+                const int index = ssdgs__lowest_bit(left),
+                          then = ssdgs__highest_bit((entries & nearer[index]) << 1);
                 const V distance = VSET(sampled.record[index][6]);
-                V (*sum)[SSDGS__NV] = lanes[index];
+                V(*sum)[SSDGS__NV] = lanes[index];
                 VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
                     V dx, dy, raw;
                     VM drawn;
                     (void)F(alpha)(sampled.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
+                    raw = VSEL(drawn, raw,
+                               VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
                     sum[0][v] = VFMA(raw, past, sum[0][v]);
                     sum[1][v] = VADD(sum[1][v], raw);
-                    if (cue) sum[2][v] = VFMA(raw, VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
-                                              sum[2][v]);
+                    if (cue)
+                        sum[2][v] = VFMA(
+                            raw,
+                            VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
+                            sum[2][v]);
                 }
             }
             VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
+                VSTORE(transmittance[micro] + v * SSDGS__VW,
+                       VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
                 if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
             }
         }
@@ -9393,7 +10268,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
 
 /* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ====
    pixels: [layer][micro-tile][3 colours, transmittance in the first layer][16 lanes]. */
-SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color, R *pixels) {
+SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color,
+                                   R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
     R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], transmittance[16][16];
@@ -9409,7 +10285,8 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
         n = F(batch_gather)(&batch, tile, &from);
         for (layer = 0; layer < layers; layer++)
             for (i = 0; i < n; i++)
-                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
+                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4,
+                       4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
@@ -9437,21 +10314,17 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
             }
             for (layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
                 V c[SSDGS__LAYERS][3][SSDGS__NV];
-                VUNROLL for (l = 0; l < at_once; l++)
-                    VUNROLL for (v = 0; v < SSDGS__NV; v++)
-                        VUNROLL for (i = 0; i < 3; i++)
-                            c[l][i][v] = VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
-                for (n = 0; n < used; n++)
-                    VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (v = 0; v < SSDGS__NV; v++)
+                    VUNROLL for (i = 0; i < 3; i++) c[l][i][v] =
+                        VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                for (n = 0; n < used; n++) VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                         const V w = VLOAD(weight[n] + v * SSDGS__VW);
-                        VUNROLL for (l = 0; l < at_once; l++)
-                            VUNROLL for (i = 0; i < 3; i++)
-                                c[l][i][v] = VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
+                        VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (i = 0; i < 3; i++) c[l][i][v] =
+                            VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
                     }
-                VUNROLL for (l = 0; l < at_once; l++)
-                    VUNROLL for (v = 0; v < SSDGS__NV; v++)
-                        VUNROLL for (i = 0; i < 3; i++)
-                            VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
+                VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (v = 0; v < SSDGS__NV; v++)
+                    VUNROLL for (i = 0; i < 3; i++)
+                        VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
             }
         }
     }
@@ -9463,23 +10336,25 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const 
     else F(composite_layers)(SSDGS__LAYERS, tile, color, pixels);
 }
 
-/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the pixel][16 lanes]; scratch:
-   room for as many. Per entry adds to sums (n, stride) of g = dL/d(ln alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, blend
-   weight w of slot 0, 0; from 8 + 4 slot on w dC of each layer, three and one without meaning. Walks front to back again: what
-   lies behind an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
-SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color, const R *pixels,
-                                            R *scratch, R *sums, size_t stride, int slot) {
+/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the
+   pixel][16 lanes]; scratch: room for as many. Per entry adds to sums (n, stride) of g = dL/d(ln alpha): g, g
+   dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w of slot 0, 0; from 8 + 4 slot on w dC of each layer,
+   three and one without meaning. Walks front to back again: what lies behind an entry is the final pixel less
+   what has been passed, so alpha and T are the forward's, bit for bit. */
+SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color,
+                                            const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
-    const int wide = layers == SSDGS__LAYERS, width = 4 * layers; /* all layers: sums over pixels with lanes over their values */
+    const int wide = layers == SSDGS__LAYERS,
+              width = 4 * layers; /* all layers: sums over pixels with lanes over their values */
     F(batch) batch;
     R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], passed[16][16], transmittance[16][16];
     uint32_t from = 0;
     int which[SSDGS__BATCH], used, micro, v, i, n, layer;
     for (micro = 0; wide && micro < 16; micro++)
         for (layer = 0; layer < layers; layer++)
-            for (i = 0; i < 16; i += 4)
-                F(transpose4)(pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16,
-                              scratch + (micro * 16 + i) * width + 4 * layer, (size_t)width);
+            for (i = 0; i < 16; i += 4) F(transpose4)
+    (pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16, scratch + (micro * 16 + i) * width + 4 * layer,
+     (size_t)width);
     for (micro = 0; micro < 16; micro++)
         for (v = 0; v < 16; v++) {
             passed[micro][v] = 0;
@@ -9489,17 +10364,18 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
         n = F(batch_gather)(&batch, tile, &from);
         for (layer = 0; layer < layers; layer++)
             for (i = 0; i < n; i++)
-                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4, 4 * sizeof(R));
+                memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4,
+                       4 * sizeof(R));
         for (micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             const R *pixel = pixels + micro * 64, *rows = scratch + micro * 16 * width;
-            V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
+            V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV],
+                before[SSDGS__NV];
             if (!left) continue;
             F(pixel_centres)(tile, micro, px, py);
             VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VUNROLL for (layer = 0; layer < layers; layer++)
-                    VUNROLL for (i = 0; i < 3; i++)
-                        dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                VUNROLL for (layer = 0; layer < layers; layer++) VUNROLL for (i = 0; i < 3; i++)
+                    dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 product[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
@@ -9515,10 +10391,11 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
                     w = VMUL(alpha, before_it);
-                    part[0] = part[1] = part[2] = part[3] = zero; /* one chain of sums would be what all waits for */
-                    VUNROLL for (layer = 0; layer < layers; layer++)
-                        VUNROLL for (i = 0; i < 3; i++)
-                            part[layer & 3] = VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
+                    part[0] = part[1] = part[2] = part[3] =
+                        zero; /* one chain of sums would be what all waits for */
+                    VUNROLL for (layer = 0; layer < layers; layer++) VUNROLL for (i = 0; i < 3; i++)
+                        part[layer & 3] =
+                            VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
                     shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
                     before[v] = VFMA(w, shade, before[v]);
                     behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
@@ -9537,7 +10414,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     if (wide) VSTORE(weight[used] + v * SSDGS__VW, w);
                     else {
                         VUNROLL for (layer = 0; layer < layers; layer++) {
-                            VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] = VMUL(w, dc[layer][i][v]);
+                            VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] =
+                                VMUL(w, dc[layer][i][v]);
                             sum[11 + 4 * layer][v] = zero;
                         }
                     }
@@ -9546,8 +10424,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
                 if (wide) continue;
                 VUNROLL for (layer = 0; layer < layers; layer++)
-                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer], sum[10 + 4 * layer],
-                            sum[11 + 4 * layer]);
+                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer],
+                            sum[10 + 4 * layer], sum[11 + 4 * layer]);
             }
             for (n = 0; wide && n < used; n++) {
                 R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
@@ -9555,8 +10433,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 VUNROLL for (v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
                 for (i = 0; i < 16; i++) {
                     const V w = VSET(weight[n][i]);
-                    VUNROLL for (v = 0; v < width / SSDGS__VW; v++)
-                        sum[v] = VFMA(w, VLOAD(rows + i * width + v * SSDGS__VW), sum[v]);
+                    VUNROLL for (v = 0; v < width / SSDGS__VW; v++) sum[v] =
+                        VFMA(w, VLOAD(rows + i * width + v * SSDGS__VW), sum[v]);
                 }
                 VUNROLL for (v = 0; v < width / SSDGS__VW; v++)
                     VSTORE(out + v * SSDGS__VW, VADD(VLOAD(out + v * SSDGS__VW), sum[v]));
@@ -9569,8 +10447,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
     }
 }
 
-SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color, const R *pixels, R *scratch,
-                                     R *sums, size_t stride, int slot) {
+SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color,
+                                     const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
     if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, scratch, sums, stride, slot);
     else if (layers == SSDGS__PER_LIGHT)
         F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, scratch, sums, stride, slot);
@@ -9578,9 +10456,9 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
 }
 
 /* ==== >>transport_kernel ====
-   sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest length.
-   Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one exponential for the longest l,
-   its squares for the others. */
+   sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest
+   length. Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one
+   exponential for the longest l, its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
     int s, i, k;
     for (s = 0; s < 16; s += SSDGS__VW) {
@@ -9590,8 +10468,10 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
         VUNROLL for (k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
         for (i = 0; i < count; i++) {
             const R *source = sources + 4 * i;
-            const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])), dz = VSUB(pz, VSET(source[2]));
-            const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))), weight = VDIV(VSET(source[3]), r);
+            const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])),
+                    dz = VSUB(pz, VSET(source[2]));
+            const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))),
+                    weight = VDIV(VSET(source[3]), r);
             V e = F(exp2)(VMUL(r, longest));
             VUNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
                 sum[k] = VFMA(weight, e, sum[k]);
@@ -9603,24 +10483,27 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
 }
 
 /* ==== >>dense_kernel  all three matrix products of a linear layer ====
-   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and the depths listed;
-   a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the outputs all serve without a copy; lanes
-   run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x SSDGS__TV vectors stay in registers. */
-typedef struct F(offsets) { uint32_t a, b; } F(offsets); /* of a depth, multiplied out before the inner loop */
+   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and
+   the depths listed; a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the
+   outputs all serve without a copy; lanes run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x
+   SSDGS__TV vectors stay in registers. */
+typedef struct F(offsets) {
+    uint32_t a, b;
+} F(offsets); /* of a depth, multiplied out before the inner loop */
 
 /* The body for a tile's number of rows, 6 at most: a constant in it. */
-#define SSDGS__BY_HEIGHT(rows, tile, ...)    \
-    switch (rows) {                          \
-        case 6: tile(6, __VA_ARGS__); break; \
-        case 5: tile(5, __VA_ARGS__); break; \
-        case 4: tile(4, __VA_ARGS__); break; \
-        case 3: tile(3, __VA_ARGS__); break; \
-        case 2: tile(2, __VA_ARGS__); break; \
-        default: tile(1, __VA_ARGS__);       \
+#define SSDGS__BY_HEIGHT(rows, tile, ...) \
+    switch (rows) { \
+    case 6: tile(6, __VA_ARGS__); break; \
+    case 5: tile(5, __VA_ARGS__); break; \
+    case 4: tile(4, __VA_ARGS__); break; \
+    case 3: tile(3, __VA_ARGS__); break; \
+    case 2: tile(2, __VA_ARGS__); break; \
+    default: tile(1, __VA_ARGS__); \
     }
 
-SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(offsets) *depth, const int vectors,
-                             const uint16_t *row, int column) {
+SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(offsets) * depth,
+                             const int vectors, const uint16_t *row, int column) {
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
     const F(offsets) *const end = depth + p->depth;
@@ -9642,17 +10525,16 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(of
     }
     VUNROLL for (i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
     if (p->accumulate) {
-        VUNROLL for (i = 0; i < rows; i++)
-            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
+        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+            VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
     }
     if (p->relu) {
-        VUNROLL for (i = 0; i < rows; i++)
-            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VMAX(sum[i][v], VSET(0));
+        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+            VMAX(sum[i][v], VSET(0));
     }
     if (p->mask) {
-        VUNROLL for (i = 0; i < rows; i++)
-            VUNROLL for (v = 0; v < vectors; v++)
-                sum[i][v] = VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
+        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+            VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
     }
     VUNROLL for (i = 0; i < rows; i++) {
         R *const to = p->out + out[i];
@@ -9661,7 +10543,8 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(of
 }
 
 /* All rows over some columns, in tiles of about equal height. */
-SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) *depth, const int vectors, int column) {
+SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * depth, const int vectors,
+                                int column) {
     int left = (p->rows + SSDGS__TR - 1) / SSDGS__TR, row = 0;
     for (; left; left--) {
         const int rows = (p->rows - row + left - 1) / left;
@@ -9688,12 +10571,14 @@ SSDGS__FN void F(dense)(const ssdgs__product *p) {
     }
 }
 
-/* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns how many. */
+/* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns
+   how many. */
 SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
     int i, s, n = 0;
     for (i = 0; i < count; i++) {
         V most = VLOAD(rows + i * SSDGS__BLOCK);
-        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW) most = VMAX(most, VLOAD(rows + i * SSDGS__BLOCK + s));
+        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW)
+            most = VMAX(most, VLOAD(rows + i * SSDGS__BLOCK + s));
         list[n] = (uint16_t)i;
         n += VBITS(VLT(VSET(0), most)) != 0;
     }
@@ -9711,7 +10596,8 @@ SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stri
             for (s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
             from = last;
         }
-        for (s = 0; s < SSDGS__BLOCK; s += 4) F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
+        for (s = 0; s < SSDGS__BLOCK; s += 4)
+            F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
     }
 }
 
@@ -9719,30 +10605,30 @@ SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stri
 #define SSDGS__BF16_FN static SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
 #define SSDGS__BF16_FI static SSDGS__INLINE SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
 
-SSDGS__BF16_FI void F(dense_bf16_tile)(const int rows, const ssdgs__product *p, const uint32_t *a, const uint32_t *b, int row) {
+SSDGS__BF16_FI void F(dense_bf16_tile)(const int rows, const ssdgs__product *p, const uint32_t *a,
+                                       const uint32_t *b, int row) {
     __m512 sum[6][4];
     const int pairs = (p->depth + 1) / 2;
     int i, v, k;
-    VUNROLL for (i = 0; i < rows; i++)
-        VUNROLL for (v = 0; v < 4; v++) sum[i][v] = VSET(p->bias[row + i]);
+    VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < 4; v++) sum[i][v] = VSET(p->bias[row + i]);
     for (k = 0; k < pairs; k++, b += SSDGS__BLOCK) {
         __m512i lanes[4];
         VUNROLL for (v = 0; v < 4; v++) lanes[v] = _mm512_loadu_si512(b + 16 * v);
         VUNROLL for (i = 0; i < rows; i++) {
             const __m512i weight = _mm512_set1_epi32((int)a[(row + i) * pairs + k]);
-            VUNROLL for (v = 0; v < 4; v++) sum[i][v] = _mm512_dpbf16_ps(sum[i][v], (__m512bh)weight, (__m512bh)lanes[v]);
+            VUNROLL for (v = 0; v < 4; v++) sum[i][v] =
+                _mm512_dpbf16_ps(sum[i][v], (__m512bh)weight, (__m512bh)lanes[v]);
         }
     }
-    VUNROLL for (i = 0; i < rows; i++)
-        VUNROLL for (v = 0; v < 4; v++)
-            VSTORE(p->out + (size_t)(row + i) * p->out_stride + 16 * v, p->relu ? VMAX(sum[i][v], VSET(0)) : sum[i][v]);
+    VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < 4; v++) VSTORE(
+        p->out + (size_t)(row + i) * p->out_stride + 16 * v, p->relu ? VMAX(sum[i][v], VSET(0)) : sum[i][v]);
 }
 
-static const uint16_t ssdgs__interleaved[32] = {0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23,
+static const uint16_t ssdgs__interleaved[32] = {0, 16, 1, 17, 2,  18, 3,  19, 4,  20, 5,  21, 6,  22, 7,  23,
                                                 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31};
 
-/* A layer's forward in bf16 with sums in float: twice the throughput. weights: (rows, pairs) from pack_weights;
-   pairs: room for the packed inputs. */
+/* A layer's forward in bf16 with sums in float: twice the throughput. weights: (rows, pairs) from
+   pack_weights; pairs: room for the packed inputs. */
 SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weights, uint32_t *pairs) {
     int k, v, row, rows, left;
     const __m512i order = _mm512_loadu_si512(ssdgs__interleaved);
@@ -9776,13 +10662,15 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
         }
 }
 
-/* ==== >>encode_kernel  enc_L(v) = (v, sin v, .., sin 2^(L-1) v, cos v, .., cos 2^(L-1) v), each per component ====
-   in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the others by doubling the angle. */
+/* ==== >>encode_kernel  enc_L(v) = (v, sin v, .., sin 2^(L-1) v, cos v, .., cos 2^(L-1) v), each per
+   component ==== in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the others by
+   doubling the angle. */
 SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims, int levels) {
     int d, l, s;
     for (d = 0; d < dims; d++)
         for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale)), sine, cosine;
+            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale)),
+              sine, cosine;
             VSTORE(out + d * SSDGS__BLOCK + s, x);
             F(sincos)(VMAX(VSET(-1e5), VMIN(VSET(1e5), x)), &sine, &cosine); /* finite however far out */
             for (l = 0; l < levels; l++) {
@@ -9803,8 +10691,9 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
             V sum = VLOAD(dout + d * SSDGS__BLOCK + s), power = VSET(1);
             for (l = 0; l < levels; l++) {
                 const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s,
-                    cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
-                V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine), VMUL(VLOAD(dout + sine), VLOAD(out + cosine)));
+                          cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
+                V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine),
+                               VMUL(VLOAD(dout + sine), VLOAD(out + cosine)));
                 sum = VFMA(power, turn, sum);
                 power = VADD(power, power);
             }
@@ -9812,7 +10701,8 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
         }
 }
 
-/* ==== >>asg_kernel  eqs. 9 to 12: directions, Lambert's cosine, Fresnel x ASG of a block under one light ==== */
+/* ==== >>asg_kernel  eqs. 9 to 12: directions, Lambert's cosine, Fresnel x ASG of a block under one light
+   ==== */
 
 /* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
 SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
@@ -9822,19 +10712,20 @@ SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *
     *inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
     for (i = 0; i < 3; i++) h[i] = VMUL(h[i], *inverse_h);
     *missing = VSUB(VSET(1), VDOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
-    *missing = VMAX(VSET(0), VMIN(VSET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
+    *missing = VMAX(VSET(0),
+                    VMIN(VSET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
     h2 = VMUL(*missing, *missing);
     *fifth = VMUL(VMUL(h2, h2), *missing);
 }
 
 /* One lane set of the geometry; both directions of the pass run through it. */
 typedef struct F(geometry) {
-    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h, local[3],
-        missing, fresnel; /* missing: 1 - wo.h */
+    V wi[3], wo[3], inverse_light, inverse_eye, irradiance, q[4], inverse_q, r[9], cosine, h[3], inverse_h,
+        local[3], missing, fresnel; /* missing: 1 - wo.h */
     VM half;
 } F(geometry);
 
-SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const R *gauss) {
+SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, const R *gauss) {
     V x[3], raw[4], d2, e2, fifth;
     int i;
     for (i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
@@ -9860,8 +10751,9 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) *g, const ssdgs__lighting *k, const
     g->fresnel = VFMA(VSET(1 - SSDGS__F0), fifth, VSET(SSDGS__F0));
 }
 
-/* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma (angular).
-   With de NULL only the value; else also the exponent's derivatives: to h (3), and to the basis row (12). */
+/* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma
+   (angular). With de NULL only the value; else also the exponent's derivatives: to h (3), and to the basis
+   row (12). */
 SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
     const V x = VDOT3(VSET(b[0]), VSET(b[1]), VSET(b[2]), h[0], h[1], h[2]);
     const V y = VDOT3(VSET(b[3]), VSET(b[4]), VSET(b[5]), h[0], h[1], h[2]);
@@ -9876,7 +10768,8 @@ SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
         db[10] = VNEG(VMUL(y, y));
         db[11] = VSET(0);
     } else {
-        /* (theta q)^2 = (theta / s)^2 ((x/l)^2 + (y/u)^2) with s = |(x, y)|: no acos, no root, smooth at the pole */
+        /* (theta q)^2 = (theta / s)^2 ((x/l)^2 + (y/u)^2) with s = |(x, y)|: no acos, no root, smooth at the
+           pole */
         const V z = VDOT3(VSET(b[6]), VSET(b[7]), VSET(b[8]), h[0], h[1], h[2]);
         const V s2 = VFMA(x, x, VMUL(y, y)), s = VSQRT(VMAX(s2, VSET(1e-16)));
         const V theta = F(atan2_upper)(s, z), turn = VDIV(theta, s);
@@ -9888,7 +10781,8 @@ SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
         V exponent = VMUL(k, VMUL(ratio, q)), slope;
         value = VMUL(scale, VEXP(exponent));
         if (!dh) return value;
-        /* on the unit sphere z^2 + s^2 = 1: d theta = (z ds - s dz); the pole's limit of d(ratio)/d(s2) is 1/3 */
+        /* on the unit sphere z^2 + s^2 = 1: d theta = (z ds - s dz); the pole's limit of d(ratio)/d(s2) is
+           1/3 */
         slope = VSEL(pole, VSET(1.0 / 3), VDIV(VMUL(turn, VSUB(z, turn)), VMAX(s2, VSET(1e-16))));
         dx = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), x, VMUL(ratio, VMUL(xl, VSET(b[9])))));
         dy = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), y, VMUL(ratio, VMUL(yu, VSET(b[10])))));
@@ -9906,7 +10800,8 @@ SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
     return value;
 }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s, which deferred is 1. */
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s, which deferred is
+   1. */
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
@@ -9924,20 +10819,23 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
                 V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL)
-                    : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
+                                    : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
                 d = VFMA(weight, lobe, d);
             }
-        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s, k->deferred ? VSET(1) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
+        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s,
+               k->deferred ? VSET(1) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
     }
 }
 
-/* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3), the eye (3)
-   and the bases (8 x 12), each (16 lanes). */
-SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, const R *drows, R *dgauss, R *lane_sums) {
+/* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3),
+   the eye (3) and the bases (8 x 12), each (16 lanes). */
+SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, const R *drows, R *dgauss,
+                                   R *lane_sums) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
-        V dwi[3], dwo[3], dn[3], dr[9], dlocal[3], dh[3], d = VSET(0), df, dlobe, dwoh, missing2, dcosine, radial, dq[4];
+        V dwi[3], dwo[3], dn[3], dr[9], dlocal[3], dh[3], d = VSET(0), df, dlobe, dwoh, missing2, dcosine,
+                                                          radial, dq[4];
         F(geometry_lanes)(&g, k, gauss + s);
         for (i = 0; i < 3; i++) {
             dwi[i] = VLOAD(drows + (SSDGS__WI + i) * SSDGS__BLOCK + s);
@@ -9949,10 +10847,11 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         dlobe = VMUL(df, g.fresnel);
         if (k->specular && !k->deferred)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw), de[3], db[12], lobe,
-                    push;
+                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
+                  de[3], db[12], lobe, push;
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-                lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, de, db) : F(asg)(0, k->basis + 12 * j, g.local, de, db);
+                lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, de, db)
+                                  : F(asg)(0, k->basis + 12 * j, g.local, de, db);
                 d = VFMA(weight, lobe, d);
                 VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
                 push = VMUL(VMUL(dlobe, weight), lobe);
@@ -9966,7 +10865,8 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         missing2 = VMUL(g.missing, g.missing);
         dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
         for (i = 0; i < 3; i++) {
-            dh[i] = VFMA(dwoh, g.wo[i], VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
+            dh[i] = VFMA(dwoh, g.wo[i],
+                         VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
             dwo[i] = VFMA(dwoh, g.h[i], dwo[i]);
             for (j = 0; j < 3; j++) dr[3 * i + j] = VMUL(g.h[i], dlocal[j]);
         }
@@ -9986,11 +10886,13 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         }
         /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
         radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
-        radial = VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), radial);
+        radial =
+            VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), radial);
         missing2 = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
         for (i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
-            const V to_light = k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
+            const V to_light =
+                k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
             const V to_eye = VMUL(VFNMA(g.wo[i], missing2, dwo[i]), g.inverse_eye);
             VSTORE(out, VSUB(VLOAD(out), VADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
@@ -10000,21 +10902,24 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
     }
 }
 
-/* ==== >>highlight_kernel  eqs. 9, 10 and 12 of a tile's pixels under one light, from what their Gaussians blend to ====
-   Q = layers 1, 2 / A, depth and F0 = layer 3 / A with A, the sum of the weights, its third; the normal is layer 4's direction,
-   M = layer 5. */
+/* ==== >>highlight_kernel  eqs. 9, 10 and 12 of a tile's pixels under one light, from what their Gaussians
+   blend to ==== Q = layers 1, 2 / A, depth and F0 = layer 3 / A with A, the sum of the weights, its third;
+   the normal is layer 4's direction, M = layer 5. */
 
 typedef struct F(glint) {
-    V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing, fifth, fresnel;
-    V n[3], inverse_n, along, p[2][3], row[2][3], q[2]; /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
-    V cosine, inverse_woh, microfacet; /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
+    V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing,
+        fifth, fresnel;
+    V n[3], inverse_n, along, p[2][3], row[2][3],
+        q[2]; /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
+    V cosine, inverse_woh,
+        microfacet; /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
     V to_camera[2]; /* the camera's ray (x, y, 1) */
     VM half;
 } F(glint);
 
-SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pixel[2], const R *layers) {
+SSDGS__FI void F(glint_lanes)(F(glint) * g, const ssdgs__lighting *k, const V pixel[2], const R *layers) {
     const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
-        *normal = more + SSDGS__TILE_LAYER;
+            *normal = more + SSDGS__TILE_LAYER;
     V at[3], d2;
     int i, j;
     g->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(more + 32), VSET(SSDGS__THIN)));
@@ -10023,7 +10928,8 @@ SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pix
     g->to_camera[0] = VMUL(VSUB(pixel[0], VSET(k->cx)), VSET(k->inverse_fx));
     g->to_camera[1] = VMUL(VSUB(pixel[1], VSET(k->cy)), VSET(k->inverse_fy));
     for (i = 0; i < 3; i++)
-        g->ray[i] = VFMA(VSET(k->view[i]), g->to_camera[0], VFMA(VSET(k->view[4 + i]), g->to_camera[1], VSET(k->view[8 + i])));
+        g->ray[i] = VFMA(VSET(k->view[i]), g->to_camera[0],
+                         VFMA(VSET(k->view[4 + i]), g->to_camera[1], VSET(k->view[8 + i])));
     d2 = VDOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
     g->inverse_ray = VDIV(VSET(1), VSQRT(d2));
     for (i = 0; i < 3; i++) {
@@ -10041,7 +10947,8 @@ SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pix
     g->fresnel = VFMA(VSUB(VSET(1), g->f0), g->fifth, g->f0);
     for (i = 0; i < 3; i++) g->n[i] = VLOAD(normal + 16 * i);
     d2 = VDOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
-    g->half = VAND(g->half, VGE(d2, VSET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
+    g->half = VAND(g->half,
+                   VGE(d2, VSET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
     g->inverse_n = VDIV(VSET(1), VSQRT(VMAX(d2, VSET(SSDGS__THIN * SSDGS__THIN))));
     for (i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
     g->along = VDOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
@@ -10054,23 +10961,26 @@ SSDGS__FI void F(glint_lanes)(F(glint) *g, const ssdgs__lighting *k, const V pix
     }
     for (j = 0; j < 2; j++) {
         for (i = 0; i < 3; i++)
-            g->row[j][i] =
-                VMUL(g->inverse_cover, VFMA(VLOAD(q + 16 * i), g->p[j][i],
-                                            VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
-                                                 VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
+            g->row[j][i] = VMUL(
+                g->inverse_cover,
+                VFMA(VLOAD(q + 16 * i), g->p[j][i],
+                     VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
+                          VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
         g->q[j] = VDOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
     }
 }
 
 /* exp(-s ((1 - t) q0 + t q1)) of lobe j */
 SSDGS__FI V F(glow_lobe)(const R *basis, const V q[2]) {
-    return VEXP(VMUL(VSET(-basis[9]), VMAX(VSET(0), VFMA(VSET(1 - basis[8]), q[0], VMUL(VSET(basis[8]), q[1])))));
+    return VEXP(
+        VMUL(VSET(-basis[9]), VMAX(VSET(0), VFMA(VSET(1 - basis[8]), q[0], VMUL(VSET(basis[8]), q[1])))));
 }
 
 SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
     V sum = VSET(0);
     int j;
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) sum = VFMA(VSET(k->basis[12 * j + 10]), F(glow_lobe)(k->basis + 12 * j, q), sum);
+    for (j = 0; j < SSDGS_ASG_COUNT; j++)
+        sum = VFMA(VSET(k->basis[12 * j + 10]), F(glow_lobe)(k->basis + 12 * j, q), sum);
     return sum;
 }
 
@@ -10084,21 +10994,27 @@ SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, V visibility, V answer) {
 
 /* dL/dS becomes the visibility's; returns the answer's. */
 SSDGS__FI V F(shadow_factor_backward)(const ssdgs__lighting *k, V visibility, V factor, V *d) {
-    const V danswer = VMUL(*d, VFNMA(factor, factor, factor)); /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
+    const V danswer =
+        VMUL(*d, VFNMA(factor, factor, factor)); /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
     const VM inside = VAND(VLT(VSET(0.01), visibility), VLT(visibility, VSET(0.99)));
     if (k->shadow && !k->refined_shadow) return VSET(0);
     *d = VSET(0);
     if (!k->shadow) return VSET(0);
-    if (k->residual_shadow) *d = VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0));
+    if (k->residual_shadow)
+        *d = VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0));
     return danswer;
 }
 
-/* What arrives at pixels: eq. 8 with a visibility between the map's and the Gaussians', as soft as these are. */
-typedef struct F(arrival) { V inverse_cover, residual, gauss, soft, map, visibility, factor; } F(arrival);
+/* What arrives at pixels: eq. 8 with a visibility between the map's and the Gaussians', as soft as these
+   are. */
+typedef struct F(arrival) {
+    V inverse_cover, residual, gauss, soft, map, visibility, factor;
+} F(arrival);
 
-SSDGS__FI void F(arrival_lanes)(F(arrival) *a, const ssdgs__lighting *k, const R *layers, V map) {
+SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const R *layers, V map) {
     const R *more = layers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
-    a->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), VSET(SSDGS__THIN)));
+    a->inverse_cover =
+        VDIV(VSET(1), VMAX(VLOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), VSET(SSDGS__THIN)));
     a->residual = VMUL(VLOAD(more), a->inverse_cover);
     a->gauss = VMUL(VLOAD(more + 16), a->inverse_cover);
     a->soft = VMUL(VLOAD(more + 32), a->inverse_cover);
@@ -10108,7 +11024,7 @@ SSDGS__FI void F(arrival_lanes)(F(arrival) *a, const ssdgs__lighting *k, const R
 }
 
 /* Writes the gradient of the layer with the residual, returns what goes to the cover, times that. */
-SSDGS__FI V F(arrival_backward)(const F(arrival) *a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
+SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
     const V dresidual = F(shadow_factor_backward)(k, a->visibility, a->factor, &dvisibility);
@@ -10124,7 +11040,8 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
     int micro, v, c;
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
-        R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER, *s = sight + micro * 64;
+        R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
+          *s = sight + micro * 64;
         F(pixel_centres)(tile, micro, px, py);
         for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
@@ -10144,24 +11061,27 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
     }
 }
 
-/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7; adds to sums (SSDGS__HIGHLIGHT_SUMS). */
-SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers, const R *sight,
-                                     R *gradient, R *sums) {
+/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7; adds to sums
+   (SSDGS__HIGHLIGHT_SUMS). */
+SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers,
+                                     const R *sight, R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
     int micro, v, i, j;
     for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
         for (v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
-        const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER, *s = sight + micro * 64;
+        const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
+                *s = sight + micro * 64;
         R *d = gradient + micro * 64, *dm = d + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
         F(pixel_centres)(tile, micro, px, py);
-        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
+        for (v = 0; v < SSDGS__NV;
+             v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
             F(glint) g;
-            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum, radial, along,
-                ddepth, dat[3], dray, dcover, to, dfactor = VSET(0);
+            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum,
+                           radial, along, ddepth, dat[3], dray, dcover, to, dfactor = VSET(0);
             R *dlayer = d + SSDGS__TILE_LAYER;
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
             F(glint_lanes)(&g, k, pixel, at);
@@ -10172,16 +11092,20 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 VSTORE(dm + 16 * i, VMUL(pull, value));
                 VSTORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
                 push = VFMA(pull, VLOAD(m + 16 * i), push);
-                dfactor = VFMA(VLOAD(d + 16 * i), VFMA(value, VLOAD(m + 16 * i), VLOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
+                dfactor =
+                    VFMA(VLOAD(d + 16 * i),
+                         VFMA(value, VLOAD(m + 16 * i), VLOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
             }
             dcover = F(arrival_backward)(&arrival, k, dfactor, d);
             push = VSEL(g.half, push, VSET(0));
             dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
             push = VMUL(push, g.microfacet);
             dq[0] = dq[1] = VSET(0);
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
+            for (j = 0; j < SSDGS_ASG_COUNT;
+                 j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
                 const R *b = k->basis + 12 * j;
-                const V lobe = VMUL(VMUL(push, g.fresnel), F(glow_lobe)(b, g.q)), pull = VMUL(VSET(-b[9] * b[10]), lobe);
+                const V lobe = VMUL(VMUL(push, g.fresnel), F(glow_lobe)(b, g.q)),
+                        pull = VMUL(VSET(-b[9] * b[10]), lobe);
                 V *out = sum[15 + 2 * j] + v;
                 const V fold = VFMA(VSET(1 - b[8]), g.q[0], VMUL(VSET(b[8]), g.q[1]));
                 dq[0] = VFMA(VSET(1 - b[8]), pull, dq[0]);
@@ -10189,7 +11113,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 *out = VFMA(fold, pull, *out);
                 out += SSDGS__NV;
                 *out = VFMA(VMUL(VSET(b[8] * (1 - b[8])), VSUB(g.q[1], g.q[0])), pull, *out);
-                sum[15 + 2 * SSDGS_ASG_COUNT + j][v] = VFMA(VSET(b[11]), lobe, sum[15 + 2 * SSDGS_ASG_COUNT + j][v]);
+                sum[15 + 2 * SSDGS_ASG_COUNT + j][v] =
+                    VFMA(VSET(b[11]), lobe, sum[15 + 2 * SSDGS_ASG_COUNT + j][v]);
             }
             /* F = F0 + (1 - F0) (1 - wo.h)^5 */
             push = VMUL(push, glow);
@@ -10198,7 +11123,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
             to = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
             dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), to, VSET(0)));
-            dcosine = VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
+            dcosine =
+                VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
             for (j = 0; j < 2; j++) {
                 to = VMUL(dq[j], g.inverse_cover);
                 for (i = 0; i < 3; i++) {
@@ -10212,7 +11138,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
             for (i = 0; i < 3; i++) { /* p = h - n (n.h) */
                 dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along))));
-                dh[i] = VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
+                dh[i] =
+                    VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
                 dwo[i] = VMUL(dwoh, g.h[i]);
             }
             radial = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
@@ -10229,7 +11156,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
             along = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
             ddepth = VSET(0);
-            for (i = 0; i < 3; i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
+            for (i = 0; i < 3;
+                 i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
                 dat[i] = k->directional ? VSET(0) : VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
                 ddepth = VFMA(dat[i], g.ray[i], ddepth);
                 sum[i][v] = VSUB(sum[i][v], dat[i]);
@@ -10251,24 +11179,31 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
 }
 
 /* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on, softness of its logit. */
-SSDGS__FI V F(sharpness)(V raw) { return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw))); }
+SSDGS__FI V F(sharpness)(V raw) {
+    return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw)));
+}
 SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_LOGIT))); }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0, softness. */
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0,
+   softness. */
 SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
     int s, i, j;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         V raw[4], q[4], r[9], sharp[2];
         for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
         F(rotation)(raw, q, r);
-        for (j = 0; j < 2; j++) sharp[j] = F(sharpness)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
+        for (j = 0; j < 2; j++)
+            sharp[j] = F(sharpness)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
         for (i = 0; i < 6; i++) {
             const int a = 3 * (i % 3), b = i < 3 ? a : (a + 3) % 9;
-            VSTORE(rows + i * SSDGS__BLOCK + s, VFMA(VMUL(sharp[0], r[a]), r[b], VMUL(VMUL(sharp[1], r[a + 1]), r[b + 1])));
+            VSTORE(rows + i * SSDGS__BLOCK + s,
+                   VFMA(VMUL(sharp[0], r[a]), r[b], VMUL(VMUL(sharp[1], r[a + 1]), r[b + 1])));
         }
         for (i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
-        VSTORE(rows + 9 * SSDGS__BLOCK + s, F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
-        VSTORE(rows + 10 * SSDGS__BLOCK + s, F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
+        VSTORE(rows + 9 * SSDGS__BLOCK + s,
+               F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
+        VSTORE(rows + 10 * SSDGS__BLOCK + s,
+               F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
     }
 }
 
@@ -10281,15 +11216,18 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
         inverse_q = F(rotation)(raw, q, r);
         for (i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
-        for (j = 0; j < 2; j++) { /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
-            const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), sharp = F(sharpness)(log_sharp);
+        for (j = 0; j < 2;
+             j++) { /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
+            const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
+                    sharp = F(sharpness)(log_sharp);
             R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
             V product = VSET(0);
             for (i = 0; i < 3; i++) {
                 const int next = (i + 1) % 3, before = (i + 2) % 3;
-                const V row = VFMA(VMUL(VSET(2), VLOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
-                                   VFMA(VLOAD(drows + (3 + i) * SSDGS__BLOCK + s), r[3 * next + j],
-                                        VMUL(VLOAD(drows + (3 + before) * SSDGS__BLOCK + s), r[3 * before + j])));
+                const V row =
+                    VFMA(VMUL(VSET(2), VLOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
+                         VFMA(VLOAD(drows + (3 + i) * SSDGS__BLOCK + s), r[3 * next + j],
+                              VMUL(VLOAD(drows + (3 + before) * SSDGS__BLOCK + s), r[3 * before + j])));
                 dr[3 * i + j] = VMUL(sharp, row);
                 product = VFMA(VMUL(VSET(0.5), row), r[3 * i + j], product);
             }
@@ -10314,17 +11252,23 @@ SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
     const V one = VSET(1), st = VADD(ss, sa), inverse_st = VDIV(one, st), albedo = VMUL(ss, inverse_st);
     if (form == SSDGS_DIPOLE_BURLEY) {
         const V w = VMAX(VMUL(sa, inverse_st), VSET(1e-12)), q = VSQRT(w);
-        /* A = (1 - q)(1 - 0.107 q) / (1 + 1.91 q), with 1 - q = albedo / (1 + q): no cancellation in the dark */
-        const V top = VMUL(VDIV(albedo, VADD(one, q)), VFNMA(VSET(0.107), q, one)), bottom = VFMA(VSET(1.91), q, one);
+        /* A = (1 - q)(1 - 0.107 q) / (1 + 1.91 q), with 1 - q = albedo / (1 + q): no cancellation in the
+           dark */
+        const V top = VMUL(VDIV(albedo, VADD(one, q)), VFNMA(VSET(0.107), q, one)),
+                bottom = VFMA(VSET(1.91), q, one);
         const V a = VDIV(top, bottom), off = VSUB(a, VSET(0.8)), off2 = VMUL(off, VABS(off));
         const V s = VFMA(VMUL(VSET(7), VABS(off)), VMUL(off, off), VSUB(VSET(1.85), a));
-        const V x = VMUL(VMUL(s, r), st), u = VEXP(VMUL(x, VSET(-1.0 / 3))), u3 = VMUL(VMUL(u, u), u), inverse_r = VDIV(one, r);
-        const V p = VMUL(VMUL(VMUL(a, s), st), VMUL(inverse_r, VSET(0.039788735772973836))), sum = VADD(u3, u); /* 1 / (8 pi) */
+        const V x = VMUL(VMUL(s, r), st), u = VEXP(VMUL(x, VSET(-1.0 / 3))), u3 = VMUL(VMUL(u, u), u),
+                inverse_r = VDIV(one, r);
+        const V p = VMUL(VMUL(VMUL(a, s), st), VMUL(inverse_r, VSET(0.039788735772973836))),
+                sum = VADD(u3, u); /* 1 / (8 pi) */
         if (d) {
             const V slope = VNEG(VFMA(u, VSET(1.0 / 3), u3)), shared = VMUL(p, VFMA(slope, x, sum));
-            const V ds = VDIV(shared, s), da = VFMA(ds, VFMA(VSET(21), off2, VSET(-1)), VMUL(VMUL(p, sum), VDIV(one, a)));
-            const V dq = VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)),
-                                       VMUL(bottom, bottom)));
+            const V ds = VDIV(shared, s),
+                    da = VFMA(ds, VFMA(VSET(21), off2, VSET(-1)), VMUL(VMUL(p, sum), VDIV(one, a)));
+            const V dq =
+                VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)),
+                              VMUL(bottom, bottom)));
             const V dw = VMUL(dq, VDIV(VSET(0.5), q)), dst = VMUL(shared, inverse_st);
             d[0] = VFNMA(dw, VMUL(VMUL(sa, inverse_st), inverse_st), dst);
             d[1] = VFMA(dw, VMUL(albedo, inverse_st), dst);
@@ -10334,20 +11278,25 @@ SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
     } else {
         const int printed = form == SSDGS_DIPOLE_PRINTED;
         const V str = VSQRT(VMUL(VMUL(VSET(3), sa), st)), s = printed ? st : str;
-        const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)), factor = form == SSDGS_DIPOLE_JENSEN ? zv : VMUL(zr, zv);
-        const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))), q = printed ? dr : dv;
+        const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)),
+                factor = form == SSDGS_DIPOLE_JENSEN ? zv : VMUL(zr, zv);
+        const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))),
+                q = printed ? dr : dv;
         const V ir = VDIV(one, dr), iv = VDIV(one, dv);
         const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir))),
-            ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
-        const V br = VFMA(s, dr, one), bv = VFMA(s, q, one), scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
+                ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
+        const V br = VFMA(s, dr, one), bv = VFMA(s, q, one),
+                scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
         const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
         if (d) {
             /* real source: z (s d + 1) e^(-s d) / d^3; virtual source: factor (s q + 1) e^(-s dv) / dv^3 */
             const V ddr = VNEG(VMUL(VMUL(zr, er), VFMA(VMUL(s, dr), s, VMUL(VSET(3), VADD(s, ir)))));
-            const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s))), dq = VMUL(VMUL(factor, ev), s);
+            const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s))),
+                    dq = VMUL(VMUL(factor, ev), s);
             const V to_dr = printed ? VADD(ddr, dq) : ddr, to_dv = printed ? ddv : VADD(ddv, dq);
             const V ds = VFNMA(VMUL(zr, er), VMUL(s, VMUL(dr, dr)), VMUL(VMUL(factor, ev), VFNMA(dv, bv, q)));
-            const V dfactor = form == SSDGS_DIPOLE_JENSEN ? VMUL(second, VSET(virtual_depth)) : VMUL(VMUL(VSET(2), second), zv);
+            const V dfactor = form == SSDGS_DIPOLE_JENSEN ? VMUL(second, VSET(virtual_depth))
+                                                          : VMUL(VMUL(VSET(2), second), zv);
             const V dzv = VMUL(VMUL(to_dv, VMUL(zv, iv)), VSET(virtual_depth));
             const V dz = VADD(VADD(first, dfactor), VFMA(to_dr, VMUL(zr, ir), dzv));
             V dst = VNEG(VMUL(dz, VMUL(zr, zr))), dsa = VSET(0);
@@ -10374,8 +11323,8 @@ SSDGS__FI V F(dipole_any)(int form, V ss, V sa, V r, R virtual_depth, V *d) {
 }
 
 /* n values, a multiple of the lanes: f, and with derivatives (3, n) those too. For tests and tools. */
-SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f, R *derivatives,
-                                 size_t n) {
+SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f,
+                                 R *derivatives, size_t n) {
     size_t i;
     for (i = 0; i < n; i += SSDGS__VW) {
         V d[3];
@@ -10386,24 +11335,25 @@ SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r,
     }
 }
 
-/* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light ==== */
+/* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light
+   ==== */
 
 /* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
 SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
     const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1,
-        separation = k->per_channel_optics ? 6 : 2;
+              separation = k->per_channel_optics ? 6 : 2;
     unit[0] = F(sigmoid)(VLOAD(network + first * SSDGS__BLOCK + s));
     unit[1] = F(sigmoid)(VLOAD(network + absorb * SSDGS__BLOCK + s));
     unit[2] = F(sigmoid)(VLOAD(network + separation * SSDGS__BLOCK + s));
 }
 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
-SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
-                         const R *optics, R *out) {
+SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility,
+                         const R *shadow, const R *optics, R *out) {
     int s, c;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-            factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
+                factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
         V profile = VSET(0), unit[3];
         R *o = out + s;
         for (c = 0; c < 3; c++) {
@@ -10411,7 +11361,8 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
             const V lit = k->deferred ? power : shaded;
             if (k->diffuse) {
                 const V kd = F(softplus)(VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
-                const V f = VMUL(VMUL(kd, VSET(0.31830988618379067)), VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
+                const V f =
+                    VMUL(VMUL(kd, VSET(0.31830988618379067)), VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
                 VSTORE(o + c * SSDGS__BLOCK, VFMA(f, lit, VLOAD(o + c * SSDGS__BLOCK)));
             }
             if (k->specular) {
@@ -10423,30 +11374,34 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
                 const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) {
                     F(optics)(k, optics, c, s, unit);
-                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)), VFMA(unit[1], VSET(2), VSET(0.05)),
+                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
+                                            VFMA(unit[1], VSET(2), VSET(0.05)),
                                             VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, NULL);
                 }
                 VSTORE(o + (6 + c) * SSDGS__BLOCK,
-                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power, VLOAD(o + (6 + c) * SSDGS__BLOCK)));
+                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power,
+                            VLOAD(o + (6 + c) * SSDGS__BLOCK)));
             }
         }
         VSTORE(o + 9 * SSDGS__BLOCK, VADD(factor, VLOAD(o + 9 * SSDGS__BLOCK)));
     }
 }
 
-/* dcolor (3, BLOCK), ddiffuse and dspecular for those terms alone: dcolor, unless they are deferred. Adds to dgauss; writes
-   drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
-SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility, const R *shadow,
-                                  const R *optics, const R *dcolor, const R *ddiffuse, const R *dspecular, R *dgauss, R *drows,
-                                  R *dshadow, R *doptics, R *dvisibility) {
+/* dcolor (3, BLOCK), ddiffuse and dspecular for those terms alone: dcolor, unless they are deferred. Adds to
+   dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
+SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows,
+                                  const R *visibility, const R *shadow, const R *optics, const R *dcolor,
+                                  const R *ddiffuse, const R *dspecular, R *dgauss, R *drows, R *dshadow,
+                                  R *doptics, R *dvisibility) {
     int s, c, i;
     for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-            factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
-        const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s), gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
+                factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
+        const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s),
+                gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
         const V direct = k->deferred ? VSET(1) : factor;
-        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0), profile = VSET(0),
-            unit[3], d[3], dunit[3];
+        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0),
+          profile = VSET(0), unit[3], d[3], dunit[3];
         for (i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
         for (c = 0; c < 3; c++) {
             const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
@@ -10454,9 +11409,10 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
                 const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067)), surface = VMUL(kd, cosine);
                 const V push = VMUL(VLOAD(ddiffuse + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                    lit = VMUL(VMUL(push, irradiance), direct);
+                        lit = VMUL(VMUL(push, irradiance), direct);
                 R *out = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
-                VSTORE(out, VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(out)));
+                VSTORE(out,
+                       VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(out)));
                 dcosine = VFMA(lit, kd, dcosine);
                 dirradiance = VFMA(VMUL(push, direct), surface, dirradiance);
                 ddirect = VFMA(VMUL(push, irradiance), surface, ddirect);
@@ -10464,7 +11420,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             if (k->specular) { /* c_s f_s S */
                 const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
                 const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                    glint = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
+                        glint = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
                 R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
                 VSTORE(out, VFMA(VMUL(glint, gloss), F(sigmoid)(raw), VLOAD(out)));
                 dgloss = VFMA(glint, ks, dgloss);
@@ -10472,13 +11428,15 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
             }
             if (k->scattering) { /* c_sss f_sss */
-                const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s), kss = F(softplus)(raw);
+                const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s),
+                        kss = F(softplus)(raw);
                 R *out = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
                 const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
                 V dprofile;
                 if (c == 0 || k->per_channel_optics) {
                     F(optics)(k, optics, c, s, unit);
-                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)), VFMA(unit[1], VSET(2), VSET(0.05)),
+                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
+                                            VFMA(unit[1], VSET(2), VSET(0.05)),
                                             VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, d);
                 }
                 VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
@@ -10497,7 +11455,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
         if (k->scattering) {
             if (!k->per_channel_optics)
                 for (i = 0; i < 2; i++)
-                    VSTORE(doptics + i * SSDGS__BLOCK + s, VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
+                    VSTORE(doptics + i * SSDGS__BLOCK + s,
+                           VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
             VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
                    VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
         }
@@ -10535,11 +11494,12 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
     }
 }
 
-/* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of "black"; values
-   are stored less 1/2, which leaves variances as they are and keeps them from cancelling. Writes d(SSIM)/d(mean, E[i^2],
-   E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows of the stride. */
-SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch, R *d_mean, R *d_square,
-                           R *d_product, R sums[3]) {
+/* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of
+   "black"; values are stored less 1/2, which leaves variances as they are and keeps them from cancelling.
+   Writes d(SSIM)/d(mean, E[i^2], E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows
+   of the stride. */
+SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
+                           R *d_mean, R *d_square, R *d_product, R sums[3]) {
     const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
     V total[3][SSDGS__NV];
     int x, t, m;
@@ -10548,7 +11508,8 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
         for (m = 0; m < 5; m++) sum[m] = zero;
         for (t = -5; t <= 5; t++) {
             const V w = VSET(ssdgs__window[t + 5]);
-            const V i = VLOAD(image + t * (ptrdiff_t)stride + x), j = VLOAD(reference + t * (ptrdiff_t)stride + x);
+            const V i = VLOAD(image + t * (ptrdiff_t)stride + x),
+                    j = VLOAD(reference + t * (ptrdiff_t)stride + x);
             const V wi = VMUL(w, i), wj = VMUL(w, j);
             sum[0] = VADD(sum[0], wi);
             sum[1] = VADD(sum[1], wj);
@@ -10575,7 +11536,8 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
         varies = VLT(zero, vi);
         vi = VMAX(vi, zero);
         vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
-        cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]), zero); /* what does not vary does so with nothing */
+        cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]),
+                   zero); /* what does not vary does so with nothing */
         a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
         a2 = VFMA(VSET(2), cov, c2);
         b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
@@ -10597,9 +11559,11 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
     for (m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
 }
 
-/* gradient = by_l1 sign(i - j) + by_ssim (B[d_mean] + 2 i B[d_square] + j B[d_product]), B the window again. */
-SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int width, size_t stride, R *scratch, const R *d_mean,
-                                    const R *d_square, const R *d_product, R by_l1, R by_ssim, R *gradient) {
+/* gradient = by_l1 sign(i - j) + by_ssim (B[d_mean] + 2 i B[d_square] + j B[d_product]), B the window
+   again. */
+SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
+                                    const R *d_mean, const R *d_square, const R *d_product, R by_l1,
+                                    R by_ssim, R *gradient) {
     int x, t, m;
     for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[3];
@@ -10626,11 +11590,13 @@ SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int widt
     }
 }
 
-/* A row of dL/d(normal, alpha) of L = weight (alpha - normal . n), n the normal of the surface that depth shows, from the nearer
-   neighbours along the row and across it: with u, v the ray (u, v, 1)'s coordinates, (ln depth)_u and (ln depth)_v,
-   n = ((ln d)_u, (ln d)_v, -1 - u (ln d)_u - v (ln d)_v) / |..|, 0 where a depth is (unknown). depth points at the row in a plane
-   with a border of 1 row and 16 columns of 0; out: 4 rows of the stride. */
-SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size_t stride, int y, R weight, R *out) {
+/* A row of dL/d(normal, alpha) of L = weight (alpha - normal . n), n the normal of the surface that depth
+   shows, from the nearer neighbours along the row and across it: with u, v the ray (u, v, 1)'s coordinates,
+   (ln depth)_u and (ln depth)_v, n = ((ln d)_u, (ln d)_v, -1 - u (ln d)_u - v (ln d)_v) / |..|, 0 where a
+   depth is (unknown). depth points at the row in a plane with a border of 1 row and 16 columns of 0; out: 4
+   rows of the stride. */
+SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size_t stride, int y, R weight,
+                                R *out) {
     const V zero = VSET(0), most = VSET(1e12);
     const R focal[2] = {camera->fx, camera->fy};
     int x, i;
@@ -10644,19 +11610,23 @@ SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size
             const V rise[2] = {VSUB(here, before), VSUB(after, here)};
             const VM nearer = VLT(VABS(rise[0]), VABS(rise[1]));
             least = VMIN(least, VMIN(before, after));
-            slope[i] = VDIV(VMUL(VSET(focal[i]), VSEL(nearer, rise[0], rise[1])), VMAX(VSEL(nearer, before, after), VSET(1e-30)));
+            slope[i] = VDIV(VMUL(VSET(focal[i]), VSEL(nearer, rise[0], rise[1])),
+                            VMAX(VSEL(nearer, before, after), VSET(1e-30)));
             slope[i] = VMAX(VNEG(most), VMIN(most, slope[i]));
         }
         known = VLT(zero, least);
         ray = VDIV(VADD(VADD(VLOAD(ssdgs__count), VSET(x)), VSET((R)0.5 - camera->cx)), VSET(camera->fx));
         n[0] = slope[0];
         n[1] = slope[1];
-        n[2] = VNEG(VFMA(slope[0], ray, VFMA(slope[1], VSET(((R)y + (R)0.5 - camera->cy) / camera->fy), VSET(1))));
+        n[2] = VNEG(
+            VFMA(slope[0], ray, VFMA(slope[1], VSET(((R)y + (R)0.5 - camera->cy) / camera->fy), VSET(1))));
         length = VDIV(VSET(-weight), VSQRT(VDOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
         for (i = 0; i < 3; i++)
             VSTORE(out + (size_t)i * stride + x,
-                   VSEL(known, VMUL(length, VDOT3(VSET(camera->view[i]), VSET(camera->view[4 + i]), VSET(camera->view[8 + i]),
-                                                  n[0], n[1], n[2])), zero));
+                   VSEL(known,
+                        VMUL(length, VDOT3(VSET(camera->view[i]), VSET(camera->view[4 + i]),
+                                           VSET(camera->view[8 + i]), n[0], n[1], n[2])),
+                        zero));
         VSTORE(out + 3 * stride + x, VSEL(known, VSET(weight), zero));
     }
 }
@@ -10666,17 +11636,19 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
     size_t i = 0;
     int bad = 0;
 #if SSDGS__VW > 1
-    for (; i + SSDGS__VW <= n; i += SSDGS__VW) bad |= VBITS(VGE(VSET(FLT_MAX), VABS(VLOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
+    for (; i + SSDGS__VW <= n; i += SSDGS__VW)
+        bad |= VBITS(VGE(VSET(FLT_MAX), VABS(VLOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
 #endif
     for (; i < n; i++) bad |= !ssdgs__finite(values[i]);
     return !bad;
 }
 
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
-   Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that flushes subnormals
-   finds the same. Those beyond 1e18 count as that: no square and no product with a rate overflows. */
-SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean, R correct_square,
-                              R epsilon) {
+   Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that
+   flushes subnormals finds the same. Those beyond 1e18 count as that: no square and no product with a rate
+   overflows. */
+SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean,
+                             R correct_square, R epsilon) {
     V g = VLOAD(gradient), m, v;
     g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
     m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
@@ -10690,12 +11662,12 @@ SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square
     VSTORE(parameter, VSUB(VLOAD(parameter), VDIV(m, v)));
 }
 
-SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean, R correct_square,
-                        R epsilon) {
+SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean,
+                       R correct_square, R epsilon) {
     R tail[4][SSDGS__VW];
     size_t i, l;
-    for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW)
-        F(adam_lanes)(parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
+    for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW) F(adam_lanes)
+    (parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
     if (i == n) return;
     for (l = 0; l < SSDGS__VW; l++) {
         tail[0][l] = i + l < n ? parameter[i + l] : 0;
@@ -10711,15 +11683,37 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
     }
 }
 
-static const ssdgs__kernels F(kernels) = {
-    F(project), SSDGS__TRAINS(F(project_backward)), F(bin), F(walk_camera), F(walk_light), F(composite),
-    SSDGS__TRAINS(F(composite_backward)), F(highlight), SSDGS__TRAINS(F(highlight_backward)), F(lobe),
-    SSDGS__TRAINS(F(lobe_backward)), F(transport), F(dense), F(live_rows), SSDGS__TRAINS(F(transpose)), SSDGS__DENSE_BF16,
-    SSDGS__TRAINS(F(row_sums)), F(encode), SSDGS__TRAINS(F(encode_backward)), F(reflect), SSDGS__TRAINS(F(reflect_backward)),
-    SSDGS__TRAINS(F(dipole_profile)), F(colour), SSDGS__TRAINS(F(colour_backward)), SSDGS__TRAINS(F(depth_normals)),
-    F(srgb_encode), F(srgb_decode), SSDGS__TRAINS(F(ssim_row)), SSDGS__TRAINS(F(ssim_backward_row)), F(finite),
-    SSDGS__TRAINS(F(adam))
-};
+static const ssdgs__kernels F(kernels) = {F(project),
+                                          SSDGS__TRAINS(F(project_backward)),
+                                          F(bin),
+                                          F(walk_camera),
+                                          F(walk_light),
+                                          F(composite),
+                                          SSDGS__TRAINS(F(composite_backward)),
+                                          F(highlight),
+                                          SSDGS__TRAINS(F(highlight_backward)),
+                                          F(lobe),
+                                          SSDGS__TRAINS(F(lobe_backward)),
+                                          F(transport),
+                                          F(dense),
+                                          F(live_rows),
+                                          SSDGS__TRAINS(F(transpose)),
+                                          SSDGS__DENSE_BF16,
+                                          SSDGS__TRAINS(F(row_sums)),
+                                          F(encode),
+                                          SSDGS__TRAINS(F(encode_backward)),
+                                          F(reflect),
+                                          SSDGS__TRAINS(F(reflect_backward)),
+                                          SSDGS__TRAINS(F(dipole_profile)),
+                                          F(colour),
+                                          SSDGS__TRAINS(F(colour_backward)),
+                                          SSDGS__TRAINS(F(depth_normals)),
+                                          F(srgb_encode),
+                                          F(srgb_decode),
+                                          SSDGS__TRAINS(F(ssim_row)),
+                                          SSDGS__TRAINS(F(ssim_backward_row)),
+                                          F(finite),
+                                          SSDGS__TRAINS(F(adam))};
 
 #undef SSDGS__NAME
 #undef SSDGS__TR
@@ -10769,15 +11763,17 @@ MIT License
 
 Copyright (c) 2026 the ssdgs.h authors
 
-Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated documentation
-files (the "Software"), to deal in the Software without restriction, including without limitation the rights to use, copy,
-modify, merge, publish, distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the Software
-is furnished to do so, subject to the following conditions:
+Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated
+documentation files (the "Software"), to deal in the Software without restriction, including without
+limitation the rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of the
+Software, and to permit persons to whom the Software is furnished to do so, subject to the following
+conditions:
 
-The above copyright notice and this permission notice shall be included in all copies or substantial portions of the Software.
+The above copyright notice and this permission notice shall be included in all copies or substantial portions
+of the Software.
 
-THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES
-OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE
-LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR
-IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
-*/
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED
+TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL
+THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF
+CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER
+DEALINGS IN THE SOFTWARE. */

@@ -1,5 +1,6 @@
-/* cc -O2 examples/bench.c -o bench -lm -lpthread: how fast models render and train here, and what each shortcut costs in quality.
-   Tables on stdout, bench.json and bench.svg beside the program. Times are the best of several passes, taken view by view. */
+/* cc -O2 examples/bench.c -o bench -lm -lpthread: how fast models render and train here, and what each
+   shortcut costs in quality. Tables on stdout, bench.json and bench.svg beside the program. Times are the
+   best of several passes, taken view by view. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
@@ -18,7 +19,12 @@
 
 enum {
     SIDE = 256, /* px, of the timed frames */
-    MAX_PHOTOS = 16, MAX_JOBS = 32, MAX_COLUMNS = 12, MAX_TABLES = 32, MAX_FACTS = 64, MAX_PIXELS = 1920 * 1080
+    MAX_PHOTOS = 16,
+    MAX_JOBS = 32,
+    MAX_COLUMNS = 12,
+    MAX_TABLES = 32,
+    MAX_FACTS = 64,
+    MAX_PIXELS = 1920 * 1080
 };
 static const double none = -1e300; /* what could not be measured: - on stdout, null in JSON */
 static volatile double sink;       /* what is written here had to be computed */
@@ -49,7 +55,10 @@ static double now(void) {
 
 /* ---- what is found: tables of named rows, and facts, the figures that others quote ---- */
 
-typedef struct row { char name[48]; double value[MAX_COLUMNS]; } row;
+typedef struct row {
+    char name[48];
+    double value[MAX_COLUMNS];
+} row;
 typedef struct table {
     char key[64];
     const char *columns; /* names between spaces */
@@ -58,15 +67,20 @@ typedef struct table {
 } table;
 
 typedef struct bench {
-    int quick, best_isa, isas[SSDGS_ISA_COUNT], isa_count, threads[3], thread_count; /* threads: 1, 2, all; no doubles */
-    const char *dataset, *model, *prefix; /* the model at hand, and what stands before its tables' and facts' names */
-    olat_dataset data;                    /* the test split */
+    int quick, best_isa, isas[SSDGS_ISA_COUNT], isa_count, threads[3],
+        thread_count; /* threads: 1, 2, all; no doubles */
+    const char *dataset, *model,
+        *prefix;       /* the model at hand, and what stands before its tables' and facts' names */
+    olat_dataset data; /* the test split */
     ssdgs_photo photos[MAX_PHOTOS], scaled[MAX_PHOTOS]; /* some of it, and to SIDE x SIDE */
-    int photo_count, views;               /* for quality, for times */
-    ssdgs_real *color, *alpha;            /* (MAX_PIXELS, 3), (MAX_PIXELS) */
+    int photo_count, views;                             /* for quality, for times */
+    ssdgs_real *color, *alpha;                          /* (MAX_PIXELS, 3), (MAX_PIXELS) */
     char cpu[128];
     table tables[MAX_TABLES];
-    struct { char key[64]; double value; } facts[MAX_FACTS];
+    struct {
+        char key[64];
+        double value;
+    } facts[MAX_FACTS];
     int table_count, fact_count;
 } bench;
 
@@ -120,8 +134,14 @@ static void print_table(const table *t) {
             const int length = (int)strcspn(column, " "), width = length < 8 ? 9 : length + 1;
             const double x = r < 0 ? none : t->rows[r].value[c], size = fabs(x); /* three digits of it */
             if (x <= none) printf("%*.*s", width, r < 0 ? length : 1, r < 0 ? column : "-");
-            else printf("%*.*f", width, size >= 100 || x == floor(x) ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : size > 0.1 ? 3 : 5,
-                        x);
+            else
+                printf("%*.*f", width,
+                       size >= 100 || x == floor(x) ? 0
+                       : size >= 10                 ? 1
+                       : size >= 1                  ? 2
+                       : size > 0.1                 ? 3
+                                                    : 5,
+                       x);
             column += length + 1;
         }
         printf("\n");
@@ -136,9 +156,12 @@ static void write_number(FILE *file, const char *key, int length, double x) {
 
 static void write_json(const bench *b, FILE *file) {
     int i, r, c;
-    fprintf(file, "{\n \"cpu\": \"%s\",\n \"isa\": \"%s\",\n \"threads\": %d,\n \"compiler\": \"%s\",\n \"dataset\": \"",
+    fprintf(file,
+            "{\n \"cpu\": \"%s\",\n \"isa\": \"%s\",\n \"threads\": %d,\n \"compiler\": \"%s\",\n "
+            "\"dataset\": \"",
             b->cpu, ssdgs_isa_string((ssdgs_isa)b->best_isa), b->threads[b->thread_count - 1], COMPILER);
-    for (i = 0; b->dataset[i]; i++) fputc(b->dataset[i] == '\\' || b->dataset[i] == '"' ? '/' : b->dataset[i], file);
+    for (i = 0; b->dataset[i]; i++)
+        fputc(b->dataset[i] == '\\' || b->dataset[i] == '"' ? '/' : b->dataset[i], file);
     fprintf(file, "\"");
     for (i = 0; i < b->fact_count; i++) {
         fprintf(file, ",\n ");
@@ -164,21 +187,21 @@ static void write_json(const bench *b, FILE *file) {
 
 /* ---- kernels: the machine's peaks and the networks' layers ---- */
 
-/* Twelve chains of FMAs, enough to hide their latency; volatile, so that the compiler cannot know them to be the same. It may
-   make vectors of scalars, here as in the kernels. */
+/* Twelve chains of FMAs, enough to hide their latency; volatile, so that the compiler cannot know them to be
+   the same. It may make vectors of scalars, here as in the kernels. */
 static volatile float half = 0.5f;
-#define PEAK(name, attribute, vector, load, fma)                                              \
-    attribute static float name(long rounds) {                                                \
-        float lanes[28];                                                                      \
-        vector sum[12], x;                                                                    \
-        int i;                                                                                \
-        for (i = 0; i < 28; i++) lanes[i] = half;                                             \
-        x = load(lanes + 12);                                                                 \
-        SSDGS__UNROLL for (i = 0; i < 12; i++) sum[i] = load(lanes + i);                      \
+#define PEAK(name, attribute, vector, load, fma) \
+    attribute static float name(long rounds) { \
+        float lanes[28]; \
+        vector sum[12], x; \
+        int i; \
+        for (i = 0; i < 28; i++) lanes[i] = half; \
+        x = load(lanes + 12); \
+        SSDGS__UNROLL for (i = 0; i < 12; i++) sum[i] = load(lanes + i); \
         for (; rounds > 0; rounds--) { SSDGS__UNROLL for (i = 0; i < 12; i++) sum[i] = fma; } \
-        SSDGS__UNROLL for (i = 0; i < 12; i++) x = fma;                                       \
-        memcpy(lanes, &x, sizeof x);                                                          \
-        return lanes[0];                                                                      \
+        SSDGS__UNROLL for (i = 0; i < 12; i++) x = fma; \
+        memcpy(lanes, &x, sizeof x); \
+        return lanes[0]; \
     }
 #define LOAD(p) (*(p))
 PEAK(peak_scalar, , float, LOAD, sum[i] * x + x)
@@ -199,27 +222,30 @@ PEAK(peak_bf16, SSDGS__ATTRIBUTE("avx512f,avx512bf16"), __m512, _mm512_loadu_ps,
 PEAK(peak_neon, , float32x4_t, vld1q_f32, vfmaq_f32(x, sum[i], x))
 #endif
 enum { BF16 = SSDGS_ISA_COUNT };
-static const struct { int isa; float (*work)(long); double operations; } peaks[] = { /* operations of one round */
+static const struct {
+    int isa;
+    float (*work)(long);
+    double operations;
+} peaks[] = {/* operations of one round */
 #if SSDGS__X86 >= 1
-    {SSDGS_ISA_SSE2, peak_sse2, 12 * 4 * 2},
+             {SSDGS_ISA_SSE2, peak_sse2, 12 * 4 * 2},
 #endif
 #if SSDGS__X86 >= 2
-    {SSDGS_ISA_AVX2, peak_avx2, 12 * 8 * 2},
+             {SSDGS_ISA_AVX2, peak_avx2, 12 * 8 * 2},
 #endif
 #if SSDGS__X86 >= 3
-    {SSDGS_ISA_AVX512, peak_avx512, 12 * 16 * 2},
+             {SSDGS_ISA_AVX512, peak_avx512, 12 * 16 * 2},
 #endif
 #if SSDGS__BF16
-    {BF16, peak_bf16, 12 * 16 * 4},
+             {BF16, peak_bf16, 12 * 16 * 4},
 #endif
 #if SSDGS__NEON
-    {SSDGS_ISA_NEON, peak_neon, 12 * 4 * 2},
+             {SSDGS_ISA_NEON, peak_neon, 12 * 4 * 2},
 #endif
-    {SSDGS_ISA_SCALAR, peak_scalar, 12 * 2}
-};
+             {SSDGS_ISA_SCALAR, peak_scalar, 12 * 2}};
 
-/* A network of the size of a model's scattering network in which no neuron is ever 0, so that none is left out, and memory
-   for one block. */
+/* A network of the size of a model's scattering network in which no neuron is ever 0, so that none is left
+   out, and memory for one block. */
 typedef struct network {
     int sizes[SSDGS_MAX_LAYERS + 1], layers;
     ssdgs_real *weights, *gradient, *inputs, *outputs, *output_gradient, *d, *spare, *transposed;
@@ -246,10 +272,12 @@ static network make_network(ssdgs_model *model) {
     ssdgs__row_lists_fill(n.lists);
     for (l = 0; l <= n.layers; l++) {
         if (l) {
-            const size_t products = (size_t)n.sizes[l] * (size_t)n.sizes[l - 1], end = at + products + (size_t)n.sizes[l];
+            const size_t products = (size_t)n.sizes[l] * (size_t)n.sizes[l - 1],
+                         end = at + products + (size_t)n.sizes[l];
             n.operations += 2.0 * (double)products * SSDGS__BLOCK;
             for (i = 0; at < end; i++, at++)
-                n.weights[at] = i < products ? (ssdgs_real)((ssdgs__uniform(3, at) - 0.5) / n.sizes[l - 1]) : 2;
+                n.weights[at] =
+                    i < products ? (ssdgs_real)((ssdgs__uniform(3, at) - 0.5) / n.sizes[l - 1]) : 2;
         }
         widest = (size_t)n.sizes[l] + 32 > widest ? (size_t)n.sizes[l] + 32 : widest;
     }
@@ -260,7 +288,8 @@ static network make_network(ssdgs_model *model) {
     n.inputs = n.transposed + widest * SSDGS__BLOCK;
     n.outputs = n.inputs + widest * SSDGS__BLOCK;
     n.gradient = take(model->context, ssdgs__slot_gradient_size(n.sizes, n.layers));
-    n.packed = (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
+    n.packed =
+        (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
     n.pairs = ssdgs__pack_weights(n.sizes, n.layers, n.weights, n.packed);
     for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
         n.inputs[i] = (ssdgs_real)(2 * ssdgs__uniform(1, i) - 1);
@@ -291,23 +320,26 @@ static void kernel_task(void *data, int task) {
     size_t i;
     long r;
     if (job->work == PEAK_RATE) sink = (double)job->peak(job->repeat);
-    else for (r = 0; r < job->repeat; r++) switch (job->work) {
-        case FORWARD: case FORWARD_BF16:
-            ssdgs__network_forward(k, n->sizes, n->layers, n->weights, job->work == FORWARD ? NULL : n->packed, n->pairs,
-                                   n->lists, n->inputs, n->outputs);
-            break;
-        case BACKWARD:
-            memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
-            ssdgs__network_backward(k, n->sizes, n->layers, n->weights, n->inputs, n->outputs, n->d, n->spare,
-                                    n->transposed, n->lists, n->sizes[0], n->gradient);
-            break;
-        default:
-            for (i = 0; i < job->share; i += 8) {
-                a += p[i] + p[i + 1], b += p[i + 2] + p[i + 3];
-                c += p[i + 4] + p[i + 5], d += p[i + 6] + p[i + 7];
+    else
+        for (r = 0; r < job->repeat; r++) switch (job->work) {
+            case FORWARD:
+            case FORWARD_BF16:
+                ssdgs__network_forward(k, n->sizes, n->layers, n->weights,
+                                       job->work == FORWARD ? NULL : n->packed, n->pairs, n->lists, n->inputs,
+                                       n->outputs);
+                break;
+            case BACKWARD:
+                memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
+                ssdgs__network_backward(k, n->sizes, n->layers, n->weights, n->inputs, n->outputs, n->d,
+                                        n->spare, n->transposed, n->lists, n->sizes[0], n->gradient);
+                break;
+            default:
+                for (i = 0; i < job->share; i += 8) {
+                    a += p[i] + p[i + 1], b += p[i + 2] + p[i + 3];
+                    c += p[i + 4] + p[i + 5], d += p[i + 6] + p[i + 7];
+                }
+                sink = (double)(a + b + c + d);
             }
-            sink = (double)(a + b + c + d);
-    }
 }
 
 static kernel make_kernel(kind work, ssdgs_context *context, int isa, const network *net) {
@@ -315,7 +347,8 @@ static kernel make_kernel(kind work, ssdgs_context *context, int isa, const netw
     size_t i = 0;
     while (peaks[i].isa != isa) i++;
     k.peak = peaks[i].work;
-    k.operations = net ? net->operations * (work == BACKWARD ? 2 : 1) : peaks[i].operations * context->threads;
+    k.operations =
+        net ? net->operations * (work == BACKWARD ? 2 : 1) : peaks[i].operations * context->threads;
     return k;
 }
 
@@ -358,13 +391,18 @@ static ssdgs_result time_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage
 }
 
 #define STAGES(X) \
-    X(PROJECT) X(SORT) X(BIN) X(WALK) X(SHADE) X(COMPOSITE) X(COMPOSITE_BACKWARD) X(SHADE_BACKWARD) X(PROJECT_BACKWARD)
+    X(PROJECT) \
+    X(SORT) X(BIN) X(WALK) X(SHADE) X(COMPOSITE) X(COMPOSITE_BACKWARD) X(SHADE_BACKWARD) X(PROJECT_BACKWARD)
 #define HOOK(name) \
-    static ssdgs_result time_##name(void *user, ssdgs_frame *frame) { return time_stage(user, frame, SSDGS_STAGE_##name); }
+    static ssdgs_result time_##name(void *user, ssdgs_frame *frame) { \
+        return time_stage(user, frame, SSDGS_STAGE_##name); \
+    }
 STAGES(HOOK)
 
-/* A context with the model at hand; allocator may be NULL, threads 0 = all. The hooks want s to stay where it is. */
-static void open_session(const bench *b, session *s, int isa, int threads, int hooks, const ssdgs_allocator *allocator) {
+/* A context with the model at hand; allocator may be NULL, threads 0 = all. The hooks want s to stay where it
+   is. */
+static void open_session(const bench *b, session *s, int isa, int threads, int hooks,
+                         const ssdgs_allocator *allocator) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     memset(s, 0, sizeof *s);
@@ -387,15 +425,17 @@ static void close_session(session *s) {
 typedef struct job {
     session *s;
     ssdgs_trainer *trainer;
-    int iteration; /* of the first view's step; a multiple of the views, where a pass over the photographs begins */
+    int iteration; /* of the first view's step; a multiple of the views, where a pass over the photographs
+                      begins */
     ssdgs_render_options options;
     int width, height, views, fixed_light, fixed_camera, turned_away;
     double ms, stage_ms[SSDGS_STAGE_COUNT]; /* means over the views of each one's best */
-    double shaded; /* fraction of the Gaussians */
+    double shaded;                          /* fraction of the Gaussians */
 } job;
 
 static job make_job(const bench *b, session *s, ssdgs_render_options options) {
-    const int views = s->context->isa == b->best_isa || b->views < 4 ? b->views : 2; /* fewer where they take long */
+    const int views =
+        s->context->isa == b->best_isa || b->views < 4 ? b->views : 2; /* fewer where they take long */
     job j = {s, NULL, 0, options, SIDE, SIDE, views, 0, 0, 0, 0, {0}, 0};
     return j;
 }
@@ -427,7 +467,9 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
     if (j->trainer) {
         j->trainer->iteration = j->iteration + view;
         check(j->s->context, ssdgs_trainer_step(j->trainer, NULL));
-    } else check(j->s->context, ssdgs_render_ex(j->s->model, &camera, &lit->light, 1, &j->options, &image, stats));
+    } else
+        check(j->s->context,
+              ssdgs_render_ex(j->s->model, &camera, &lit->light, 1, &j->options, &image, stats));
 }
 
 /* Jobs in turn, for at least two passes; the first also warms up. */
@@ -456,14 +498,18 @@ static void time_jobs(bench *b, job *jobs, int count, double seconds) {
     for (i = 0; i < count; i++) {
         job *j = jobs + i;
         for (v = 0; v < j->views; v++) {
-            for (stage = 0; stage < SSDGS_STAGE_COUNT; stage++) j->stage_ms[stage] += 1e3 * best[i][v][stage] / j->views;
+            for (stage = 0; stage < SSDGS_STAGE_COUNT; stage++)
+                j->stage_ms[stage] += 1e3 * best[i][v][stage] / j->views;
             j->ms += 1e3 * best[i][v][SSDGS_STAGE_COUNT] / j->views;
         }
     }
 }
 
 /* Phases of the default schedule, in iterations of 60,000. */
-static const struct { const char *name; int from, to; } phases[] = {{"diffuse", 0, 5000}, {"all", 5000, 60000}};
+static const struct {
+    const char *name;
+    int from, to;
+} phases[] = {{"diffuse", 0, 5000}, {"all", 5000, 60000}};
 enum { PHASES = sizeof phases / sizeof *phases };
 
 /* The job as a training job at the model's number of Gaussians, on scaled photographs of its views. */
@@ -477,19 +523,24 @@ static job training_job(const bench *b, job j, ssdgs_trainer *trainer, int phase
     options.max_gaussians = SSDGS__MAX_GAUSSIANS;
     for (v = 0; v < j.views; v++) photos[v] = b->scaled[v * b->photo_count / j.views];
     j.trainer = trainer;
-    if (!trainer) check(j.s->context, ssdgs_trainer_create(j.s->model, photos, j.views, &options, &j.trainer));
+    if (!trainer)
+        check(j.s->context, ssdgs_trainer_create(j.s->model, photos, j.views, &options, &j.trainer));
     j.iteration = (phases[phase].from + j.views) / j.views * j.views;
     return j;
 }
 
-/* ---- quality: images against those of the first options and against the photographs, at the photographs' size ---- */
+/* ---- quality: images against those of the first options and against the photographs, at the photographs'
+   size ---- */
 
-typedef struct quality { double psnr_exact, max_error, psnr_photo; } quality;
+typedef struct quality {
+    double psnr_exact, max_error, psnr_photo;
+} quality;
 
 static const ssdgs_real black[3] = {0, 0, 0};
 
 /* Stored values within [0,1] of a photograph's view, left in color. */
-static void render_stored(bench *b, session *s, const ssdgs_photo *photo, const ssdgs_render_options *options) {
+static void render_stored(bench *b, session *s, const ssdgs_photo *photo,
+                          const ssdgs_render_options *options) {
     ssdgs_image image = {0, b->color, b->alpha, NULL, NULL, NULL, NULL, NULL, NULL};
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     size_t i;
@@ -498,7 +549,8 @@ static void render_stored(bench *b, session *s, const ssdgs_photo *photo, const 
     for (i = 0; i < 3 * pixels; i++) b->color[i] = b->color[i] < 0 ? 0 : b->color[i] > 1 ? 1 : b->color[i];
 }
 
-static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count, quality *out) {
+static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count,
+                            quality *out) {
     const int views = s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
     ssdgs_real *exact[MAX_PHOTOS], *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
     int o, v;
@@ -511,7 +563,9 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
             double photo_squares = 0;
             size_t i;
             render_stored(b, s, photo, options + o);
-            if (!o) exact[v] = (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
+            if (!o)
+                exact[v] =
+                    (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
             ssdgs__photo_planes(photo, black, 0, n, target);
             for (i = 0; i < 3 * n; i++) {
                 error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
@@ -535,13 +589,15 @@ static const char *const presets[] = {"exact", "default", "fast"};
 enum { EXACT, DEFAULT, FAST, PRESETS };
 
 static ssdgs_render_options preset(int i) {
-    return i == EXACT ? ssdgs_render_options_exact() : i == DEFAULT ? ssdgs_render_options_default()
-                                                                    : ssdgs_render_options_fast();
+    return i == EXACT     ? ssdgs_render_options_exact()
+           : i == DEFAULT ? ssdgs_render_options_default()
+                          : ssdgs_render_options_fast();
 }
 
-static const char *name_of(char text[48], const session *s, const char *what) { /* NULL = nothing more to say */
-    snprintf(text, 48, "%s %d thread%s%s%.20s", ssdgs_isa_string(ssdgs_context_isa(s->context)), s->context->threads,
-             s->context->threads > 1 ? "s" : "", what ? " " : "", what ? what : "");
+static const char *name_of(char text[48], const session *s,
+                           const char *what) { /* NULL = nothing more to say */
+    snprintf(text, 48, "%s %d thread%s%s%.20s", ssdgs_isa_string(ssdgs_context_isa(s->context)),
+             s->context->threads, s->context->threads > 1 ? "s" : "", what ? " " : "", what ? what : "");
     return text;
 }
 
@@ -570,16 +626,19 @@ static void measure_machine(bench *b) {
                 n > 2 ? kernels[2].best : none);
         close_session(&s);
     }
-    n = t->row_count - b->thread_count; /* no program can gain more from a second thread; near 1 the machine was busy */
-    add_facts(b, "threads2_speedup_peak", b->thread_count > 1 ? t->rows[n + 1].value[0] / t->rows[n].value[0] : none);
+    n = t->row_count -
+        b->thread_count; /* no program can gain more from a second thread; near 1 the machine was busy */
+    add_facts(b, "threads2_speedup_peak",
+              b->thread_count > 1 ? t->rows[n + 1].value[0] / t->rows[n].value[0] : none);
     free(memory);
     print_table(t);
 }
 
 /* The scattering network's layers on one thread, against that thread's peak in the same seconds. */
 static void measure_layers(bench *b) {
-    table *t = new_table(b, "layers", "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak "
-                                      "bf16_peak bf16_gflops bf16_of_peak");
+    table *t = new_table(b, "layers",
+                         "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak "
+                         "bf16_peak bf16_gflops bf16_of_peak");
     int i, bf16;
     for (i = 0; i < b->isa_count; i++) {
         kernel k[5];
@@ -595,12 +654,15 @@ static void measure_layers(bench *b) {
         k[3] = make_kernel(PEAK_RATE, s.context, bf16 ? BF16 : b->isas[i], NULL);
         k[4] = make_kernel(FORWARD_BF16, s.context, b->isas[i], &n);
         time_kernels(k, bf16 ? 5 : 3, b->quick ? 0.5 : 2);
-        v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best, k[1].best / k[0].best,
-                    k[2].best / k[0].best, 3 / (1 / k[1].best + 2 / k[2].best) / k[0].best, bf16 ? k[3].best : none,
+        v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best,
+                    k[1].best / k[0].best, k[2].best / k[0].best,
+                    3 / (1 / k[1].best + 2 / k[2].best) / k[0].best, bf16 ? k[3].best : none,
                     bf16 ? k[4].best : none, bf16 ? k[4].best / k[3].best : none);
         if (b->isas[i] == b->best_isa) /* of one thread, all of them */
-            add_facts(b, "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
-                      "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak", v[0], v[5], v[3], v[4], v[8]);
+            add_facts(b,
+                      "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
+                      "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak",
+                      v[0], v[5], v[3], v[4], v[8]);
         ssdgs__release(s.context, n.weights);
         ssdgs__release(s.context, n.output_gradient);
         ssdgs__release(s.context, n.gradient);
@@ -616,8 +678,9 @@ static void measure_stages(bench *b) {
     char name[48];
     int i, k, stage;
     t[0] = new_table(b, "stages_frame", "project sort bin walk shade composite other total");
-    t[1] = new_table(b, "stages_training",
-                     "project sort bin walk shade composite composite_back shade_back project_back other total");
+    t[1] =
+        new_table(b, "stages_training",
+                  "project sort bin walk shade composite composite_back shade_back project_back other total");
     for (i = 0; i < b->isa_count * b->thread_count; i++) {
         session s;
         job jobs[2];
@@ -640,7 +703,8 @@ static void measure_stages(bench *b) {
 }
 
 static void measure_frames(bench *b) {
-    table *t = new_table(b, "frames", "ms frames_per_s psnr_exact max_error psnr_photo loss_db shaded_fraction");
+    table *t =
+        new_table(b, "frames", "ms frames_per_s psnr_exact max_error psnr_photo loss_db shaded_fraction");
     char name[48];
     int i, n, p;
     for (i = 0; i < b->isa_count; i++) {
@@ -656,25 +720,30 @@ static void measure_frames(bench *b) {
         time_jobs(b, jobs, b->thread_count * PRESETS, b->isas[i] == b->best_isa ? 6 : 2);
         for (n = 0; n < b->thread_count * PRESETS; n++) {
             p = n % PRESETS;
-            add_row(t, name_of(name, jobs[n].s, presets[p]), jobs[n].ms, 1e3 / jobs[n].ms, q[p].psnr_exact, q[p].max_error,
-                    q[p].psnr_photo, q[EXACT].psnr_photo - q[p].psnr_photo, jobs[n].shaded);
+            add_row(t, name_of(name, jobs[n].s, presets[p]), jobs[n].ms, 1e3 / jobs[n].ms, q[p].psnr_exact,
+                    q[p].max_error, q[p].psnr_photo, q[EXACT].psnr_photo - q[p].psnr_photo, jobs[n].shaded);
         }
         for (n = 0; n < b->thread_count; n++) close_session(s + n);
         if (b->isas[i] != b->best_isa) continue;
-        add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps", 1e3 / all[EXACT].ms, 1e3 / all[DEFAULT].ms,
-                  1e3 / all[FAST].ms);
+        add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps", 1e3 / all[EXACT].ms,
+                  1e3 / all[DEFAULT].ms, 1e3 / all[FAST].ms);
         add_facts(b, "default_psnr_loss_db fast_psnr_loss_db shaded_fraction threads2_speedup_render",
-                  q[EXACT].psnr_photo - q[DEFAULT].psnr_photo, q[EXACT].psnr_photo - q[FAST].psnr_photo, all[DEFAULT].shaded,
+                  q[EXACT].psnr_photo - q[DEFAULT].psnr_photo, q[EXACT].psnr_photo - q[FAST].psnr_photo,
+                  all[DEFAULT].shaded,
                   b->thread_count > 1 ? jobs[DEFAULT].ms / jobs[PRESETS + DEFAULT].ms : none);
     }
     print_table(t);
 }
 
 /* One shortcut at a time on top of exact, from weak to strong. */
-static const struct { const char *name; double values[6]; } knobs[] = {
-    {"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}}, {"light_detail", {0.8, 0.6, 0.5, 0.35}}, {"bf16", {1}},
-    {"stop", {1e-3, 4e-3, 0.01, 0.03}}, {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}
-};
+static const struct {
+    const char *name;
+    double values[6];
+} knobs[] = {{"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}},
+             {"light_detail", {0.8, 0.6, 0.5, 0.35}},
+             {"bf16", {1}},
+             {"stop", {1e-3, 4e-3, 0.01, 0.03}},
+             {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}};
 enum { KNOBS = sizeof knobs / sizeof *knobs };
 
 static void measure_sweep(bench *b) {
@@ -692,7 +761,8 @@ static void measure_sweep(bench *b) {
     for (k = 0; k < KNOBS; k++)
         for (i = 0; knobs[k].values[i] > 0; i++, count++) {
             ssdgs_render_options *o = options + count;
-            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, NULL, &o->stop, &o->alpha_threshold};
+            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, NULL, &o->stop,
+                                               &o->alpha_threshold};
             *o = preset(EXACT);
             if (fields[k]) *fields[k] = (ssdgs_real)knobs[k].values[i];
             else o->bf16 = 1;
@@ -706,23 +776,30 @@ static void measure_sweep(bench *b) {
     measure_quality(b, &s, options, count, q);
     time_jobs(b, jobs, count, 12);
     for (i = 0; i < count; i++)
-        add_row(t, names[i], jobs[i].ms, pow(10, -q[i].psnr_exact / 20), q[i].max_error, q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
+        add_row(t, names[i], jobs[i].ms, pow(10, -q[i].psnr_exact / 20), q[i].max_error,
+                q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
     close_session(&s);
     print_table(t);
 }
 
 /* What stays as it was, or what a scene does without, should cost nothing. */
 static void measure_skipping(bench *b) {
-    static const struct { const char *name; int skipped_terms, fixed_light, fixed_camera, turned_away; } kinds[] = {
-        {"everything moves, all terms", 0, 0, 0, 0}, {"light fixed", 0, 1, 0, 0}, {"camera fixed", 0, 0, 1, 0},
-        {"light and camera fixed", 0, 1, 1, 0}, {"out of sight", 0, 0, 0, 1},
-        {"opaque: no scattering", SSDGS_SCATTERING_TERM, 0, 0, 0}, {"no shadow", SSDGS_SHADOW_TERM, 0, 0, 0},
-        {"matt: no specular", SSDGS_SPECULAR_TERM, 0, 0, 0},
-        {"no scattering, no specular", SSDGS_SCATTERING_TERM | SSDGS_SPECULAR_TERM, 0, 0, 0},
-        {"diffuse alone", SSDGS_ALL_TERMS & ~SSDGS_DIFFUSE_TERM, 0, 0, 0}
-    };
+    static const struct {
+        const char *name;
+        int skipped_terms, fixed_light, fixed_camera, turned_away;
+    } kinds[] = {{"everything moves, all terms", 0, 0, 0, 0},
+                 {"light fixed", 0, 1, 0, 0},
+                 {"camera fixed", 0, 0, 1, 0},
+                 {"light and camera fixed", 0, 1, 1, 0},
+                 {"out of sight", 0, 0, 0, 1},
+                 {"opaque: no scattering", SSDGS_SCATTERING_TERM, 0, 0, 0},
+                 {"no shadow", SSDGS_SHADOW_TERM, 0, 0, 0},
+                 {"matt: no specular", SSDGS_SPECULAR_TERM, 0, 0, 0},
+                 {"no scattering, no specular", SSDGS_SCATTERING_TERM | SSDGS_SPECULAR_TERM, 0, 0, 0},
+                 {"diffuse alone", SSDGS_ALL_TERMS & ~SSDGS_DIFFUSE_TERM, 0, 0, 0}};
     enum { KINDS = sizeof kinds / sizeof *kinds };
-    table *t = new_table(b, "skipping", "exact_ms default_ms fast_ms exact_of_all default_of_all fast_of_all");
+    table *t =
+        new_table(b, "skipping", "exact_ms default_ms fast_ms exact_of_all default_of_all fast_of_all");
     job jobs[PRESETS * KINDS];
     session s;
     int i, p;
@@ -746,8 +823,8 @@ static void measure_skipping(bench *b) {
     print_table(t);
 }
 
-/* The session's model becomes one of `count` Gaussians on the same surfaces: copies, the smaller the more they are, each moved
-   within its original, in the order of a trained model. */
+/* The session's model becomes one of `count` Gaussians on the same surfaces: copies, the smaller the more
+   they are, each moved within its original, in the order of a trained model. */
 static void replicate(session *s, int count) {
     ssdgs_model *from = s->model, *to;
     const double times = (double)count / from->count, shrink = 0.5 * log(times);
@@ -757,10 +834,12 @@ static void replicate(session *s, int count) {
     memcpy(to->globals, from->globals, from->global_count * sizeof *to->globals);
     for (i = 0; i < (size_t)count; i++) {
         ssdgs_real g[SSDGS_CHANNELS], q[4], axes[9];
-        for (c = 0; c < SSDGS_CHANNELS; c++) g[c] = from->gaussians[(size_t)c * from->capacity + (size_t)((double)i / times)];
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            g[c] = from->gaussians[(size_t)c * from->capacity + (size_t)((double)i / times)];
         ssdgs__rotation_scalar(g + SSDGS_ROTATION, q, axes);
         for (k = 0; k < 3; k++) {
-            const double shift = exp((double)g[SSDGS_LOG_SCALE + k]) * (2 * ssdgs__uniform(3, 3 * i + (size_t)k) - 1);
+            const double shift =
+                exp((double)g[SSDGS_LOG_SCALE + k]) * (2 * ssdgs__uniform(3, 3 * i + (size_t)k) - 1);
             for (c = 0; c < 3; c++) g[SSDGS_POSITION + c] += (ssdgs_real)shift * axes[3 * c + k];
             g[SSDGS_LOG_SCALE + k] -= (ssdgs_real)shrink;
         }
@@ -772,7 +851,10 @@ static void replicate(session *s, int count) {
 }
 
 /* An allocator that counts; a block's size stands before it. */
-typedef struct meter { size_t live, peak; int allocations; } meter;
+typedef struct meter {
+    size_t live, peak;
+    int allocations;
+} meter;
 
 static void *meter_allocate(void *user, size_t bytes) {
     meter *m = (meter *)user;
@@ -815,7 +897,8 @@ static double exponent(const table *t, int first, int count, int x, int y) {
 
 static void measure_scaling(bench *b) {
     static const int sizes[] = {10000, 30000, 100000, 300000, 1000000, 3000000, 300000},
-        screens[][2] = {{800, 800}, {128, 128}, {256, 256}, {512, 512}, {1024, 1024}, {1280, 720}, {1920, 1080}};
+                     screens[][2] = {{800, 800},   {128, 128},  {256, 256},  {512, 512},
+                                     {1024, 1024}, {1280, 720}, {1920, 1080}};
     enum { SIZES = 6, SCREENS = 6, MILLION = 4 };
     table *t = new_table(b, "scaling", "gaussians pixels ms frames_per_s mib_held second_frame_allocations");
     const int most = b->quick ? 3 : b->prefix[0] ? 5 : SIZES; /* the published network takes long */
@@ -832,7 +915,8 @@ static void measure_scaling(bench *b) {
         j.views = 2;
         j.width = screens[i < SIZES ? 2 : i - SIZES][0];
         j.height = screens[i < SIZES ? 2 : i - SIZES][1];
-        for (k = 0; k < 2; k++) { /* the same frame twice; a model that changed in between, so that all is done again */
+        for (k = 0; k < 2;
+             k++) { /* the same frame twice; a model that changed in between, so that all is done again */
             const int before = m.allocations;
             ssdgs_model_get(s.model);
             run(b, &j, 0, NULL);
@@ -841,11 +925,13 @@ static void measure_scaling(bench *b) {
         snprintf(name, sizeof name, "%d at %dx%d", s.model->count, j.width, j.height);
         k = m.allocations;
         time_jobs(b, &j, 1, 1);
-        add_row(t, name, (double)s.model->count, (double)j.width * j.height, j.ms, 1e3 / j.ms, (double)m.peak / 1048576,
-                (double)k);
+        add_row(t, name, (double)s.model->count, (double)j.width * j.height, j.ms, 1e3 / j.ms,
+                (double)m.peak / 1048576, (double)k);
         close_session(&s);
     }
-    add_facts(b, "exponent_gaussians exponent_pixels render800_300k_default_fps second_frame_gaussians second_frame_allocations",
+    add_facts(b,
+              "exponent_gaussians exponent_pixels render800_300k_default_fps second_frame_gaussians "
+              "second_frame_allocations",
               exponent(t, 0, most, 0, 2), exponent(t, t->row_count - SCREENS, SCREENS, 1, 2),
               b->quick ? none : t->rows[most].value[3], last->value[0], last->value[5]);
     add_facts(b, "bytes_per_gaussian_render",
@@ -865,7 +951,8 @@ static void measure_training(bench *b) {
     for (n = 0; n <= last; n++) {
         open_session(b, s + n, b->best_isa, b->threads[n], 0, NULL);
         for (p = 0; p < PHASES; p++)
-            jobs[n * PHASES + p] = training_job(b, make_job(b, s + n, preset(EXACT)), p ? jobs[n * PHASES].trainer : NULL, p);
+            jobs[n * PHASES + p] =
+                training_job(b, make_job(b, s + n, preset(EXACT)), p ? jobs[n * PHASES].trainer : NULL, p);
     }
     time_jobs(b, jobs, b->thread_count * PHASES, 10);
     for (p = 0; p < PHASES; p++) {
@@ -876,7 +963,9 @@ static void measure_training(bench *b) {
     }
     add_row(t, "whole run", 6e4, hours[0] * 60, hours[1] * 60, hours[1]);
     p = PHASES - 1;
-    add_facts(b, "train256_ms_per_iteration train256_ms_per_iteration_mean train_60k_hours_projected threads2_speedup_train",
+    add_facts(b,
+              "train256_ms_per_iteration train256_ms_per_iteration_mean train_60k_hours_projected "
+              "threads2_speedup_train",
               all[p].ms /* of the last phase, most of a run */, hours[1] * 60, hours[1],
               last ? jobs[p].ms / jobs[PHASES + p].ms : none);
     for (n = 0; n <= last; n++) {
@@ -916,40 +1005,56 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
 
 /* ---- the chart: each shortcut's time against its error, from exact on ---- */
 
-static const struct { const char *ink, *mark; } looks[KNOBS] = { /* inks that read on white and on black */
-    {"#d1495b", "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"}, {"#3d85c6", "m-3.5 -3.5h7v7h-7z"}, {"#8e6bbf", "m0 -5l5 5l-5 5l-5 -5z"},
-    {"#2a9d6f", "m0 -5l5 9h-10z"}, {"#d98a1f", "m0 5l5 -9h-10z"}
-};
+static const struct {
+    const char *ink, *mark;
+} looks[KNOBS] = {/* inks that read on white and on black */
+                  {"#d1495b", "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"},
+                  {"#3d85c6", "m-3.5 -3.5h7v7h-7z"},
+                  {"#8e6bbf", "m0 -5l5 5l-5 5l-5 -5z"},
+                  {"#2a9d6f", "m0 -5l5 9h-10z"},
+                  {"#d98a1f", "m0 5l5 -9h-10z"}};
 enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };
-static const double least_error = 1e-5, largest_error = 0.1; /* images that are equal, or nearly, stand on the axis */
+static const double least_error = 1e-5,
+                    largest_error = 0.1; /* images that are equal, or nearly, stand on the axis */
 
-typedef struct chart { FILE *file; double left, fastest, slowest; } chart;
+typedef struct chart {
+    FILE *file;
+    double left, fastest, slowest;
+} chart;
 
-static double chart_x(const chart *c, double ms) { return c->left + WIDE * log(ms / c->fastest) / log(c->slowest / c->fastest); }
+static double chart_x(const chart *c, double ms) {
+    return c->left + WIDE * log(ms / c->fastest) / log(c->slowest / c->fastest);
+}
 
 static double chart_y(double error) {
-    return TOP + HIGH * log((error > least_error ? error : least_error) / largest_error) / log(least_error / largest_error);
+    return TOP + HIGH * log((error > least_error ? error : least_error) / largest_error) /
+                     log(least_error / largest_error);
 }
 
 static void draw_axes(const chart *c, const char *title) {
-    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}, levels[] = {1e-5, 1e-4, 1.0 / 255, 1e-3, 1e-2, 1e-1};
+    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8},
+                        levels[] = {1e-5, 1e-4, 1.0 / 255, 1e-3, 1e-2, 1e-1};
     const double bottom = TOP + HIGH;
     double decade;
     int i;
-    fprintf(c->file, "<text x=\"%.0f\" y=\"%d\" class=\"b\">%s</text>\n<g class=\"g\">\n", c->left, TOP - 12, title);
+    fprintf(c->file, "<text x=\"%.0f\" y=\"%d\" class=\"b\">%s</text>\n<g class=\"g\">\n", c->left, TOP - 12,
+            title);
     for (i = 0; i < 6; i++)
-        fprintf(c->file, "<path d=\"M%.1f %.1fh%d\"%s/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s%g</text>\n", c->left,
-                chart_y(levels[i]), WIDE, i == 2 ? " stroke-dasharray=\"4 4\"" : "", c->left - 6, chart_y(levels[i]) + 4,
-                i == 2 ? "1/" : "", i == 2 ? 255 : levels[i]);
+        fprintf(c->file,
+                "<path d=\"M%.1f %.1fh%d\"%s/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s%g</text>\n",
+                c->left, chart_y(levels[i]), WIDE, i == 2 ? " stroke-dasharray=\"4 4\"" : "", c->left - 6,
+                chart_y(levels[i]) + 4, i == 2 ? "1/" : "", i == 2 ? 255 : levels[i]);
     for (decade = 1e-3; decade < c->slowest; decade *= 10)
         for (i = 0; i < 10; i++) {
             const double x = chart_x(c, decade * steps[i]);
             if (x >= c->left && x <= c->left + WIDE)
-                fprintf(c->file, "<path d=\"M%.1f %.1fv-5\"/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%g</text>\n", x,
-                        bottom, x, bottom + 16, decade * steps[i]);
+                fprintf(c->file,
+                        "<path d=\"M%.1f %.1fv-5\"/><text x=\"%.1f\" y=\"%.1f\" "
+                        "text-anchor=\"middle\">%g</text>\n",
+                        x, bottom, x, bottom + 16, decade * steps[i]);
         }
-    fprintf(c->file, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">milliseconds a frame</text></g>\n", c->left + WIDE / 2,
-            bottom + 34);
+    fprintf(c->file, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">milliseconds a frame</text></g>\n",
+            c->left + WIDE / 2, bottom + 34);
 }
 
 static void draw_sweep(chart *c, const table *t, const char *title) {
@@ -965,8 +1070,8 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
     c->slowest *= 1.15;
     draw_axes(c, title);
     for (r = PRESETS, k = 0; k < KNOBS; k++) {
-        fprintf(c->file, "<g fill=\"%s\"><path fill=\"none\" stroke=\"%s\" d=\"M%.1f %.1f", looks[k].ink, looks[k].ink,
-                chart_x(c, x0), chart_y(y0));
+        fprintf(c->file, "<g fill=\"%s\"><path fill=\"none\" stroke=\"%s\" d=\"M%.1f %.1f", looks[k].ink,
+                looks[k].ink, chart_x(c, x0), chart_y(y0));
         for (i = 0; knobs[k].values[i] > 0; i++) {
             v = t->rows[r + i].value;
             fprintf(c->file, "L%.1f %.1f", chart_x(c, v[0]), chart_y(v[1]));
@@ -974,15 +1079,19 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
         fprintf(c->file, "\"/>");
         for (i = 0; knobs[k].values[i] > 0; i++, r++) {
             v = t->rows[r].value;
-            fprintf(c->file, "<path d=\"M%.1f %.1f%s\"/><text x=\"%.1f\" y=\"%.1f\" class=\"s\">%g</text>", chart_x(c, v[0]),
-                    chart_y(v[1]), looks[k].mark, chart_x(c, v[0]) + 7, chart_y(v[1]) + 3, knobs[k].values[i]);
+            fprintf(c->file, "<path d=\"M%.1f %.1f%s\"/><text x=\"%.1f\" y=\"%.1f\" class=\"s\">%g</text>",
+                    chart_x(c, v[0]), chart_y(v[1]), looks[k].mark, chart_x(c, v[0]) + 7, chart_y(v[1]) + 3,
+                    knobs[k].values[i]);
         }
         fprintf(c->file, "</g>\n");
     }
     for (r = 0; r < PRESETS; r++) {
         const double x = chart_x(c, t->rows[r].value[0]), y = chart_y(t->rows[r].value[1]);
-        fprintf(c->file, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"7\" class=\"p\"/><text x=\"%.1f\" y=\"%.1f\" class=\"b\" "
-                "text-anchor=\"%s\">%s</text>\n", x, y, r ? x - 12 : x, r ? y + 4 : y - 12, r ? "end" : "middle", presets[r]);
+        fprintf(
+            c->file,
+            "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"7\" class=\"p\"/><text x=\"%.1f\" y=\"%.1f\" class=\"b\" "
+            "text-anchor=\"%s\">%s</text>\n",
+            x, y, r ? x - 12 : x, r ? y + 4 : y - 12, r ? "end" : "middle", presets[r]);
     }
 }
 
@@ -991,13 +1100,18 @@ static void write_svg(const bench *b, FILE *file) {
     int i;
     c.file = file;
     c.left = LEFT;
-    fprintf(file, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"12\" "
-            "fill=\"#808080\">\n<style>.g path{stroke:#888;stroke-opacity:.4;fill:none}.b{font-weight:bold}.s{font-size:9px}"
-            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">root mean square error against "
-            "exact; 1 is white</text>\n", 2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
+    fprintf(file,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" "
+            "font-size=\"12\" "
+            "fill=\"#808080\">\n<style>.g "
+            "path{stroke:#888;stroke-opacity:.4;fill:none}.b{font-weight:bold}.s{font-size:9px}"
+            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">root mean square "
+            "error against "
+            "exact; 1 is white</text>\n",
+            2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
     for (i = 0; i < KNOBS; i++)
-        fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i, looks[i].mark,
-                looks[i].ink, 410 + 104 * i, knobs[i].name);
+        fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i,
+                looks[i].mark, looks[i].ink, 410 + 104 * i, knobs[i].name);
     for (i = 0; i < b->table_count; i++) {
         const char *key = b->tables[i].key;
         if (strlen(key) < 5 || strcmp(key + strlen(key) - 5, "sweep")) continue;
@@ -1011,14 +1125,16 @@ static void write_svg(const bench *b, FILE *file) {
 
 /* The path of a file beside the program. To be freed. */
 static char *path_beside(const char *program, const char *ending) {
-    const size_t length = strlen(program), stem = length > 4 && !strcmp(program + length - 4, ".exe") ? length - 4 : length;
+    const size_t length = strlen(program),
+                 stem = length > 4 && !strcmp(program + length - 4, ".exe") ? length - 4 : length;
     char *path = (char *)make(length + 16, 1);
     snprintf(path, length + 16, "%.*s%s", (int)stem, program, ending);
     return path;
 }
 
 /* Calls write on a file beside the program. */
-static void write_beside(const bench *b, const char *program, const char *ending, void (*write)(const bench *, FILE *)) {
+static void write_beside(const bench *b, const char *program, const char *ending,
+                         void (*write)(const bench *, FILE *)) {
     char *path = path_beside(program, ending);
     FILE *file = fopen(path, "wb");
     if (!file) die(path, "cannot be written");
@@ -1051,7 +1167,8 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     if (code == SSDGS_OK) fprintf(stderr, "bench: note: %s\n", message);
 }
 
-/* What is wrong with the models is better known now; where they lie the dataset must be read. No output may be one of these files. */
+/* What is wrong with the models is better known now; where they lie the dataset must be read. No output may
+   be one of these files. */
 static void look_at_models(const char *dataset, char paths[2][1024], const char *program, double origin[3]) {
     static const char *const endings[2] = {".json", ".svg"};
     ssdgs_context *context;
@@ -1095,7 +1212,8 @@ static void load_photos(bench *b, const double origin[3]) {
     b->views = b->quick ? 2 : b->photo_count < 8 ? b->photo_count : 8;
     for (i = 0; i < b->photo_count; i++) {
         b->photos[i] = all[i * b->data.count / b->photo_count];
-        if (b->photos[i].camera.width * b->photos[i].camera.height > MAX_PIXELS) die(b->dataset, "photographs over 1920x1080");
+        if (b->photos[i].camera.width * b->photos[i].camera.height > MAX_PIXELS)
+            die(b->dataset, "photographs over 1920x1080");
         scale_photo(b->photos + i, b->scaled + i);
     }
     free(all);
@@ -1110,7 +1228,8 @@ static void look_at_machine(bench *b) {
     int i, all;
     snprintf(b->cpu, sizeof b->cpu, "%.100s", name ? name : "unknown");
     while (file && fgets(line, sizeof line, file))
-        if (!strncmp(line, "model name", 10)) snprintf(b->cpu, sizeof b->cpu, "%.100s", line + strcspn(line, ":") + 2);
+        if (!strncmp(line, "model name", 10))
+            snprintf(b->cpu, sizeof b->cpu, "%.100s", line + strcspn(line, ":") + 2);
     if (file) fclose(file);
     b->cpu[strcspn(b->cpu, "\r\n\"\\")] = 0;
     check(NULL, ssdgs_context_create(NULL, &context));
@@ -1136,12 +1255,15 @@ int main(int argc, char **argv) {
         else files = 4;
     }
     if (files != 0 && files != 3) {
-        fprintf(stderr, "usage: bench [--quick] [--models DIR] [DATASET default_model.ply published_model.ply]\n");
+        fprintf(stderr,
+                "usage: bench [--quick] [--models DIR] [DATASET default_model.ply published_model.ply]\n");
         return 2;
     }
     for (i = 0; i < 2; i++)
         snprintf(paths[i], sizeof paths[i], "%s%s", given[0] ? given[1 + i] : folder,
-                 given[0] ? "" : i ? "/waxcow_published.ply" : "/waxcow.ply");
+                 given[0] ? ""
+                 : i      ? "/waxcow_published.ply"
+                          : "/waxcow.ply");
     b.dataset = given[0] ? given[0] : "examples/data/waxcow";
     b.prefix = "";
     b.model = paths[0];

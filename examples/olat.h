@@ -7,15 +7,15 @@
    if (olat_load("scene", "transforms_train.json", 0, &set, error)) { puts(error); return 1; }
    ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
 
-   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at the top or
-             in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep); transform_matrix (camera
-             to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's own key wins over the
-             top's, one that tells a focal length over all of those. Distorted lenses are refused.
-   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are not sRGB
-             become so, masks become alpha. The dataset's notes say what was done.
-   ERRORS    Functions return 0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept.
-   HOSTILE   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its links).
-   SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
+   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at
+   the top or in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep);
+   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's
+   own key wins over the top's, one that tells a focal length over all of those. Distorted lenses are refused.
+   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are
+   not sRGB become so, masks become alpha. The dataset's notes say what was done. ERRORS    Functions return
+   0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept. HOSTILE
+   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its
+   links). SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
 
 #ifndef OLAT_H
 #define OLAT_H
@@ -57,16 +57,16 @@
 #define OLAT__PRINTF(text, values)
 #endif
 
-enum { /* flags of olat_load */
-    OLAT_NO_IMAGES = 1,   /* a trajectory: images are neither needed nor read; sizes are w, h or 256 x 256 */
-    OLAT_ALLOW_PARENT = 2 /* image paths may contain ".." */
+enum {                     /* flags of olat_load */
+       OLAT_NO_IMAGES = 1, /* a trajectory: images are neither needed nor read; sizes are w, h or 256 x 256 */
+       OLAT_ALLOW_PARENT = 2 /* image paths may contain ".." */
 };
 
 typedef struct olat_frame {
     ssdgs_camera camera;
     ssdgs_light light;
-    char *file, *mask;   /* folder/path of the image and its mask; NULL if the frame names none */
-    void *pixels;        /* (h,w,4) straight alpha, tightly packed; NULL without image */
+    char *file, *mask; /* folder/path of the image and its mask; NULL if the frame names none */
+    void *pixels;      /* (h,w,4) straight alpha, tightly packed; NULL without image */
     ssdgs_pixels format;
     int has_image;
 } olat_frame;
@@ -74,13 +74,21 @@ typedef struct olat_frame {
 typedef struct olat_dataset {
     olat_frame *frames;
     int count;
-    double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far away */
-    char notes[512];  /* what was done or may be wrong: lines, the last one without its newline; "" if nothing */
+    double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far
+                         away */
+    char notes[512];  /* what was done or may be wrong: lines, the last one without its newline; "" if
+                         nothing */
 } olat_dataset;
 
 enum {
-    OLAT__MAX_SIDE = 1 << 15, OLAT__MAX_PIXELS = 1 << 28, OLAT__MAX_FILE = 0x7fffffff, OLAT__MAX_PATH = 4096,
-    OLAT__MAX_DEPTH = 64, OLAT__MAX_NODES = 1 << 24, OLAT__MAX_STRING = 1 << 20, OLAT__MAX_FRAMES = 1 << 20
+    OLAT__MAX_SIDE = 1 << 15,
+    OLAT__MAX_PIXELS = 1 << 28,
+    OLAT__MAX_FILE = 0x7fffffff,
+    OLAT__MAX_PATH = 4096,
+    OLAT__MAX_DEPTH = 64,
+    OLAT__MAX_NODES = 1 << 24,
+    OLAT__MAX_STRING = 1 << 20,
+    OLAT__MAX_FRAMES = 1 << 20
 };
 
 /* ==== errors and files ==== */
@@ -118,7 +126,8 @@ static int olat__read_file(const char *path, unsigned char **data, size_t *size,
         size_t part = total - done < 1 << 20 ? total - done : 1 << 20;
         long got = (long)read(file, *data + done, (unsigned)part);
         if (got > 0) done += (size_t)got;
-        else if (got == 0 || errno != EINTR) problem = got == 0 ? "ended while it was read" : "cannot be read";
+        else if (got == 0 || errno != EINTR)
+            problem = got == 0 ? "ended while it was read" : "cannot be read";
     }
     close(file);
     *size = total;
@@ -132,7 +141,8 @@ static int olat__write_file(const char *path, const unsigned char *data, size_t 
     int file = -1, attempt, reason = 0;
     struct stat info;
     char *name;
-    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode)) return olat__fail(error, "%s: is not a regular file", olat__tail(path));
+    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
+        return olat__fail(error, "%s: is not a regular file", olat__tail(path));
     name = (char *)malloc(room);
     if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
     for (attempt = 0; file < 0 && attempt < 100 && (attempt == 0 || errno == EEXIST); attempt++) {
@@ -176,10 +186,12 @@ OLAT__API int olat_check_writable(const char *path, char error[512]) {
 
 /* ==== inflate and deflate, RFC 1950 and 1951 ==== */
 
-static const unsigned short olat__length_base[29] = {3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 17, 19, 23, 27, 31,
-                                                     35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
-static const unsigned short olat__distance_base[30] = {1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385, 513,
-                                                       769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
+static const unsigned short olat__length_base[29] = {3,  4,  5,  6,   7,   8,   9,   10,  11, 13,
+                                                     15, 17, 19, 23,  27,  31,  35,  43,  51, 59,
+                                                     67, 83, 99, 115, 131, 163, 195, 227, 258};
+static const unsigned short olat__distance_base[30] = {
+    1,   2,   3,   4,   5,   7,    9,    13,   17,   25,   33,   49,   65,    97,    129,
+    193, 257, 385, 513, 769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
 static int olat__length_extra(int i) { return i < 8 || i == 28 ? 0 : i / 4 - 1; }
 static int olat__distance_extra(int i) { return i < 4 ? 0 : i / 2 - 1; }
 
@@ -211,7 +223,8 @@ static void olat__put_be32(unsigned char *p, uint32_t value) {
 
 #define OLAT__FAST_BITS 9
 typedef struct olat__huffman {
-    uint16_t fast[1 << OLAT__FAST_BITS]; /* symbol | length << 9 of the code in the low bits; 0: a longer code, or none */
+    uint16_t fast[1 << OLAT__FAST_BITS]; /* symbol | length << 9 of the code in the low bits; 0: a longer
+                                            code, or none */
     uint16_t count[16], symbol[288];     /* codes of each length; symbols in the order of their codes */
 } olat__huffman;
 
@@ -231,7 +244,8 @@ static int olat__bad(olat__inflater *z, const char *problem) {
     return 256;
 }
 
-/* Builds the canonical code. Incomplete sets are refused, but for the one-code and the empty distance code. */
+/* Builds the canonical code. Incomplete sets are refused, but for the one-code and the empty distance
+   code. */
 static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsigned char *lengths, int count,
                                 const char *problem) {
     unsigned code[16] = {0}, offset[16] = {0}, slot;
@@ -294,7 +308,8 @@ static int olat__symbol(olat__inflater *z, const olat__huffman *h) {
     return olat__bad(z, "a code that stands for nothing");
 }
 
-/* Gives whole unread bytes back to the input and drops the rest of the current one; returns how many bytes are left. */
+/* Gives whole unread bytes back to the input and drops the rest of the current one; returns how many bytes
+   are left. */
 static size_t olat__align(olat__inflater *z) {
     z->at -= (size_t)(z->count / 8);
     z->bits = 0;
@@ -306,7 +321,8 @@ static void olat__stored(olat__inflater *z) {
     size_t left = olat__align(z), length;
     const unsigned char *p = z->in + z->at;
     if (left < 4) olat__bad(z, "the data end early");
-    else if ((p[0] ^ p[2]) != 255 || (p[1] ^ p[3]) != 255) olat__bad(z, "a stored block's length and its complement disagree");
+    else if ((p[0] ^ p[2]) != 255 || (p[1] ^ p[3]) != 255)
+        olat__bad(z, "a stored block's length and its complement disagree");
     else if ((length = (size_t)(p[0] | p[1] << 8)) > left - 4) olat__bad(z, "the data end early");
     else if (length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
     else {
@@ -331,7 +347,8 @@ static void olat__dynamic(olat__inflater *z) {
             if (i == 0) olat__bad(z, "a repeat before the first code length");
             else value = lengths[i - 1];
         }
-        if (symbol > 15) repeat = symbol == 18 ? 11 + olat__take(z, 7) : 3 + olat__take(z, symbol == 16 ? 2 : 3);
+        if (symbol > 15)
+            repeat = symbol == 18 ? 11 + olat__take(z, 7) : 3 + olat__take(z, symbol == 16 ? 2 : 3);
         if (repeat > literals + distances - i) olat__bad(z, "too many code lengths");
         for (; repeat > 0 && !z->problem; repeat--) lengths[i++] = (unsigned char)value;
     }
@@ -375,7 +392,8 @@ static void olat__compressed(olat__inflater *z) {
         distance = (size_t)(olat__distance_base[symbol] + olat__take(z, olat__distance_extra(symbol)));
         if (distance > z->length) olat__bad(z, "a distance reaches before the data");
         if ((size_t)length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
-        for (; length > 0 && !z->problem; length--, z->length++) z->out[z->length] = z->out[z->length - distance];
+        for (; length > 0 && !z->problem; length--, z->length++)
+            z->out[z->length] = z->out[z->length - distance];
     }
 }
 
@@ -383,7 +401,8 @@ static void olat__compressed(olat__inflater *z) {
 static const char *olat__inflate(olat__inflater *z) {
     int last = 0;
     if (z->size < 6) return "the data end early";
-    if ((z->in[0] & 15) != 8 || z->in[0] >> 4 > 7 || (z->in[0] * 256 + z->in[1]) % 31 != 0 || (z->in[1] & 32) != 0) {
+    if ((z->in[0] & 15) != 8 || z->in[0] >> 4 > 7 || (z->in[0] * 256 + z->in[1]) % 31 != 0 ||
+        (z->in[1] & 32) != 0) {
         return "a bad zlib header";
     }
     for (z->at = 2; !last && !z->problem;) {
@@ -402,7 +421,8 @@ static const char *olat__inflate(olat__inflater *z) {
     if (z->problem) return z->problem;
     if (z->length < z->capacity) return "less data than the image needs";
     if (olat__align(z) < 4) return "the data end early";
-    return olat__be32(z->in + z->at) == olat__adler32(z->out, z->length) ? NULL : "the Adler checksum is wrong";
+    return olat__be32(z->in + z->at) == olat__adler32(z->out, z->length) ? NULL
+                                                                         : "the Adler checksum is wrong";
 }
 
 typedef struct olat__deflater {
@@ -414,7 +434,8 @@ typedef struct olat__deflater {
 
 static void olat__put(olat__deflater *z, size_t value, int n) {
     z->bits |= (uint64_t)value << z->count;
-    for (z->count += n; z->count >= 8; z->count -= 8, z->bits >>= 8) z->out[z->length++] = (unsigned char)(z->bits & 255);
+    for (z->count += n; z->count >= 8; z->count -= 8, z->bits >>= 8)
+        z->out[z->length++] = (unsigned char)(z->bits & 255);
 }
 
 static void olat__put_symbol(olat__deflater *z, int symbol) {
@@ -427,8 +448,9 @@ static unsigned olat__hash(const unsigned char *p) {
     return ((uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16) * 2654435761u >> 17;
 }
 
-/* Packs size < 2^31 bytes into one block of fixed codes; returns the length of the zlib stream. The table holds (2, 32768)
-   zeros: the last position + 1 of each hash, and the one before of each position. Nine bits a byte are the worst case. */
+/* Packs size < 2^31 bytes into one block of fixed codes; returns the length of the zlib stream. The table
+   holds (2, 32768) zeros: the last position + 1 of each hash, and the one before of each position. Nine bits
+   a byte are the worst case. */
 static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char *out, uint32_t *table) {
     olat__deflater z = {out, 0, 0, 0};
     size_t i = 0;
@@ -469,8 +491,14 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 /* ==== PNG ==== */
 
 enum {
-    OLAT__IHDR = 0x49484452, OLAT__PLTE = 0x504C5445, OLAT__IDAT = 0x49444154, OLAT__IEND = 0x49454E44,
-    OLAT__TRNS = 0x74524E53, OLAT__GAMA = 0x67414D41, OLAT__SRGB = 0x73524742, OLAT__ICCP = 0x69434350,
+    OLAT__IHDR = 0x49484452,
+    OLAT__PLTE = 0x504C5445,
+    OLAT__IDAT = 0x49444154,
+    OLAT__IEND = 0x49454E44,
+    OLAT__TRNS = 0x74524E53,
+    OLAT__GAMA = 0x67414D41,
+    OLAT__SRGB = 0x73524742,
+    OLAT__ICCP = 0x69434350,
     OLAT__CICP = 0x63494350
 };
 static const unsigned char olat__signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
@@ -481,8 +509,8 @@ static const unsigned char olat__passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0,
 
 typedef struct olat__png {
     int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key;
-    int curve;      /* how much the chunk knows that told the gamma; 0: none did */
-    uint32_t gamma; /* samples are light to the power of gamma / 100000; 0: like sRGB */
+    int curve;       /* how much the chunk knows that told the gamma; 0: none did */
+    uint32_t gamma;  /* samples are light to the power of gamma / 100000; 0: like sRGB */
     unsigned key[3]; /* the transparent colour */
     unsigned char palette[256][4];
     unsigned char *packed, *raw, *out;
@@ -491,7 +519,8 @@ typedef struct olat__png {
 } olat__png;
 
 static uint32_t olat__crc32(const unsigned char *data, size_t size) {
-    uint32_t table[16], crc = 0xFFFFFFFFu, i, k; /* half a byte at a time: a table this small is made on the spot */
+    uint32_t table[16], crc = 0xFFFFFFFFu, i,
+                        k; /* half a byte at a time: a table this small is made on the spot */
     for (i = 0; i < 16; i++) {
         for (table[i] = i, k = 0; k < 4; k++) table[i] = (table[i] & 1 ? 0xEDB88320u : 0) ^ table[i] >> 1;
     }
@@ -515,7 +544,8 @@ static const char *olat__png_header(olat__png *png, const unsigned char *data, s
     if (width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE) return "a side is longer than 32768 pixels";
     if (height > OLAT__MAX_PIXELS / width) return "the image has more than 2^28 pixels";
     if (data[9] > 6 || !(depths[data[9]] >> k & 1)) return "unknown combination of colour type and bit depth";
-    if (data[10] != 0 || data[11] != 0 || data[12] > 1) return "unknown compression, filter or interlace method";
+    if (data[10] != 0 || data[11] != 0 || data[12] > 1)
+        return "unknown compression, filter or interlace method";
     png->width = (int)width;
     png->height = (int)height;
     png->depth = data[8];
@@ -529,16 +559,19 @@ static const char *olat__png_header(olat__png *png, const unsigned char *data, s
 static const char *olat__png_palette(olat__png *png, const unsigned char *data, size_t length) {
     size_t i;
     if (length % 3 != 0 || length < 3 || length > 768) return "PLTE has a bad length";
-    if (png->color == 3 && length / 3 > (size_t)1 << png->depth) return "PLTE is longer than the bit depth allows";
+    if (png->color == 3 && length / 3 > (size_t)1 << png->depth)
+        return "PLTE is longer than the bit depth allows";
     png->palette_size = (int)(length / 3);
-    for (i = 0; i < 4 * (length / 3); i++) png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
+    for (i = 0; i < 4 * (length / 3); i++)
+        png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
     return NULL;
 }
 
 static const char *olat__png_transparency(olat__png *png, const unsigned char *data, size_t length) {
     size_t i;
     if (png->color & 4) return "tRNS in an image with alpha";
-    if (png->color == 3 ? length < 1 || length > (size_t)png->palette_size : length != 2 * (size_t)png->channels) {
+    if (png->color == 3 ? length < 1 || length > (size_t)png->palette_size
+                        : length != 2 * (size_t)png->channels) {
         return "tRNS has a bad length";
     }
     png->has_key = 1;
@@ -552,22 +585,30 @@ static const char *olat__png_transparency(olat__png *png, const unsigned char *d
 /* What the file is where it is no PNG, by its first bytes. */
 static const char *olat__png_foreign(const unsigned char *bytes, size_t size) {
 #define OLAT__FOREIGN(kind) "this is " kind " file, not a PNG file: convert it to PNG"
-    static const struct { size_t at, length; const char *bytes, *problem; } kinds[] = {
-        {0, 3, "\xFF\xD8\xFF", OLAT__FOREIGN("a JPEG")}, {8, 4, "WEBP", OLAT__FOREIGN("a WebP")},
-        {0, 4, "GIF8", OLAT__FOREIGN("a GIF")}, {0, 4, "II*\0", OLAT__FOREIGN("a TIFF")},
-        {0, 4, "MM\0*", OLAT__FOREIGN("a TIFF")}, {0, 2, "BM", OLAT__FOREIGN("a BMP")},
-        {0, 4, "\x76\x2F\x31\x01", OLAT__FOREIGN("an OpenEXR")}, {4, 4, "ftyp", OLAT__FOREIGN("a HEIC or AVIF")},
-        {0, 23, "version https://git-lfs", "this is a Git LFS pointer, not the image itself: run git lfs pull"}};
+    static const struct {
+        size_t at, length;
+        const char *bytes, *problem;
+    } kinds[] = {{0, 3, "\xFF\xD8\xFF", OLAT__FOREIGN("a JPEG")},
+                 {8, 4, "WEBP", OLAT__FOREIGN("a WebP")},
+                 {0, 4, "GIF8", OLAT__FOREIGN("a GIF")},
+                 {0, 4, "II*\0", OLAT__FOREIGN("a TIFF")},
+                 {0, 4, "MM\0*", OLAT__FOREIGN("a TIFF")},
+                 {0, 2, "BM", OLAT__FOREIGN("a BMP")},
+                 {0, 4, "\x76\x2F\x31\x01", OLAT__FOREIGN("an OpenEXR")},
+                 {4, 4, "ftyp", OLAT__FOREIGN("a HEIC or AVIF")},
+                 {0, 23, "version https://git-lfs",
+                  "this is a Git LFS pointer, not the image itself: run git lfs pull"}};
 #undef OLAT__FOREIGN
     size_t i;
     for (i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        if (size >= kinds[i].at + kinds[i].length && !memcmp(bytes + kinds[i].at, kinds[i].bytes, kinds[i].length))
+        if (size >= kinds[i].at + kinds[i].length &&
+            !memcmp(bytes + kinds[i].at, kinds[i].bytes, kinds[i].length))
             return kinds[i].problem;
     return "this is not a PNG file";
 }
 
-/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word, of one kind
-   the first chunk; malformed ones say nothing. */
+/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word,
+   of one kind the first chunk; malformed ones say nothing. */
 static void olat__png_curve(olat__png *png, uint32_t type, const unsigned char *data, size_t length) {
     const uint32_t value = length == 4 ? olat__be32(data) : 0;
     int curve = 0;
@@ -577,7 +618,9 @@ static void olat__png_curve(olat__png *png, uint32_t type, const unsigned char *
     if (type == OLAT__CICP && length == 4) curve = 4;
     if (curve <= png->curve) return;
     png->curve = curve;
-    png->gamma = curve == 1 && (value < 40000 || value > 50000) ? value : curve == 4 && data[1] == 8 ? 100000 : 0;
+    png->gamma = curve == 1 && (value < 40000 || value > 50000) ? value
+                 : curve == 4 && data[1] == 8                   ? 100000
+                                                                : 0;
 }
 
 /* Walks over the chunks: fills the header and the palette, and gathers the compressed data in png->packed. */
@@ -604,9 +647,11 @@ static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, 
             problem = stage != START ? "a second IHDR" : olat__png_header(png, data, length);
             stage = HEADER;
         } else if (type == OLAT__PLTE) {
-            problem = stage != HEADER || png->palette_size ? "PLTE is out of place" : olat__png_palette(png, data, length);
+            problem = stage != HEADER || png->palette_size ? "PLTE is out of place"
+                                                           : olat__png_palette(png, data, length);
         } else if (type == OLAT__TRNS) {
-            problem = stage != HEADER || png->has_key ? "tRNS is out of place" : olat__png_transparency(png, data, length);
+            problem = stage != HEADER || png->has_key ? "tRNS is out of place"
+                                                      : olat__png_transparency(png, data, length);
         } else if (type == OLAT__IDAT) {
             if (stage == AFTER) return "IDAT chunks are not consecutive";
             if (png->color == 3 && !png->palette_size) return "PLTE is missing";
@@ -622,8 +667,10 @@ static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, 
 }
 
 /* What a filter expects a byte to be, from the row above (NULL: none) and the byte `back` to the left. */
-static int olat__predict(int filter, const unsigned char *row, const unsigned char *above, size_t i, size_t back) {
-    int a = i < back ? 0 : row[i - back], b = above ? above[i] : 0, c = above && i >= back ? above[i - back] : 0;
+static int olat__predict(int filter, const unsigned char *row, const unsigned char *above, size_t i,
+                         size_t back) {
+    int a = i < back ? 0 : row[i - back], b = above ? above[i] : 0,
+        c = above && i >= back ? above[i - back] : 0;
     int pa = abs(b - c), pb = abs(a - c), pc = abs(a + b - 2 * c);
     switch (filter) {
     case 1: return a;
@@ -643,7 +690,8 @@ static size_t olat__png_pass(const olat__png *png, int pass, int *width, int *he
 }
 
 /* Writes a row of samples to every step-th pixel of the output from pixel `to` on. */
-static const char *olat__png_row(const olat__png *png, const unsigned char *row, int count, size_t to, size_t step) {
+static const char *olat__png_row(const olat__png *png, const unsigned char *row, int count, size_t to,
+                                 size_t step) {
     const unsigned opaque = (1u << png->depth) - 1;
     const int second = png->color & 2 ? 1 : 0, third = 2 * second;
     size_t i = 0;
@@ -664,7 +712,9 @@ static const char *olat__png_row(const olat__png *png, const unsigned char *row,
         rgba[1] = s[second];
         rgba[2] = s[third];
         rgba[3] = png->color & 4 ? s[png->channels - 1] : opaque;
-        if (png->has_key && s[0] == png->key[0] && s[second] == png->key[second] && s[third] == png->key[third]) rgba[3] = 0;
+        if (png->has_key && s[0] == png->key[0] && s[second] == png->key[second] &&
+            s[third] == png->key[third])
+            rgba[3] = 0;
         for (c = 0; c < 4; c++) {
             uint16_t wide = (uint16_t)rgba[c];
             if (png->depth == 16) memcpy(png->out + 8 * to + 2 * c, &wide, 2);
@@ -690,7 +740,8 @@ static const char *olat__png_unfilter(olat__png *png) {
             for (i = 0; filter && i < bytes; i++) {
                 row[i] = (unsigned char)((row[i] + olat__predict(filter, row, above, i, back)) & 255);
             }
-            problem = olat__png_row(png, row, width, (size_t)(p[1] + y * p[3]) * (size_t)png->width + p[0], p[2]);
+            problem =
+                olat__png_row(png, row, width, (size_t)(p[1] + y * p[3]) * (size_t)png->width + p[0], p[2]);
         }
     }
     return problem;
@@ -712,7 +763,8 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
     out_size = (uint64_t)png->width * (uint64_t)png->height * (png->depth == 16 ? 8 : 4);
     png->unit = "byte of the compressed data";
     png->at = png->packed_size;
-    if (raw_size / 1032 > png->packed_size) return "less data than the image needs"; /* deflate packs no better */
+    if (raw_size / 1032 > png->packed_size)
+        return "less data than the image needs"; /* deflate packs no better */
     if (raw_size > SIZE_MAX || out_size > SIZE_MAX) return "out of memory";
     png->raw = (unsigned char *)malloc((size_t)raw_size);
     png->out = (unsigned char *)malloc((size_t)out_size);
@@ -729,8 +781,8 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
     return olat__png_unfilter(png);
 }
 
-static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width, int *height,
-                            ssdgs_pixels *format, void **pixels, uint32_t *gamma, char *error) {
+static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width,
+                            int *height, ssdgs_pixels *format, void **pixels, uint32_t *gamma, char *error) {
     olat__png png;
     const char *problem;
     memset(&png, 0, sizeof png);
@@ -743,7 +795,9 @@ static int olat__png_decode(const char *name, const unsigned char *bytes, size_t
     *format = png.depth == 16 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
     *pixels = problem ? NULL : png.out;
     *gamma = png.gamma;
-    return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at, problem) : 0;
+    return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at,
+                                problem)
+                   : 0;
 }
 
 static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels,
@@ -758,9 +812,10 @@ static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixel
     return failed;
 }
 
-/* Decodes a PNG of any kind into (h,w,4) straight RGBA as stored, 16 bits if the file has 16. free() the pixels. */
-OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height, ssdgs_pixels *format,
-                              void **pixels, char error[512]) {
+/* Decodes a PNG of any kind into (h,w,4) straight RGBA as stored, 16 bits if the file has 16. free() the
+   pixels. */
+OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height,
+                              ssdgs_pixels *format, void **pixels, char error[512]) {
     uint32_t gamma;
     return olat__png_decode("PNG", bytes, size, width, height, format, pixels, &gamma, error);
 }
@@ -772,7 +827,8 @@ OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pix
     return olat__png_file(path, width, height, format, pixels, &gamma, error);
 }
 
-/* Filters a row into out: the filter byte, then the differences. Takes the filter whose differences are smallest. */
+/* Filters a row into out: the filter byte, then the differences. Takes the filter whose differences are
+   smallest. */
 static void olat__filter_row(const unsigned char *row, const unsigned char *above, size_t bytes, size_t back,
                              unsigned char *out) {
     uint64_t best = UINT64_MAX;
@@ -789,7 +845,8 @@ static void olat__filter_row(const unsigned char *row, const unsigned char *abov
     }
 }
 
-/* Completes a chunk whose length bytes of data are in place already at p + 8; returns where the next one starts. */
+/* Completes a chunk whose length bytes of data are in place already at p + 8; returns where the next one
+   starts. */
 static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t length) {
     olat__put_be32(p, (uint32_t)length);
     olat__put_be32(p + 4, type);
@@ -798,15 +855,16 @@ static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t le
 }
 
 /* Writes (h,w,channels) bytes as PNG: 1 grey, 3 RGB, 4 RGBA. The file appears whole or not at all. */
-OLAT__API int olat_write_png(const char *path, int width, int height, int channels, const unsigned char *pixels,
-                             char error[512]) {
+OLAT__API int olat_write_png(const char *path, int width, int height, int channels,
+                             const unsigned char *pixels, char error[512]) {
     const size_t row = (size_t)width * (size_t)channels, raw_size = (size_t)height * (row + 1);
     unsigned char *raw, *file, *p;
     uint32_t *table;
     int y, failed;
-    if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE || height > OLAT__MAX_PIXELS / width ||
-        (channels != 1 && channels != 3 && channels != 4)) {
-        return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels", olat__tail(path), width, height, channels);
+    if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE ||
+        height > OLAT__MAX_PIXELS / width || (channels != 1 && channels != 3 && channels != 4)) {
+        return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels", olat__tail(path), width,
+                          height, channels);
     }
     raw = (unsigned char *)malloc(raw_size);
     file = (unsigned char *)malloc(raw_size + raw_size / 8 + 128); /* nine bits a byte, and the chunks */
@@ -836,24 +894,37 @@ OLAT__API int olat_write_png(const char *path, int width, int height, int channe
 
 /* ==== JSON ==== */
 
-typedef enum olat__type { OLAT__NULL, OLAT__FALSE, OLAT__TRUE, OLAT__NUMBER, OLAT__STRING, OLAT__ARRAY, OLAT__OBJECT } olat__type;
+typedef enum olat__type {
+    OLAT__NULL,
+    OLAT__FALSE,
+    OLAT__TRUE,
+    OLAT__NUMBER,
+    OLAT__STRING,
+    OLAT__ARRAY,
+    OLAT__OBJECT
+} olat__type;
 
 typedef struct olat__node {
-    const char *key, *text; /* key of a member, value of a string; decoded in place, NUL appended; NULL if none */
+    const char *key,
+        *text; /* key of a member, value of a string; decoded in place, NUL appended; NULL if none */
     double number;
     size_t key_length, text_length;
     olat__type type;
-    int line, parent, child, next, index, size; /* child: the first; next: the sibling; 0 = none, since node 0 is the root */
+    int line, parent, child, next, index,
+        size; /* child: the first; next: the sibling; 0 = none, since node 0 is the root */
 } olat__node;
 
 typedef struct olat__json {
     char *path, *error, *text, *at, *end;
     olat__node *nodes;
-    int count, capacity, line, where, failed; /* where: the node being parsed; failed: error holds a message, the first one */
+    int count, capacity, line, where,
+        failed; /* where: the node being parsed; failed: error holds a message, the first one */
 } olat__json;
 
-/* Records the first failure: file, line, keys from the root to the node, message. Returns 0, which callers pass on. */
-OLAT__PRINTF(3, 4) static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
+/* Records the first failure: file, line, keys from the root to the node, message. Returns 0, which callers
+   pass on. */
+OLAT__PRINTF(3, 4)
+static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
     const olat__node *chain[OLAT__MAX_DEPTH + 1], *n;
     char keys[160] = "", what[240];
     size_t used = 0;
@@ -870,7 +941,8 @@ OLAT__PRINTF(3, 4) static int olat__json_fail(olat__json *j, const olat__node *n
         else snprintf(keys + used, sizeof keys - used, "[%d]", n->index);
         used = strlen(keys);
     }
-    j->failed = olat__fail(j->error, "%s: line %d: %s%s%s", olat__tail(j->path), node->line, keys, used ? ": " : "", what);
+    j->failed = olat__fail(j->error, "%s: line %d: %s%s%s", olat__tail(j->path), node->line, keys,
+                           used ? ": " : "", what);
     return 0;
 }
 
@@ -882,9 +954,9 @@ static int olat__same_letters(const char *text, const char *lower, size_t length
     return i == length;
 }
 
-/* Reads the JSON number at text; returns its length, 0 if there is none. strtod is given whole digits and an exponent, which
-   read the same in every locale, and today's C libraries round them correctly. 767 digits decide every double: of those
-   beyond 780 it matters only whether one is not zero. */
+/* Reads the JSON number at text; returns its length, 0 if there is none. strtod is given whole digits and an
+   exponent, which read the same in every locale, and today's C libraries round them correctly. 767 digits
+   decide every double: of those beyond 780 it matters only whether one is not zero. */
 static size_t olat__parse_number(const char *text, double *value) {
     enum { KEPT = 780 };
     char digits[KEPT + 32];
@@ -907,7 +979,8 @@ static size_t olat__parse_number(const char *text, double *value) {
         negative = p[1] == '-';
         p += p[1] == '-' || p[1] == '+' ? 2 : 1;
         if (!olat__is_digit(*p)) return 0;
-        for (; olat__is_digit(*p); p++) written = written < 1000000000000 ? 10 * written + (*p - '0') : written;
+        for (; olat__is_digit(*p); p++)
+            written = written < 1000000000000 ? 10 * written + (*p - '0') : written;
         exponent += negative ? -written : written;
     }
     exponent = exponent > 99999 ? 99999 : exponent < -99999 ? -99999 : exponent;
@@ -918,7 +991,8 @@ static size_t olat__parse_number(const char *text, double *value) {
     return (size_t)(p - text);
 }
 
-/* Length of the UTF-8 sequence at p, 0 if it is malformed. A NUL ends every text, so nothing beyond it is read. */
+/* Length of the UTF-8 sequence at p, 0 if it is malformed. A NUL ends every text, so nothing beyond it is
+   read. */
 static int olat__utf8_length(const char *p) {
     unsigned c = (unsigned char)p[0], code;
     int i, n = c < 0x80 ? 1 : c < 0xC2 ? 0 : c < 0xE0 ? 2 : c < 0xF0 ? 3 : c < 0xF5 ? 4 : 0;
@@ -1008,15 +1082,18 @@ static const char *olat__json_scalar(olat__json *j, olat__node *node) {
 }
 
 static void olat__skip_space(olat__json *j) {
-    for (; *j->at == ' ' || *j->at == '\t' || *j->at == '\n' || *j->at == '\r'; j->at++) j->line += *j->at == '\n';
+    for (; *j->at == ' ' || *j->at == '\t' || *j->at == '\n' || *j->at == '\r'; j->at++)
+        j->line += *j->at == '\n';
 }
 
-/* Appends a node to the container, after its child `last` (0: none yet); returns its index, -1 when no more fit. */
+/* Appends a node to the container, after its child `last` (0: none yet); returns its index, -1 when no more
+   fit. */
 static int olat__json_add(olat__json *j, int container, int last) {
     olat__node *node;
     if (j->count == j->capacity) {
         int capacity = j->capacity ? 2 * j->capacity : 256;
-        node = capacity > OLAT__MAX_NODES ? NULL : (olat__node *)realloc(j->nodes, (size_t)capacity * sizeof *node);
+        node = capacity > OLAT__MAX_NODES ? NULL
+                                          : (olat__node *)realloc(j->nodes, (size_t)capacity * sizeof *node);
         if (!node) return -1;
         j->nodes = node;
         j->capacity = capacity;
@@ -1032,8 +1109,9 @@ static int olat__json_add(olat__json *j, int container, int last) {
 
 /* Parses everything into j->nodes; returns NULL or what is wrong at j->where. */
 static const char *olat__json_values(olat__json *j) {
-    int last[OLAT__MAX_DEPTH + 1] = {0}, depth = 0, container = -1; /* last: the newest child of every open container */
-    for (;;) { /* a value each time */
+    int last[OLAT__MAX_DEPTH + 1] = {0}, depth = 0,
+                               container = -1; /* last: the newest child of every open container */
+    for (;;) {                                 /* a value each time */
         const char *problem;
         olat__node *node;
         int self, is_member = container >= 0 && j->nodes[container].type == OLAT__OBJECT;
@@ -1066,7 +1144,8 @@ static const char *olat__json_values(olat__json *j) {
             if (depth == 0) return j->at == j->end ? NULL : "text after the end of the value";
             if (*j->at == ',') break;
             if (j->at == j->end) return "the file ends early";
-            if (*j->at != (j->nodes[container].type == OLAT__ARRAY ? ']' : '}')) return "a comma or closing bracket was expected";
+            if (*j->at != (j->nodes[container].type == OLAT__ARRAY ? ']' : '}'))
+                return "a comma or closing bracket was expected";
             j->where = container;
             container = j->nodes[container].parent;
             depth--;
@@ -1081,9 +1160,11 @@ static void olat__json_parse(olat__json *j) {
     const unsigned char *text = (const unsigned char *)j->text;
     const char *problem;
     j->line = 1;
-    j->at = j->text + (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
+    j->at = j->text +
+            (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
     olat__skip_space(j);
-    if (j->end - j->text > 1 && (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* a mark, or a letter */
+    if (j->end - j->text > 1 &&
+        (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* a mark, or a letter */
         problem = "the file is UTF-16: save it as UTF-8";
     } else if ((problem = olat__json_values(j)) == NULL) return;
     if (!j->nodes) j->failed = olat__fail(j->error, "%s: %s", olat__tail(j->path), problem);
@@ -1107,12 +1188,14 @@ static const olat__node *olat__find(const olat__json *j, const olat__node *objec
     return found;
 }
 
-/* Reads an array of count numbers; a single one may stand without brackets. Their limit keeps float arithmetic finite. */
+/* Reads an array of count numbers; a single one may stand without brackets. Their limit keeps float
+   arithmetic finite. */
 static int olat__numbers(olat__json *j, const olat__node *node, int count, double *out) {
     const olat__node *n = node->type == OLAT__ARRAY && node->child ? &j->nodes[node->child] : node;
     int i;
     if (node->type == OLAT__ARRAY ? node->size != count : count != 1) {
-        return olat__json_fail(j, node, "%d number%s expected", count, count == 1 ? " was" : "s in an array were");
+        return olat__json_fail(j, node, "%d number%s expected", count,
+                               count == 1 ? " was" : "s in an array were");
     }
     for (i = 0; i < count; i++, n = &j->nodes[n->next]) {
         if (n->type != OLAT__NUMBER) return olat__json_fail(j, n, "a number was expected");
@@ -1130,10 +1213,11 @@ static int olat__get(olat__json *j, const olat__node *object, const char *key, i
 
 static double olat__dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent. The axes
-   must be a rotation times a scale, to three decimals, and become exactly a rotation: rounding shears no image. */
-static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale, double axes[3][3],
-                          double origin[3]) {
+/* Reads a matrix of 3 x 3, 3 x 4 or 4 x 4: its columns are a camera's axes and position; 0 if it is absent.
+   The axes must be a rotation times a scale, to three decimals, and become exactly a rotation: rounding
+   shears no image. */
+static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale,
+                          double axes[3][3], double origin[3]) {
     const olat__node *node = olat__find(j, object, key), *row;
     double y[3], scale2 = 1, along, x_length, z_length;
     int columns, i, k;
@@ -1148,12 +1232,17 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
         if (!olat__numbers(j, row, columns, v)) return 0;
         for (k = 0; k < 3 && i < 3; k++) axes[k][i] = v[k];
         if (i < 3) origin[i] = v[3];
-        else if (olat__dot(v, v) > 1e-12 || fabs(v[3] - 1) > 1e-6) return olat__json_fail(j, row, "this row must be 0 0 0 1");
+        else if (olat__dot(v, v) > 1e-12 || fabs(v[3] - 1) > 1e-6)
+            return olat__json_fail(j, row, "this row must be 0 0 0 1");
     }
-    if (any_scale) scale2 = (olat__dot(axes[0], axes[0]) + olat__dot(axes[1], axes[1]) + olat__dot(axes[2], axes[2])) / 3;
+    if (any_scale)
+        scale2 =
+            (olat__dot(axes[0], axes[0]) + olat__dot(axes[1], axes[1]) + olat__dot(axes[2], axes[2])) / 3;
     for (i = 0; i < 9; i++) {
-        if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 5e-3) continue;
-        return olat__json_fail(j, node, "the 3 x 3 part is not a rotation%s", any_scale ? " times a scale" : "");
+        if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 5e-3)
+            continue;
+        return olat__json_fail(j, node, "the 3 x 3 part is not a rotation%s",
+                               any_scale ? " times a scale" : "");
     }
     z_length = sqrt(olat__dot(axes[2], axes[2]));
     for (k = 0; k < 3; k++) axes[2][k] /= z_length;
@@ -1161,8 +1250,10 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
     for (k = 0; k < 3; k++) axes[0][k] -= along * axes[2][k];
     x_length = sqrt(olat__dot(axes[0], axes[0]));
     for (k = 0; k < 3; k++) axes[0][k] /= x_length;
-    for (k = 0; k < 3; k++) y[k] = axes[2][(k + 1) % 3] * axes[0][(k + 2) % 3] - axes[2][(k + 2) % 3] * axes[0][(k + 1) % 3];
-    if (olat__dot(y, axes[1]) < 0) return olat__json_fail(j, node, "the matrix mirrors: its determinant is negative");
+    for (k = 0; k < 3; k++)
+        y[k] = axes[2][(k + 1) % 3] * axes[0][(k + 2) % 3] - axes[2][(k + 2) % 3] * axes[0][(k + 1) % 3];
+    if (olat__dot(y, axes[1]) < 0)
+        return olat__json_fail(j, node, "the matrix mirrors: its determinant is negative");
     memcpy(axes[1], y, sizeof y);
     return 1;
 }
@@ -1186,13 +1277,49 @@ static int olat__nonzero(const olat__json *j, const olat__node *node) {
 
 /* Refuses a lens that is no pinhole's by its model's name, and by any coefficient that is not 0. */
 static void olat__check_lens(olat__json *j, const olat__node *object) {
-    static const char *const models[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "full_opencv",
-                                         "simple_radial", "radial"};
-    static const char *const keys[] = {
-        "camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "p1", "p2", "p3", "p4", "p5",
-        "p6", "p7", "p8", "p9", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "b1", "b2", "skew", "ftheta_p0",
-        "ftheta_p1", "ftheta_p2", "ftheta_p3", "ftheta_p4", "distortion", "distortion_params",
-        "distortion_coefficients", "rolling_shutter"};
+    static const char *const models[] = {"pinhole",     "simple_pinhole", "perspective", "opencv",
+                                         "full_opencv", "simple_radial",  "radial"};
+    static const char *const keys[] = {"camera_model",
+                                       "is_fisheye",
+                                       "k1",
+                                       "k2",
+                                       "k3",
+                                       "k4",
+                                       "k5",
+                                       "k6",
+                                       "k7",
+                                       "k8",
+                                       "k9",
+                                       "p1",
+                                       "p2",
+                                       "p3",
+                                       "p4",
+                                       "p5",
+                                       "p6",
+                                       "p7",
+                                       "p8",
+                                       "p9",
+                                       "s1",
+                                       "s2",
+                                       "s3",
+                                       "s4",
+                                       "s5",
+                                       "s6",
+                                       "s7",
+                                       "s8",
+                                       "s9",
+                                       "b1",
+                                       "b2",
+                                       "skew",
+                                       "ftheta_p0",
+                                       "ftheta_p1",
+                                       "ftheta_p2",
+                                       "ftheta_p3",
+                                       "ftheta_p4",
+                                       "distortion",
+                                       "distortion_params",
+                                       "distortion_coefficients",
+                                       "rolling_shutter"};
     size_t i, m;
     for (i = 0; i < sizeof keys / sizeof *keys; i++) {
         const olat__node *node = olat__find(j, object, keys[i]);
@@ -1202,8 +1329,10 @@ static void olat__check_lens(olat__json *j, const olat__node *object) {
             fine = olat__is_word(node, models[m]);
         if (fine) continue;
         value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
-        olat__json_fail(j, node, "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
-            " image_undistorter or Metashape's Export > Undistort, say", value, value[0] ? ": " : "");
+        olat__json_fail(j, node,
+                        "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
+                        " image_undistorter or Metashape's Export > Undistort, say",
+                        value, value[0] ? ": " : "");
     }
 }
 
@@ -1226,14 +1355,16 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
         if (!olat__get(j, object, focal[i], 1, &v[i])) continue;
         given = 1;
         if (i < 2 && !(v[i] > 0)) olat__json_fail(j, object, "%s is not positive", focal[i]);
-        if (i > 1 && !(v[i] > 1e-4 && v[i] < 3.14)) olat__json_fail(j, object, "%s is not between 0 and pi", focal[i]);
+        if (i > 1 && !(v[i] > 1e-4 && v[i] < 3.14))
+            olat__json_fail(j, object, "%s is not between 0 and pi", focal[i]);
     }
     if (given) memcpy(lens->focal, v, sizeof v); /* a frame's camera is another one than the top's */
     has_cx = olat__get(j, object, "cx", 1, &lens->centre[0]);
     has_cy = olat__get(j, object, "cy", 1, &lens->centre[1]);
     if (has_cx != has_cy) olat__json_fail(j, object, "cx and cy come in pairs");
     if (olat__get(j, object, "camera_intrinsics", 4, v)) {
-        if (!(v[2] > 0 && v[3] > 0)) olat__json_fail(j, object, "camera_intrinsics: focal lengths must be positive");
+        if (!(v[2] > 0 && v[3] > 0))
+            olat__json_fail(j, object, "camera_intrinsics: focal lengths must be positive");
         memcpy(lens->centre, v, 2 * sizeof *v);
         memcpy(lens->focal, v + 2, 2 * sizeof *v);
         has_cx = 1;
@@ -1262,9 +1393,10 @@ static void olat__read_pose(olat__json *j, const olat__node *node, const double 
     }
 }
 
-/* What the frames' positions had better be relative to: where cameras and point lights lie too far away for floats to
-   tell them apart, their mean, rounded so that floats hold it; else 0. Cameras in one place do not tell how large the
-   scene is: they must be further away than millimetres can explain. What is wrong with a frame is told when it is read. */
+/* What the frames' positions had better be relative to: where cameras and point lights lie too far away for
+   floats to tell them apart, their mean, rounded so that floats hold it; else 0. Cameras in one place do not
+   tell how large the scene is: they must be further away than millimetres can explain. What is wrong with a
+   frame is told when it is read. */
 static void olat__find_origin(olat__json *j, const olat__node *frames, double origin[3]) {
     double sum[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, radius = 0, length;
     int turn, i, k, light, places = 0;
@@ -1287,25 +1419,29 @@ static void olat__find_origin(olat__json *j, const olat__node *frames, double or
         for (k = 0; k < 3 && turn == 0; k++) mean[k] = sum[k] / (places ? places : 1);
     }
     length = sqrt(olat__dot(mean, mean));
-    for (k = 0; k < 3; k++) origin[k] = length > 64 * radius && length > 1000 && !j->failed ? (double)(float)mean[k] : 0;
+    for (k = 0; k < 3; k++)
+        origin[k] = length > 64 * radius && length > 1000 && !j->failed ? (double)(float)mean[k] : 0;
     j->failed = 0;
 }
 
 /* Fills the camera, whose size is known, from the lens and the frame's pose. */
-static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens, const double origin[3],
-                              ssdgs_camera *camera) {
+static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens,
+                              const double origin[3], ssdgs_camera *camera) {
     const double w = camera->width, h = camera->height;
     double view[12], focal[2];
     int i, in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
     if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
-                  : lens->w && lens->h && fabs(w * lens->h - h * lens->w) > (w > h ? w : h)) { /* an angle allows another size alone */
+                  : lens->w && lens->h &&
+                        fabs(w * lens->h - h * lens->w) >
+                            (w > h ? w : h)) { /* an angle allows another size alone */
         olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
     }
     for (i = 0; i < 2; i++) {
         const double angle = lens->focal[2 + i];
         focal[i] = lens->focal[i] > 0 ? lens->focal[i] : angle > 0 ? 0.5 * (i ? h : w) / tan(0.5 * angle) : 0;
     }
-    if (!(focal[0] + focal[1] > 0)) olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
+    if (!(focal[0] + focal[1] > 0))
+        olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
     camera->fx = (ssdgs_real)(focal[0] > 0 ? focal[0] : focal[1]); /* else pixels are square */
     camera->fy = (ssdgs_real)(focal[1] > 0 ? focal[1] : focal[0]);
     camera->cx = (ssdgs_real)(lens->has_centre ? lens->centre[0] : 0.5 * w);
@@ -1314,14 +1450,17 @@ static void olat__read_camera(olat__json *j, const olat__node *node, const olat_
     for (i = 0; i < 12; i++) camera->view[i] = (ssdgs_real)view[i];
 }
 
-static void olat__read_light(olat__json *j, const olat__node *node, const double origin[3], ssdgs_light *light) {
+static void olat__read_light(olat__json *j, const olat__node *node, const double origin[3],
+                             ssdgs_light *light) {
     const olat__node *intensity = olat__find(j, node, "pl_intensity");
     double v[3] = {0, 0, 0}, rgb[3] = {1, 1, 1}, length = 1;
     int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v), i;
-    if (is_point == is_far) olat__json_fail(j, node, is_far ? "both pl_pos and pl_dir" : "pl_pos or pl_dir is missing");
+    if (is_point == is_far)
+        olat__json_fail(j, node, is_far ? "both pl_pos and pl_dir" : "pl_pos or pl_dir is missing");
     if (is_far) length = sqrt(olat__dot(v, v));
     if (!(fabs(length - 1) < 1e-2)) olat__json_fail(j, node, "pl_dir is not a unit vector");
-    if (intensity && intensity->type == OLAT__ARRAY && intensity->size != 1) olat__numbers(j, intensity, 3, rgb);
+    if (intensity && intensity->type == OLAT__ARRAY && intensity->size != 1)
+        olat__numbers(j, intensity, 3, rgb);
     else if (intensity && olat__numbers(j, intensity, 1, rgb)) rgb[1] = rgb[2] = rgb[0];
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
     light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
@@ -1336,7 +1475,8 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
     static const char *const devices[] = {"con", "prn", "aux", "nul", "com", "lpt"};
     size_t i, start, end, stem, d;
     if (length == 0 || length > OLAT__MAX_PATH) return length ? "the path is too long" : "the path is empty";
-    if (path[0] == '/' || path[0] == '\\' || (length > 1 && path[1] == ':')) return "the path is not relative";
+    if (path[0] == '/' || path[0] == '\\' || (length > 1 && path[1] == ':'))
+        return "the path is not relative";
     for (i = 0; i < length; i++) {
         if ((unsigned char)path[i] < 32 || path[i] == 127) return "the path holds a control character";
     }
@@ -1349,7 +1489,8 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
             if (!allow_parent) return "the path leaves the folder by '..'";
             continue;
         }
-        if (path[end - 1] == '.' || path[end - 1] == ' ') return "a name in the path ends in a dot or a space";
+        if (path[end - 1] == '.' || path[end - 1] == ' ')
+            return "a name in the path ends in a dot or a space";
         for (stem = 0; stem < end - start && name[stem] != '.'; stem++) {}
         for (d = 0; d < 6; d++) { /* com and lpt take a digit */
             if (stem != (d < 4 ? 3 : 4) || !olat__same_letters(name, devices[d], 3)) continue;
@@ -1361,36 +1502,43 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
 
 /* Refuses a name that ends as those of another kind of image do; 1 if it does. */
 static int olat__other_image(olat__json *j, const olat__node *name) {
-    static const char *const kinds[][2] = {
-        {".jpg", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".webp", "WebP"}, {".exr", "OpenEXR"},
-        {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".tiff", "TIFF"}, {".bmp", "BMP"}, {".gif", "GIF"},
-        {".heic", "HEIC"}, {".avif", "AVIF"}, {".dng", "DNG"}, {".ppm", "PPM"}};
+    static const char *const kinds[][2] = {{".jpg", "JPEG"},  {".jpeg", "JPEG"},   {".jpe", "JPEG"},
+                                           {".webp", "WebP"}, {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"},
+                                           {".tif", "TIFF"},  {".tiff", "TIFF"},   {".bmp", "BMP"},
+                                           {".gif", "GIF"},   {".heic", "HEIC"},   {".avif", "AVIF"},
+                                           {".dng", "DNG"},   {".ppm", "PPM"}};
     const size_t size = name->text_length;
     size_t i;
     for (i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         const size_t length = strlen(kinds[i][0]);
         if (size < length || !olat__same_letters(name->text + size - length, kinds[i][0], length)) continue;
-        olat__json_fail(j, name, "%s: %s images cannot be read: convert them to PNG, for instance with: mogrify -format"
-            " png *%s, and name those here", name->text + (size > 60 ? size - 60 : 0), kinds[i][1], kinds[i][0]);
+        olat__json_fail(
+            j, name,
+            "%s: %s images cannot be read: convert them to PNG, for instance with: mogrify -format"
+            " png *%s, and name those here",
+            name->text + (size > 60 ? size - 60 : 0), kinds[i][1], kinds[i][0]);
         return 1;
     }
     return 0;
 }
 
-/* Checks a path out of the file and joins it to the folder, with ext, else ".png", where it is not whole and has no
-   ending; NULL after a failure. */
-static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext, int whole,
-                        int flags) {
+/* Checks a path out of the file and joins it to the folder, with ext, else ".png", where it is not whole and
+   has no ending; NULL after a failure. */
+static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext,
+                        int whole, int flags) {
     const char *problem, *suffix = ext ? ext->text : ".png";
     const size_t used = strlen(folder);
     size_t room, i;
     char *file;
     if (path->type != OLAT__STRING) olat__json_fail(j, path, "a string was expected");
-    else if ((problem = olat__path_problem(path->text, path->text_length, flags & OLAT_ALLOW_PARENT)) != NULL) {
+    else if ((problem = olat__path_problem(path->text, path->text_length, flags & OLAT_ALLOW_PARENT)) !=
+             NULL) {
         olat__json_fail(j, path, "%s", problem);
     }
     if (j->failed || (!ext && !(flags & OLAT_NO_IMAGES) && olat__other_image(j, path))) return NULL;
-    if (whole || (path->text_length >= 4 && olat__same_letters(path->text + path->text_length - 4, ".png", 4))) suffix = "";
+    if (whole ||
+        (path->text_length >= 4 && olat__same_letters(path->text + path->text_length - 4, ".png", 4)))
+        suffix = "";
     room = used + path->text_length + 8;
     if ((file = (char *)malloc(room)) == NULL) {
         olat__json_fail(j, path, "out of memory");
@@ -1404,12 +1552,15 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
 }
 
 /* The paths of the frame's image and mask; NULL where it names none. */
-static void olat__read_paths(olat__json *j, const olat__node *node, const char *folder, int flags, char **file,
-                             char **mask) {
-    const olat__node *whole = olat__find(j, node, "img_path"), *path = whole ? whole : olat__find(j, node, "file_path");
-    const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"), *of_mask = olat__find(j, node, "mask_path");
+static void olat__read_paths(olat__json *j, const olat__node *node, const char *folder, int flags,
+                             char **file, char **mask) {
+    const olat__node *whole = olat__find(j, node, "img_path"),
+                     *path = whole ? whole : olat__find(j, node, "file_path");
+    const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"),
+                     *of_mask = olat__find(j, node, "mask_path");
     if (!path && !(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
-    if (path && ext && (ext->type != OLAT__STRING || (!olat__other_image(j, ext) && !olat__is_word(ext, ".png")))) {
+    if (path && ext &&
+        (ext->type != OLAT__STRING || (!olat__other_image(j, ext) && !olat__is_word(ext, ".png")))) {
         olat__json_fail(j, ext, "\".png\" was expected: other images cannot be read");
     }
     if (path) *file = olat__join(j, folder, path, ext, whole != NULL, flags);
@@ -1424,12 +1575,15 @@ static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) 
 static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
     const size_t count = 4 * (size_t)frame->camera.width * (size_t)frame->camera.height;
     const unsigned top = frame->format == SSDGS_PIXELS_RGBA16 ? 65535 : 255;
-    uint16_t *out = (uint16_t *)malloc(count * sizeof *out), *curve = (uint16_t *)malloc((top + 1) * sizeof *curve);
+    uint16_t *out = (uint16_t *)malloc(count * sizeof *out),
+             *curve = (uint16_t *)malloc((top + 1) * sizeof *curve);
     const int failed = !out || !curve;
     size_t i;
     for (i = 0; !failed && i <= top; i++) {
         const double light = pow((double)i / top, 1e5 / gamma);
-        curve[i] = (uint16_t)(65535 * (light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055) + 0.5);
+        curve[i] =
+            (uint16_t)(65535 * (light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055) +
+                       0.5);
     }
     for (i = 0; !failed && i < count; i++) {
         const unsigned value = olat__sample(frame->pixels, frame->format, i);
@@ -1454,8 +1608,9 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
         return olat__fail(error, "mask_path: %s", problem);
     }
     if (width != frame->camera.width || height != frame->camera.height) {
-        failed = olat__fail(error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
-                            olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
+        failed = olat__fail(
+            error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
+            olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
     }
     for (i = 0; !failed && i < (size_t)width * (size_t)height; i++) {
         const uint64_t top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255, one = top * top;
@@ -1477,7 +1632,8 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
 static int olat__read_photo(olat_frame *frame, uint32_t *gamma, char *error) {
     ssdgs_camera *camera = &frame->camera;
     frame->has_image = 1;
-    return olat__png_file(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, gamma, error) ||
+    return olat__png_file(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels, gamma,
+                          error) ||
            (*gamma && olat__to_srgb(frame, *gamma, error)) || (frame->mask && olat__apply_mask(frame, error));
 }
 
@@ -1492,9 +1648,12 @@ OLAT__PRINTF(2, 3) static void olat__note(olat_dataset *set, const char *format,
 }
 
 /* A side of an image not read: twice its middle, 0 = not given. */
-static int olat__side(double middle) { return middle >= 0.5 && middle <= 16384 ? (int)(2 * middle + 0.5) : 256; }
+static int olat__side(double middle) {
+    return middle >= 0.5 && middle <= 16384 ? (int)(2 * middle + 0.5) : 256;
+}
 
-static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin, olat_dataset *out) {
+static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin,
+                              olat_dataset *out) {
     const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames"), *node;
     int i, masked = 0, curved = 0, oblong = 0;
     uint32_t gamma = 0, first_gamma = 0;
@@ -1503,7 +1662,8 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
     olat__read_lens(j, root, &top);
     if (root->type != OLAT__OBJECT || !frames) olat__json_fail(j, root, "frames is missing");
     else if (frames->type != OLAT__ARRAY) olat__json_fail(j, frames, "an array was expected");
-    else if (frames->size < 1 || frames->size > OLAT__MAX_FRAMES) olat__json_fail(j, frames, "there must be 1 to 2^20 frames");
+    else if (frames->size < 1 || frames->size > OLAT__MAX_FRAMES)
+        olat__json_fail(j, frames, "there must be 1 to 2^20 frames");
     if (j->failed) return;
     out->frames = (olat_frame *)calloc((size_t)frames->size, sizeof *out->frames);
     if (!out->frames) {
@@ -1513,7 +1673,8 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
     out->count = frames->size;
     if (origin) memcpy(out->origin, origin, sizeof out->origin);
     else olat__find_origin(j, frames, out->origin);
-    for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed; i++, node = &j->nodes[node->next]) {
+    for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed;
+         i++, node = &j->nodes[node->next]) {
         olat_frame *frame = &out->frames[i];
         ssdgs_camera *camera = &frame->camera;
         if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
@@ -1533,16 +1694,18 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
         oblong += !(lens.focal[0] + lens.focal[1] > 0) && fabs((double)(camera->fx / camera->fy) - 1) > 0.01;
     }
     if (olat__dot(out->origin, out->origin) > 0) {
-        olat__note(out, "coordinates are taken relative to %.9g, %.9g, %.9g", out->origin[0], out->origin[1], out->origin[2]);
+        olat__note(out, "coordinates are taken relative to %.9g, %.9g, %.9g", out->origin[0], out->origin[1],
+                   out->origin[2]);
     }
     if (masked) olat__note(out, "masks of %d of the %d photographs are used", masked, out->count);
     if (curved) {
-        olat__note(out, "%d of the %d photographs %s %s (gAMA %g): converted to the sRGB curve", curved, out->count,
-                   curved == 1 ? "is" : "are", first_gamma == 100000 ? "linear" : "not sRGB", first_gamma / 1e5);
+        olat__note(out, "%d of the %d photographs %s %s (gAMA %g): converted to the sRGB curve", curved,
+                   out->count, curved == 1 ? "is" : "are", first_gamma == 100000 ? "linear" : "not sRGB",
+                   first_gamma / 1e5);
     }
     if (oblong) {
-        olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y", oblong,
-                   out->count);
+        olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y",
+                   oblong, out->count);
     }
 }
 
@@ -1583,8 +1746,9 @@ static void olat__json_close(olat__json *j) {
     free(j->path);
 }
 
-/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a failure.
-   Positions become relative to origin, of 3 numbers; NULL chooses one: 0 unless they lie far away. */
+/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a
+   failure. Positions become relative to origin, of 3 numbers; NULL chooses one: 0 unless they lie far
+   away. */
 OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin,
                            olat_dataset *out, char error[512]) {
     olat__json j;
@@ -1596,15 +1760,17 @@ OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags
     return j.failed;
 }
 
-OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out, char error[512]) {
+OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out,
+                        char error[512]) {
     return olat_load_at(folder, split_json, flags, NULL, out, error);
 }
 
 /* ==== guarding files: by what they are, whatever they are called ==== */
 
 typedef struct olat__known {
-    char *path;        /* as it was given; NULL: nobody's slot */
-    const char *name;  /* behind it in memory: what lies below the folder of this id; "": the id is the file's own */
+    char *path; /* as it was given; NULL: nobody's slot */
+    const char
+        *name; /* behind it in memory: what lies below the folder of this id; "": the id is the file's own */
     uint64_t id[2];
     int is_output;
 } olat__known;
@@ -1636,8 +1802,8 @@ static int olat__identify(const char *path, uint64_t id[2]) {
 
 static int olat__separates(char c) { return c && strchr(OLAT__SEPARATORS, c) != NULL; }
 
-/* The place that a file has or would have: the nearest folder that exists, and what comes below it in small letters and
-   without names that mean nothing. `name` holds the path, and then the latter. */
+/* The place that a file has or would have: the nearest folder that exists, and what comes below it in small
+   letters and without names that mean nothing. `name` holds the path, and then the latter. */
 static void olat__place(char *name, uint64_t id[2]) {
     size_t cut = strlen(name), from;
     char *to = name;
@@ -1672,13 +1838,16 @@ static olat__known *olat__slot(const olat_guard *guard, const olat__known *file)
     for (c = file->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001B3);
     for (at = (size_t)(hash ^ hash >> 32) & last; guard->slots[at].path; at = (at + 1) & last) {
         const olat__known *other = &guard->slots[at];
-        if (other->id[0] == file->id[0] && other->id[1] == file->id[1] && !strcmp(other->name, file->name)) break;
+        if (other->id[0] == file->id[0] && other->id[1] == file->id[1] && !strcmp(other->name, file->name))
+            break;
     }
     return &guard->slots[at];
 }
 
-/* Notes the file by its own id, or by its place where that is NULL; fails where an output is known already. */
-static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *id, int is_output, char *error) {
+/* Notes the file by its own id, or by its place where that is NULL; fails where an output is known
+   already. */
+static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *id, int is_output,
+                           char *error) {
     const size_t size = strlen(path) + 1;
     olat__known file, *slot;
     olat_guard grown;
@@ -1695,7 +1864,8 @@ static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *
         free(guard->slots);
         *guard = grown;
     }
-    if ((file.path = (char *)malloc(2 * size)) == NULL) return olat__fail(error, "%s: out of memory", olat__tail(path));
+    if ((file.path = (char *)malloc(2 * size)) == NULL)
+        return olat__fail(error, "%s: out of memory", olat__tail(path));
     memcpy(file.path, path, size);
     file.name = name = file.path + size;
     file.is_output = is_output;
@@ -1710,31 +1880,36 @@ static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *
     }
     free(file.path);
     if (!is_output) return 0;
-    return olat__fail(error, slot->is_output ? "%s: would be written twice, also as %s: give the outputs different names"
-                                             : "%s: would replace an input, %s: choose another output folder",
+    return olat__fail(error,
+                      slot->is_output
+                          ? "%s: would be written twice, also as %s: give the outputs different names"
+                          : "%s: would replace an input, %s: choose another output folder",
                       olat__tail(path), olat__tail(slot->path));
 }
 
-/* A file that must stay as it is; there need not be one. Inputs come before outputs. Fails only for want of memory. */
+/* A file that must stay as it is; there need not be one. Inputs come before outputs. Fails only for want of
+   memory. */
 OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[512]) {
     uint64_t id[2];
     return olat__guard_add(guard, path, olat__identify(path, id) ? id : NULL, 0, error);
 }
 
-/* A file to be written: fails where it is an input, or was named as an output before, if only in other case. */
+/* A file to be written: fails where it is an input, or was named as an output before, if only in other
+   case. */
 OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
     olat__known file;
     const olat__known *input;
     file.name = "";
     if (guard->room && olat__identify(path, file.id) && (input = olat__slot(guard, &file))->path) {
-        return olat__fail(error, "%s: would replace an input, %s: choose another output folder", olat__tail(path),
-                          olat__tail(input->path));
+        return olat__fail(error, "%s: would replace an input, %s: choose another output folder",
+                          olat__tail(path), olat__tail(input->path));
     }
     return olat__guard_add(guard, path, NULL, 1, error);
 }
 
 /* A dataset as input: the JSON, and the images and masks that it names as far as it can be read. */
-OLAT__API int olat_guard_folder(olat_guard *guard, const char *folder, const char *split_json, char error[512]) {
+OLAT__API int olat_guard_folder(olat_guard *guard, const char *folder, const char *split_json,
+                                char error[512]) {
     const olat__node *frames, *node;
     char problem[512] = "";
     olat__json j;
@@ -1767,7 +1942,10 @@ OLAT__API void olat_guard_free(olat_guard *guard) {
 }
 
 /* A text file that grows in memory; text is NULL once out of it. */
-typedef struct olat__writer { char *text; size_t size, room; } olat__writer;
+typedef struct olat__writer {
+    char *text;
+    size_t size, room;
+} olat__writer;
 
 static void olat__writer_start(olat__writer *w) {
     w->size = 0;
@@ -1832,7 +2010,8 @@ static void olat__write_path(olat__writer *w, const char *key, const char *file,
     olat__write(w, ", ");
 }
 
-static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3], const char *folder) {
+static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3],
+                              const char *folder) {
     static const double last_row[4] = {0, 0, 0, 1};
     const ssdgs_camera *camera = &frame->camera;
     const int is_point = frame->light.kind == SSDGS_LIGHT_POINT;
@@ -1843,7 +2022,8 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
     v[0] = camera->width, v[1] = camera->height;
     olat__write_numbers(w, "\"w\": ", v, 1, 9, ", ");
     olat__write_numbers(w, "\"h\": ", v + 1, 1, 9, ",\n  ");
-    v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx, v[3] = (double)camera->fy;
+    v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx,
+    v[3] = (double)camera->fy;
     olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, 9, "],\n  \"transform_matrix\": [");
     for (k = 0; k < 3; k++) { /* camera to world, y up and z backward */
         for (m = 0, v[3] = origin[k]; m < 3; m++) {
@@ -1861,7 +2041,8 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
     olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]}");
 }
 
-/* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined poses, say. */
+/* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined
+   poses, say. */
 OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset *set, char error[512]) {
     olat__writer w;
     int i;
@@ -1885,7 +2066,8 @@ OLAT__API void olat_print_notes(const olat_dataset *set, const char *program) {
     }
 }
 
-/* The frames as ssdgs_photo structs that share the dataset's pixels: (count), to be freed; NULL if out of memory. */
+/* The frames as ssdgs_photo structs that share the dataset's pixels: (count), to be freed; NULL if out of
+   memory. */
 OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
     ssdgs_photo *photos = (ssdgs_photo *)calloc((size_t)set->count, sizeof *photos);
     int i;
@@ -1898,10 +2080,12 @@ OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
     return photos;
 }
 
-/* The frame's photograph on a background, (h,w,3) stored values; the background alone where the frame has no image. */
+/* The frame's photograph on a background, (h,w,3) stored values; the background alone where the frame has no
+   image. */
 OLAT__API void olat_compose(const olat_frame *frame, const ssdgs_real background[3], ssdgs_real *out) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    const ssdgs_real unit = frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
+    const ssdgs_real unit =
+        frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
     size_t i, k;
     for (i = 0; i < pixels; i++) {
         ssdgs_real v[4] = {0, 0, 0, 0};

@@ -1,4 +1,5 @@
-/* cc -O2 examples/relight.c -o relight -lm -lpthread: renders a model in the views and lights of a dataset, or on a path */
+/* cc -O2 examples/relight.c -o relight -lm -lpthread: renders a model in the views and lights of a dataset,
+   or on a path */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
@@ -14,27 +15,28 @@
 
 #define PI 3.14159265358979323846
 enum { SPLIT, OUT_FOLDER, BACKGROUND, SHEET, THREADS, ISA, NETWORKS, TRAJECTORY, COMPONENTS, OPTION_COUNT };
-static const char *const option_names[OPTION_COUNT] = {
-    "--split", "--out", "--background", "--sheet", "--threads", "--isa", "--networks", "--trajectory", "--components"
-};
+static const char *const option_names[OPTION_COUNT] = {"--split",    "--out",        "--background",
+                                                       "--sheet",    "--threads",    "--isa",
+                                                       "--networks", "--trajectory", "--components"};
 
-static int usage(const char *problem, const char *what)
-{
-    fprintf(stderr, "relight: %s %s\n"
-            "usage: relight MODEL.ply DATASET --out DIR [--split test|train|valid] [--trajectory] [--components]\n"
+static int usage(const char *problem, const char *what) {
+    fprintf(stderr,
+            "relight: %s %s\n"
+            "usage: relight MODEL.ply DATASET --out DIR [--split test|train|valid] [--trajectory] "
+            "[--components]\n"
             "               [--sheet FILE.png] [--background black|white] [--threads N] [--isa NAME]\n"
-            "               [--networks ORIGINAL.ply]: settings and networks of the model before an editor dropped them\n", problem, what);
+            "               [--networks ORIGINAL.ply]: settings and networks of the model before an editor "
+            "dropped them\n",
+            problem, what);
     return 2;
 }
 
-static int fail(const char *message)
-{
+static int fail(const char *message) {
     fprintf(stderr, "relight: %s\n", message);
     return 1;
 }
 
-static void hear(void *user, ssdgs_result code, const char *message)
-{
+static void hear(void *user, ssdgs_result code, const char *message) {
     (void)user;
     if (code == SSDGS_OK) fprintf(stderr, "relight: note: %s\n", message);
 }
@@ -43,8 +45,7 @@ static void hear(void *user, ssdgs_result code, const char *message)
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
 enum { SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
 static const char *const suffixes[OUTPUT_COUNT] = {
-    "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"
-};
+    "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"};
 
 /* Everything the program holds; main releases it. */
 typedef struct job {
@@ -55,16 +56,16 @@ typedef struct job {
     ssdgs_model *model;
     olat_dataset data;
     olat_guard guard;
-    ssdgs_metrics *metrics;          /* of each frame that has an image */
-    ssdgs_image planes;              /* of the view at hand; color is scratch once image is made */
-    ssdgs_real *memory, *image, *photo; /* what planes point into; (h,w,3) stored values of the rendering and the photograph */
-    int black;                       /* pictures so far */
-    unsigned char *bytes, *sheet;    /* (h,w,3) */
+    ssdgs_metrics *metrics; /* of each frame that has an image */
+    ssdgs_image planes;     /* of the view at hand; color is scratch once image is made */
+    ssdgs_real *memory, *image,
+        *photo; /* what planes point into; (h,w,3) stored values of the rendering and the photograph */
+    int black;  /* pictures so far */
+    unsigned char *bytes, *sheet;                    /* (h,w,3) */
     int sheet_rows, cell_width, cell_height, shrink; /* so many pixels each way become one of the sheet */
 } job;
 
-static int parse(job *j, int argc, char **argv)
-{
+static int parse(job *j, int argc, char **argv) {
     int i, option, isa = 0;
     const char *value;
     char *end = NULL;
@@ -84,7 +85,8 @@ static int parse(job *j, int argc, char **argv)
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
-    else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid")) return usage("no such split:", value);
+    else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid"))
+        return usage("no such split:", value);
     value = j->given[BACKGROUND];
     if (value && !strcmp(value, "white")) j->background[0] = j->background[1] = j->background[2] = 1;
     else if (value && strcmp(value, "black")) return usage("no such background:", value);
@@ -106,15 +108,15 @@ static int parse(job *j, int argc, char **argv)
 /* ---- files ---- */
 
 /* Makes the folder and those above it; what goes wrong shows when files are written. */
-static void make_folders(const char *path)
-{
+static void make_folders(const char *path) {
     char *part = (char *)malloc(strlen(path) + 1);
     size_t i;
     for (i = 0; part; i++) {
         if (i > 0 && (path[i] == '/' || path[i] == '\\' || !path[i])) {
             memcpy(part, path, i);
             part[i] = 0;
-            if (make_directory(part) && errno != EEXIST && !path[i]) fprintf(stderr, "relight: cannot make %s\n", part);
+            if (make_directory(part) && errno != EEXIST && !path[i])
+                fprintf(stderr, "relight: cannot make %s\n", part);
         }
         if (!path[i]) break;
     }
@@ -122,15 +124,14 @@ static void make_folders(const char *path)
 }
 
 /* A frame's file name without its folder. */
-static const char *base_name(const olat_frame *frame)
-{
+static const char *base_name(const olat_frame *frame) {
     const char *slash = strrchr(frame->file, '/');
     return slash ? slash + 1 : frame->file;
 }
 
-/* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; OUT/metrics.json without a frame. To be freed. */
-static char *output_path(const job *j, const olat_frame *frame, const char *suffix)
-{
+/* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; OUT/metrics.json without a
+   frame. To be freed. */
+static char *output_path(const job *j, const olat_frame *frame, const char *suffix) {
     const char *name = frame ? base_name(frame) : "metrics.json", *dot = frame ? strrchr(name, '.') : NULL;
     const size_t length = dot ? (size_t)(dot - name) : strlen(name);
     char *path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
@@ -139,8 +140,7 @@ static char *output_path(const job *j, const olat_frame *frame, const char *suff
     return path;
 }
 
-static int write_image(const job *j, const olat_frame *frame, const char *suffix)
-{
+static int write_image(const job *j, const olat_frame *frame, const char *suffix) {
     char *path = output_path(j, frame, suffix), error[512] = "";
     int ok = path && !olat_write_png(path, frame->camera.width, frame->camera.height, 3, j->bytes, error);
     if (path && !ok) fail(error);
@@ -149,16 +149,15 @@ static int write_image(const job *j, const olat_frame *frame, const char *suffix
 }
 
 /* Whether a path may be written. */
-static int check_output(job *j, const char *path)
-{
+static int check_output(job *j, const char *path) {
     char error[512] = "";
     return path && (!olat_guard_output(&j->guard, path, error) || !fail(error));
 }
 
 /* Nothing that will be written may be one of the files read, or of the dataset's, or be written twice. */
-static int check_outputs(job *j)
-{
-    static const char *const splits[3] = {"transforms_train.json", "transforms_test.json", "transforms_valid.json"};
+static int check_outputs(job *j) {
+    static const char *const splits[3] = {"transforms_train.json", "transforms_test.json",
+                                          "transforms_valid.json"};
     char error[512] = "";
     const char *const models[2] = {j->model_path, j->given[NETWORKS]};
     int i, output, ok = 1;
@@ -180,15 +179,13 @@ static int check_outputs(job *j)
     return ok && (!j->given[SHEET] || check_output(j, j->given[SHEET]));
 }
 
-static void write_numbers(olat__writer *w, const ssdgs_metrics *m)
-{
+static void write_numbers(olat__writer *w, const ssdgs_metrics *m) {
     char text[128]; /* no setlocale is called, so that numbers have a point */
     snprintf(text, sizeof text, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", m->psnr, m->ssim, m->flip);
     olat__write(w, text);
 }
 
-static int write_metrics(const job *j, const ssdgs_metrics *mean)
-{
+static int write_metrics(const job *j, const ssdgs_metrics *mean) {
     char *path = output_path(j, NULL, ""), error[512] = "";
     olat__writer w;
     const char *separator = "";
@@ -217,10 +214,11 @@ static int write_metrics(const job *j, const ssdgs_metrics *mean)
 /* ---- the path of the paper's Appendix D ---- */
 
 /* A circle round the z axis of `axes`: a mean distance and a mean height, as seen from the centre. */
-typedef struct orbit { double centre[3], radius, height, azimuth; } orbit;
+typedef struct orbit {
+    double centre[3], radius, height, azimuth;
+} orbit;
 
-static void orbit_add(orbit *o, double axes[3][3], const ssdgs_real point[3], double share, int is_first)
-{
+static void orbit_add(orbit *o, double axes[3][3], const ssdgs_real point[3], double share, int is_first) {
     double local[3];
     int i, k;
     for (i = 0; i < 3; i++)
@@ -230,9 +228,9 @@ static void orbit_add(orbit *o, double axes[3][3], const ssdgs_real point[3], do
     if (is_first) o->azimuth = atan2(local[1], local[0]);
 }
 
-static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real point[3])
-{
-    double angle = o->azimuth + turn * PI / 180, around = sqrt(fmax(0, o->radius * o->radius - o->height * o->height));
+static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real point[3]) {
+    double angle = o->azimuth + turn * PI / 180,
+           around = sqrt(fmax(0, o->radius * o->radius - o->height * o->height));
     double local[3] = {around * cos(angle), around * sin(angle), o->height};
     int i, k;
     for (k = 0; k < 3; k++) {
@@ -243,8 +241,7 @@ static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real 
 }
 
 /* World axes with up last: z, unless the cameras' mean upward direction lies clearly along another one. */
-static void find_axes(const olat_dataset *data, double axes[3][3])
-{
+static void find_axes(const olat_dataset *data, double axes[3][3]) {
     double up[3] = {0, 0, 0};
     int i, k, best = 2, sign;
     for (i = 0; i < data->count; i++)
@@ -256,10 +253,10 @@ static void find_axes(const olat_dataset *data, double axes[3][3])
         for (k = 0; k < 3; k++) axes[i][k] = k == (best + 1 + i) % 3 ? (i > 0 ? sign : 1) : 0;
 }
 
-/* Replaces the frames of data, from which it takes its measures, by those of the path: the light goes round in steps of 2.4
-   degrees, the camera goes to the back in steps of 2, the light goes round again, the camera returns. */
-static int make_trajectory(job *j)
-{
+/* Replaces the frames of data, from which it takes its measures, by those of the path: the light goes round
+   in steps of 2.4 degrees, the camera goes to the back in steps of 2, the light goes round again, the camera
+   returns. */
+static int make_trajectory(job *j) {
     olat_dataset *data = &j->data;
     olat_frame *frames;
     ssdgs_camera first;
@@ -277,7 +274,8 @@ static int make_trajectory(job *j)
     memset(&light_orbit, 0, sizeof light_orbit);
     for (k = 0; k < 3; k++) {
         double sum = 0;
-        for (i = 0; i < model.count; i++) sum += (double)model.gaussians[(size_t)(SSDGS_POSITION + k) * model.stride + (size_t)i];
+        for (i = 0; i < model.count; i++)
+            sum += (double)model.gaussians[(size_t)(SSDGS_POSITION + k) * model.stride + (size_t)i];
         centre[k] = (ssdgs_real)(model.count ? sum / model.count : 0);
         up[k] = (ssdgs_real)axes[2][k];
         camera_orbit.centre[k] = (double)centre[k];
@@ -295,11 +293,13 @@ static int make_trajectory(job *j)
     if (!frames) return !fail("out of memory");
     for (i = 0; i < count; i++) {
         int half = i / 240, step = i % 240 + 1;
-        double light_turn = step < 150 ? 2.4 * step : 0, camera_turn = (step > 150 ? 2.0 * (step - 150) : 0) + 180 * half;
+        double light_turn = step < 150 ? 2.4 * step : 0,
+               camera_turn = (step > 150 ? 2.0 * (step - 150) : 0) + 180 * half;
         ssdgs_camera *camera = &frames[i].camera;
         orbit_at(&camera_orbit, axes, camera_turn, eye);
-        *camera = ssdgs_camera_look_at(eye, centre, up, (ssdgs_real)(2 * atan(0.5 * first.width / (double)first.fx)), first.width,
-                                       first.height);
+        *camera = ssdgs_camera_look_at(eye, centre, up,
+                                       (ssdgs_real)(2 * atan(0.5 * first.width / (double)first.fx)),
+                                       first.width, first.height);
         camera->fy = first.fy;
         frames[i].light = light;
         orbit_at(&light_orbit, axes, light_turn, frames[i].light.position);
@@ -313,8 +313,7 @@ static int make_trajectory(job *j)
 
 /* ---- one view ---- */
 
-static int make_planes(job *j)
-{
+static int make_planes(job *j) {
     ssdgs_real *next;
     size_t most = 0, pixels;
     int i, width = 0, height = 0;
@@ -333,7 +332,8 @@ static int make_planes(job *j)
         j->shrink = (width + SHEET_CELL - 1) / SHEET_CELL;
         j->cell_width = width / j->shrink;
         j->cell_height = (height + j->shrink - 1) / j->shrink; /* never 0 */
-        j->sheet = (unsigned char *)calloc((size_t)j->cell_width * SHEET_COLUMNS, (size_t)(j->cell_height * j->sheet_rows) * 3);
+        j->sheet = (unsigned char *)calloc((size_t)j->cell_width * SHEET_COLUMNS,
+                                           (size_t)(j->cell_height * j->sheet_rows) * 3);
     }
     if (!j->metrics || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet)) return !fail("out of memory");
     j->image = next;
@@ -350,26 +350,29 @@ static int make_planes(job *j)
 }
 
 /* Says why a picture is black. */
-static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats *stats)
-{
+static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats *stats) {
     const ssdgs_real *light = frame->light.intensity;
     const int baked = ssdgs_model_settings(j->model)->baked;
     const char *why = !stats->gaussians ? "the model holds no Gaussians"
-        : stats->rejected == stats->gaussians ? "no Gaussian of the model can be drawn: their values are not finite"
-        : !stats->visible ? "no Gaussian is in the picture: is this the model's dataset?"
-        : !stats->shaded ? "the Gaussians in the picture are too faint or too small to show"
-        : stats->blackened == stats->shaded ? "the Gaussians' colours are not finite"
-        : !baked && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0) ? "the light's intensity is 0"
-        : "no light reaches what the camera sees: is the light where it should be, and its intensity in the model's unit?";
+                      : stats->rejected == stats->gaussians
+                          ? "no Gaussian of the model can be drawn: their values are not finite"
+                      : !stats->visible ? "no Gaussian is in the picture: is this the model's dataset?"
+                      : !stats->shaded  ? "the Gaussians in the picture are too faint or too small to show"
+                      : stats->blackened == stats->shaded ? "the Gaussians' colours are not finite"
+                      : !baked && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0)
+                          ? "the light's intensity is 0"
+                          : "no light reaches what the camera sees: is the light where it should be, and its "
+                            "intensity in the model's unit?";
     if (!j->black++) fprintf(stderr, "relight: note: %s is black: %s\n", base_name(frame), why);
 }
 
-/* The image, and its metrics when there is a photograph, into job; with the components when they are asked for. */
-static ssdgs_result render(job *j, int index, int components)
-{
+/* The image, and its metrics when there is a photograph, into job; with the components when they are asked
+   for. */
+static ssdgs_result render(job *j, int index, int components) {
     const olat_frame *frame = &j->data.frames[index];
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    const ssdgs_render_options options = frame->has_image ? ssdgs_render_options_exact() : ssdgs_render_options_default();
+    const ssdgs_render_options options =
+        frame->has_image ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     ssdgs_image planes = j->planes;
     ssdgs_render_stats stats;
     ssdgs_result result;
@@ -383,15 +386,17 @@ static ssdgs_result render(job *j, int index, int components)
     if (result) return result;
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
     if (i == 3 * pixels) tell_black(j, frame, &stats);
-    ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background, j->image);
+    ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background,
+                  j->image);
     if (!frame->has_image) return SSDGS_OK;
     olat_compose(frame, j->background, j->photo);
-    return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height, &j->metrics[index]);
+    return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height,
+                         &j->metrics[index]);
 }
 
-/* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as they are. */
-static void show(job *j, const olat_frame *frame, int output)
-{
+/* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as
+   they are. */
+static void show(job *j, const olat_frame *frame, int output) {
     size_t i, pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const ssdgs_image *p = &j->planes;
     ssdgs_real *out = p->color, nearest = (ssdgs_real)1e30, farthest = 0;
@@ -423,31 +428,31 @@ static void show(job *j, const olat_frame *frame, int output)
 }
 
 /* Puts the bytes, shrunk, into a cell of the sheet, which holds the largest frame. */
-static void paste(job *j, const olat_frame *frame, int row, int column)
-{
+static void paste(job *j, const olat_frame *frame, int row, int column) {
     const int n = j->shrink;
     int x, y, c, k, sum;
     for (y = 0; y < j->cell_height && (y + 1) * n <= frame->camera.height; y++)
         for (x = 0; x < j->cell_width && (x + 1) * n <= frame->camera.width; x++)
             for (c = 0; c < 3; c++) {
                 for (sum = 0, k = 0; k < n * n; k++)
-                    sum += j->bytes[3 * ((size_t)(y * n + k / n) * (size_t)frame->camera.width + (size_t)(x * n + k % n)) + (size_t)c];
-                j->sheet[3 * ((row * j->cell_height + y) * SHEET_COLUMNS * j->cell_width + column * j->cell_width + x) + c] =
-                    (unsigned char)((sum + n * n / 2) / (n * n));
+                    sum += j->bytes[3 * ((size_t)(y * n + k / n) * (size_t)frame->camera.width +
+                                         (size_t)(x * n + k % n)) +
+                                    (size_t)c];
+                j->sheet[3 * ((row * j->cell_height + y) * SHEET_COLUMNS * j->cell_width +
+                              column * j->cell_width + x) +
+                         c] = (unsigned char)((sum + n * n / 2) / (n * n));
             }
 }
 
 /* Regardless of case, as some file systems are. */
-static int compare_names(const void *a, const void *b)
-{
+static int compare_names(const void *a, const void *b) {
     const char *x = *(const char *const *)a, *y = *(const char *const *)b;
     while (*x && tolower((unsigned char)*x) == tolower((unsigned char)*y)) x++, y++;
     return tolower((unsigned char)*x) - tolower((unsigned char)*y);
 }
 
 /* Whether one frame's name is another's with the suffix of an output. */
-static int names_overlap(const char *const *names, int count)
-{
+static int names_overlap(const char *const *names, int count) {
     int i, output, overlap = 0;
     for (i = 0; i < count; i++)
         for (output = DIFFUSE; output < OUTPUT_COUNT; output++) {
@@ -455,16 +460,16 @@ static int names_overlap(const char *const *names, int count)
             char other[256];
             const char *key = other;
             if (!end || end[strlen(suffixes[output])] != '.') continue;
-            snprintf(other, sizeof other, "%.*s%.16s", (int)(end - names[i] < 200 ? end - names[i] : 200), names[i],
-                     end + strlen(suffixes[output]));
+            snprintf(other, sizeof other, "%.*s%.16s", (int)(end - names[i] < 200 ? end - names[i] : 200),
+                     names[i], end + strlen(suffixes[output]));
             overlap |= bsearch(&key, names, (size_t)count, sizeof *names, compare_names) != NULL;
         }
     return overlap;
 }
 
-/* Frames of a path may have no file, those of several folders the same names, or one that is an output of another: they are numbered. */
-static int name_frames(olat_dataset *data)
-{
+/* Frames of a path may have no file, those of several folders the same names, or one that is an output of
+   another: they are numbered. */
+static int name_frames(olat_dataset *data) {
     const char **names = (const char **)malloc((size_t)data->count * sizeof *names + 1);
     int i, named = 0, repeated = 0;
     if (!names) return !fail("out of memory");
@@ -485,8 +490,7 @@ static int name_frames(olat_dataset *data)
     return 1;
 }
 
-static int load_frames(job *j)
-{
+static int load_frames(job *j) {
     const ssdgs_real *from = ssdgs_model_settings(j->model)->origin;
     const double origin[3] = {(double)from[0], (double)from[1], (double)from[2]};
     char error[512] = "", name[64], *path = (char *)malloc(strlen(j->dataset) + 64);
@@ -502,22 +506,24 @@ static int load_frames(job *j)
     }
     free(path);
     snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
-    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &j->data, error)) return !fail(error);
+    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &j->data, error))
+        return !fail(error);
     olat_print_notes(&j->data, "relight");
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
 }
 
-static int relight(job *j)
-{
+static int relight(job *j) {
     ssdgs_metrics mean = {0, 0, 0};
     ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
     int i, output, row = 0, scored = 0;
     char error[512] = "";
     if (result) return fail(ssdgs_result_string(result));
-    if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL)) return fail(ssdgs_error_message(j->context));
+    if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL))
+        return fail(ssdgs_error_message(j->context));
     if (j->given[NETWORKS]) {
         ssdgs_model *original;
-        if (ssdgs_model_load(j->context, j->given[NETWORKS], &original, NULL)) return fail(ssdgs_error_message(j->context));
+        if (ssdgs_model_load(j->context, j->given[NETWORKS], &original, NULL))
+            return fail(ssdgs_error_message(j->context));
         result = ssdgs_model_adopt(j->model, original);
         ssdgs_model_destroy(original);
         if (result) return fail(ssdgs_error_message(j->context));
@@ -532,7 +538,8 @@ static int relight(job *j)
         int on_sheet = row < j->sheet_rows && i == (2 * row + 1) * j->data.count / (2 * j->sheet_rows);
         if (render(j, i, components || on_sheet)) return fail(ssdgs_error_message(j->context));
         for (output = PHOTO; output < OUTPUT_COUNT; output++) {
-            int written = output == IMAGE || (components && output != PHOTO), pasted = on_sheet && output < SHEET_COLUMNS;
+            int written = output == IMAGE || (components && output != PHOTO),
+                pasted = on_sheet && output < SHEET_COLUMNS;
             if (!written && !pasted) continue;
             show(j, frame, output);
             if (written && !write_image(j, frame, suffixes[output])) return 1;
@@ -545,23 +552,24 @@ static int relight(job *j)
         mean.ssim += j->metrics[i].ssim;
         mean.flip += j->metrics[i].flip;
     }
-    if (j->sheet && olat_write_png(j->given[SHEET], SHEET_COLUMNS * j->cell_width, j->sheet_rows * j->cell_height, 3, j->sheet,
-                                   error))
+    if (j->sheet && olat_write_png(j->given[SHEET], SHEET_COLUMNS * j->cell_width,
+                                   j->sheet_rows * j->cell_height, 3, j->sheet, error))
         return fail(error);
     if (scored) {
         mean.psnr /= scored;
         mean.ssim /= scored;
         mean.flip /= scored;
         if (!write_metrics(j, &mean)) return 1;
-        printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT], mean.psnr, mean.ssim, mean.flip, scored);
+        printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT], mean.psnr, mean.ssim,
+               mean.flip, scored);
     }
-    if (j->black > 1) fprintf(stderr, "relight: note: %d pictures of %d are black\n", j->black, j->data.count);
+    if (j->black > 1)
+        fprintf(stderr, "relight: note: %d pictures of %d are black\n", j->black, j->data.count);
     printf("%d images in %s\n", j->data.count, j->out);
     return 0;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     job j;
     int status;
     memset(&j, 0, sizeof j);

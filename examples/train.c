@@ -1,4 +1,5 @@
-/* cc -O2 examples/train.c -o train -lm -lpthread: trains a relightable model from a folder of OLAT photographs */
+/* cc -O2 examples/train.c -o train -lm -lpthread: trains a relightable model from a folder of OLAT
+   photographs */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
@@ -16,54 +17,120 @@
 #endif
 
 enum {
-    OUTPUT, ITERATIONS, BACKGROUND, PRESET, TRANSFER, SCHEDULE, TERMS, SEED, THREADS, MAX_GAUSSIANS, START_POINTS, CHECKPOINT_EVERY,
-    ISA, TRAIN_JSON, SET, RESUME, REFINE, OPTION_COUNT /* the flags, RESUME and on, take no value */
+    OUTPUT,
+    ITERATIONS,
+    BACKGROUND,
+    PRESET,
+    TRANSFER,
+    SCHEDULE,
+    TERMS,
+    SEED,
+    THREADS,
+    MAX_GAUSSIANS,
+    START_POINTS,
+    CHECKPOINT_EVERY,
+    ISA,
+    TRAIN_JSON,
+    SET,
+    RESUME,
+    REFINE,
+    OPTION_COUNT /* the flags, RESUME and on, take no value */
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "-o", "--iterations", "--background", "--preset", "--transfer", "--schedule", "--terms", "--seed", "--threads",
-    "--max-gaussians", "--points", "--checkpoint-every", "--isa", "--train-json", "--set",
-    "--resume", "--refine"
-};
+    "-o",      "--iterations", "--background", "--preset",        "--transfer", "--schedule",
+    "--terms", "--seed",       "--threads",    "--max-gaussians", "--points",   "--checkpoint-every",
+    "--isa",   "--train-json", "--set",        "--resume",        "--refine"};
 
-static int usage(const char *problem, const char *what)
-{
-    fprintf(stderr, "train: %s %s\n"
-            "usage: train DATASET -o MODEL.ply [--iterations N] [--background black|white] [--preset default|published]\n"
-            "             [--transfer srgb|none] [--schedule progressive|joint|swapped|merged] [--resume] [--refine]\n"
-            "             [--terms diffuse,specular,shadow,scattering] [--max-gaussians N] [--points N] [--seed N]\n"
+static int usage(const char *problem, const char *what) {
+    fprintf(stderr,
+            "train: %s %s\n"
+            "usage: train DATASET -o MODEL.ply [--iterations N] [--background black|white] [--preset "
+            "default|published]\n"
+            "             [--transfer srgb|none] [--schedule progressive|joint|swapped|merged] [--resume] "
+            "[--refine]\n"
+            "             [--terms diffuse,specular,shadow,scattering] [--max-gaussians N] [--points N] "
+            "[--seed N]\n"
             "             [--checkpoint-every N] [--train-json FILE] [--threads N] [--isa NAME]\n"
-            "             [--set NAME=VALUE[,VALUE...]]: numbers and rates of ssdgs_settings and ssdgs_train_options\n",
+            "             [--set NAME=VALUE[,VALUE...]]: numbers and rates of ssdgs_settings and "
+            "ssdgs_train_options\n",
             problem, what);
     return 2;
 }
 
 /* The bounds in the dataset's coordinates, which may be too large for floats. */
-typedef struct corners { double bounds_min[3], bounds_max[3]; } corners;
+typedef struct corners {
+    double bounds_min[3], bounds_max[3];
+} corners;
 
 /* What --set can set, by the names of ssdgs.h: so many ints, reals or, of corners, doubles. */
 typedef enum place { IN_SETTINGS, IN_OPTIONS, IN_CORNERS } place;
-typedef struct field { const char *name; place in; int reals, count; size_t at; } field;
-#define SETTING(reals, count, name) {#name, IN_SETTINGS, reals, count, offsetof(ssdgs_settings, name)}
-#define OPTION(reals, count, name) {#name, IN_OPTIONS, reals, count, offsetof(ssdgs_train_options, name)}
-#define CORNER(name) {#name, IN_CORNERS, 1, 3, offsetof(corners, name)}
-static const field fields[] = {
-    SETTING(0, 1, dipole), SETTING(0, 1, asg), SETTING(0, 1, per_channel_optics), SETTING(0, 1, depth_cue), SETTING(0, 1, transport),
-    SETTING(0, 1, residual_shadow), SETTING(0, 1, shadow_on_scattering), SETTING(0, 1, scattering_layers),
-    SETTING(0, 1, scattering_width), SETTING(0, 1, view_octaves), SETTING(0, 1, light_octaves), SETTING(0, 1, shadow_layers), SETTING(0, 1, shadow_width), SETTING(0, 1, light_blur),
-    SETTING(0, 1, light_map_size), SETTING(1, 1, light_bias), SETTING(1, 1, pixel_variance), SETTING(1, 1, eta),
-    OPTION(0, 1, random_background), OPTION(0, 1, densify_every), OPTION(0, 1, densify_from), OPTION(0, 1, densify_until),
-    OPTION(0, 1, opacity_reset_every), OPTION(0, 1, refine_camera), OPTION(0, 1, refine_light), OPTION(1, 1, dssim), OPTION(1, 1, normal_weight),
-    CORNER(bounds_min), CORNER(bounds_max), OPTION(1, 1, densify_gradient), OPTION(1, 1, densify_size), OPTION(1, 1, densify_shadow),
-    OPTION(1, 1, prune_opacity), OPTION(1, 1, prune_weight), OPTION(1, 1, prune_outside), OPTION(1, 1, opacity_fade), OPTION(1, 1, adam_epsilon),
-    OPTION(1, 2, position), OPTION(1, 2, opacity), OPTION(1, 2, scale), OPTION(1, 2, rotation),
-    OPTION(1, 2, color), OPTION(1, 2, asg), OPTION(1, 2, frame), OPTION(1, 2, material), OPTION(1, 2, shadow),
-    OPTION(1, 2, scattering), OPTION(1, 2, camera_rate), OPTION(1, 2, light_rate)
-};
+typedef struct field {
+    const char *name;
+    place in;
+    int reals, count;
+    size_t at;
+} field;
+#define SETTING(reals, count, name) \
+    { #name, IN_SETTINGS, reals, count, offsetof(ssdgs_settings, name) }
+#define OPTION(reals, count, name) \
+    { #name, IN_OPTIONS, reals, count, offsetof(ssdgs_train_options, name) }
+#define CORNER(name) \
+    { #name, IN_CORNERS, 1, 3, offsetof(corners, name) }
+static const field fields[] = {SETTING(0, 1, dipole),
+                               SETTING(0, 1, asg),
+                               SETTING(0, 1, per_channel_optics),
+                               SETTING(0, 1, depth_cue),
+                               SETTING(0, 1, transport),
+                               SETTING(0, 1, residual_shadow),
+                               SETTING(0, 1, shadow_on_scattering),
+                               SETTING(0, 1, scattering_layers),
+                               SETTING(0, 1, scattering_width),
+                               SETTING(0, 1, view_octaves),
+                               SETTING(0, 1, light_octaves),
+                               SETTING(0, 1, shadow_layers),
+                               SETTING(0, 1, shadow_width),
+                               SETTING(0, 1, light_blur),
+                               SETTING(0, 1, light_map_size),
+                               SETTING(1, 1, light_bias),
+                               SETTING(1, 1, pixel_variance),
+                               SETTING(1, 1, eta),
+                               OPTION(0, 1, random_background),
+                               OPTION(0, 1, densify_every),
+                               OPTION(0, 1, densify_from),
+                               OPTION(0, 1, densify_until),
+                               OPTION(0, 1, opacity_reset_every),
+                               OPTION(0, 1, refine_camera),
+                               OPTION(0, 1, refine_light),
+                               OPTION(1, 1, dssim),
+                               OPTION(1, 1, normal_weight),
+                               CORNER(bounds_min),
+                               CORNER(bounds_max),
+                               OPTION(1, 1, densify_gradient),
+                               OPTION(1, 1, densify_size),
+                               OPTION(1, 1, densify_shadow),
+                               OPTION(1, 1, prune_opacity),
+                               OPTION(1, 1, prune_weight),
+                               OPTION(1, 1, prune_outside),
+                               OPTION(1, 1, opacity_fade),
+                               OPTION(1, 1, adam_epsilon),
+                               OPTION(1, 2, position),
+                               OPTION(1, 2, opacity),
+                               OPTION(1, 2, scale),
+                               OPTION(1, 2, rotation),
+                               OPTION(1, 2, color),
+                               OPTION(1, 2, asg),
+                               OPTION(1, 2, frame),
+                               OPTION(1, 2, material),
+                               OPTION(1, 2, shadow),
+                               OPTION(1, 2, scattering),
+                               OPTION(1, 2, camera_rate),
+                               OPTION(1, 2, light_rate)};
 
 /* NAME=VALUE[,VALUE...], the name and the number of values telling the field; what is wrong, or NULL. */
-static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, corners *bounds, const char *text)
-{
-    unsigned char *const places[3] = {(unsigned char *)settings, (unsigned char *)options, (unsigned char *)bounds};
+static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, corners *bounds,
+                             const char *text) {
+    unsigned char *const places[3] = {(unsigned char *)settings, (unsigned char *)options,
+                                      (unsigned char *)bounds};
     size_t length = strcspn(text, "="), i;
     const char *p = text + length, *problem = "--set knows no such number:";
     int count = 0, n;
@@ -92,8 +159,7 @@ static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *opti
 }
 
 /* The place of word[0 .. length) in a list like "black|white", or -1. */
-static int choice(const char *list, const char *word, size_t length)
-{
+static int choice(const char *list, const char *word, size_t length) {
     int index = 0;
     for (;; index++) {
         size_t n = strcspn(list, "|");
@@ -104,16 +170,14 @@ static int choice(const char *list, const char *word, size_t length)
 }
 
 /* An option's choice into value, when it was given. */
-static int choose(const char *const *given, int option, const char *list, int *value)
-{
+static int choose(const char *const *given, int option, const char *list, int *value) {
     int index = given[option] ? choice(list, given[option], strlen(given[option])) : *value;
     if (index < 0) return 0;
     *value = index;
     return 1;
 }
 
-static int number(const char *const *given, int option, int least, int *value)
-{
+static int number(const char *const *given, int option, int least, int *value) {
     char *end;
     long parsed;
     if (!given[option]) return 1;
@@ -127,8 +191,7 @@ static int number(const char *const *given, int option, int least, int *value)
     return 1;
 }
 
-static double seconds_now(void)
-{
+static double seconds_now(void) {
 #ifdef _WIN32
     return (double)clock() / CLOCKS_PER_SEC; /* wall time there */
 #else
@@ -138,8 +201,7 @@ static double seconds_now(void)
 #endif
 }
 
-static const char *clock_text(double seconds, char text[32])
-{
+static const char *clock_text(double seconds, char text[32]) {
     int s = seconds < 3e6 ? (int)(seconds + 0.5) : 3000000;
     if (s >= 3600) snprintf(text, 32, "%d:%02d:%02d", s / 3600, s / 60 % 60, s % 60);
     else snprintf(text, 32, "%d:%02d", s / 60, s % 60);
@@ -148,22 +210,21 @@ static const char *clock_text(double seconds, char text[32])
 
 static volatile sig_atomic_t interrupted;
 
-static void on_interrupt(int signal_number)
-{
+static void on_interrupt(int signal_number) {
     interrupted = 1;
     signal(signal_number, SIG_DFL); /* a second Ctrl-C ends the program at once */
 }
 
 typedef struct run {
     int iterations, checkpoint_every, terminal;
-    int kept;                     /* iterations in the checkpoint that another run left: it is replaced once this run has done as many */
-    int done;                     /* iterations of this run */
+    int kept; /* iterations in the checkpoint that another run left: it is replaced once this run has done as
+                 many */
+    int done; /* iterations of this run */
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
 } run;
 
-static int progress(void *user, const ssdgs_train_stats *stats)
-{
+static int progress(void *user, const ssdgs_train_stats *stats) {
     run *r = (run *)user;
     int done = stats->iteration, total = r->iterations;
     int percent = (int)(100.0 * done / total), finished = done >= total;
@@ -184,10 +245,12 @@ static int progress(void *user, const ssdgs_train_stats *stats)
     }
     if (r->speed > 0 && (finished || (r->terminal ? now > r->drawn + 0.2 : percent / 5 > r->percent))) {
         double weight = 1 - exp(-(now - r->drawn) / 5); /* the last seconds count */
-        if (done > r->drawn_at && now > r->drawn) r->speed += weight * ((done - r->drawn_at) / (now - r->drawn) - r->speed);
-        if (r->terminal) fprintf(stderr, "\r|%.*s%.*s| ", percent / 10, "##########", 10 - percent / 10, "----------");
-        fprintf(stderr, "%d/%d loss %.4f PSNR %.1f %d Gaussians %.1f/s %s left%s", done, total, stats->loss, r->psnr,
-                stats->gaussians, r->speed, clock_text((total - done) / r->speed, left),
+        if (done > r->drawn_at && now > r->drawn)
+            r->speed += weight * ((done - r->drawn_at) / (now - r->drawn) - r->speed);
+        if (r->terminal)
+            fprintf(stderr, "\r|%.*s%.*s| ", percent / 10, "##########", 10 - percent / 10, "----------");
+        fprintf(stderr, "%d/%d loss %.4f PSNR %.1f %d Gaussians %.1f/s %s left%s", done, total, stats->loss,
+                r->psnr, stats->gaussians, r->speed, clock_text((total - done) / r->speed, left),
                 r->terminal && !finished ? "   " : "\n");
         r->drawn = now;
         r->drawn_at = done;
@@ -214,14 +277,12 @@ typedef struct job {
 } job;
 
 /* The library's notes; failures are told where they end the program. */
-static void hear(void *user, ssdgs_result code, const char *message)
-{
+static void hear(void *user, ssdgs_result code, const char *message) {
     (void)user;
     if (code == SSDGS_OK) fprintf(stderr, "train: note: %s\n", message);
 }
 
-static int parse(job *j, int argc, char **argv)
-{
+static int parse(job *j, int argc, char **argv) {
     const char **given = j->given, *terms;
     const char *problem;
     int i, option, sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
@@ -242,25 +303,29 @@ static int parse(job *j, int argc, char **argv)
     if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
     j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
     j->options = preset ? ssdgs_train_options_published() : ssdgs_train_options_default();
-    if (!choose(given, BACKGROUND, "black|white", &white)) return usage("no such background:", given[BACKGROUND]);
-    if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer)) return usage("no such transfer:", given[TRANSFER]);
+    if (!choose(given, BACKGROUND, "black|white", &white))
+        return usage("no such background:", given[BACKGROUND]);
+    if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer))
+        return usage("no such transfer:", given[TRANSFER]);
     if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))
         return usage("no such schedule:", given[SCHEDULE]);
     terms = given[TERMS];
     if (terms) j->settings.terms = 0;
     while (terms) {
         size_t length = strcspn(terms, ",");
-        int term = choice("diffuse|specular|shadow|scattering", terms, length); /* in the order of the SSDGS_*_TERM bits */
+        int term = choice("diffuse|specular|shadow|scattering", terms,
+                          length); /* in the order of the SSDGS_*_TERM bits */
         if (term < 0) return usage("no such term in --terms", given[TERMS]);
         j->settings.terms |= 1 << term;
         terms = terms[length] ? terms + length + 1 : NULL;
     }
     while (given[ISA] && isa < SSDGS_ISA_COUNT && strcmp(given[ISA], ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", given[ISA]);
-    if (!number(given, ITERATIONS, 1, &j->options.iterations) || !number(given, START_POINTS, 1, &j->options.initial_points) ||
+    if (!number(given, ITERATIONS, 1, &j->options.iterations) ||
+        !number(given, START_POINTS, 1, &j->options.initial_points) ||
         !number(given, MAX_GAUSSIANS, 1, &j->options.max_gaussians) ||
-        !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) || !number(given, SEED, 0, &seed) ||
-        !number(given, THREADS, 0, &j->desc.threads))
+        !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) ||
+        !number(given, SEED, 0, &seed) || !number(given, THREADS, 0, &j->desc.threads))
         return 2;
     if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
@@ -271,26 +336,28 @@ static int parse(job *j, int argc, char **argv)
         j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
     }
     for (i = 0; i < sets; i++)
-        if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL) return usage(problem, argv[i]);
+        if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL)
+            return usage(problem, argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
     j->desc.logger.write = hear;
     return 0;
 }
 
-static int fail(const char *message)
-{
+static int fail(const char *message) {
     fprintf(stderr, "train: %s\n", message);
     return 1;
 }
 
-/* Prints the means over every step-th of the photographs, each one's pose and light first fitted by so many steps. */
-static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps, const char *label)
-{
+/* Prints the means over every step-th of the photographs, each one's pose and light first fitted by so many
+   steps. */
+static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps,
+                             const char *label) {
     ssdgs_metrics m, mean = {0, 0, 0};
     int i, count = (all + step - 1) / step;
     for (i = 0; i < count; i++) {
         ssdgs_photo photo = photos[i * step];
-        ssdgs_result result = fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
+        ssdgs_result result =
+            fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
         if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, NULL, &m);
         if (result) return result;
         mean.psnr += m.psnr / count;
@@ -301,8 +368,7 @@ static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int ste
     return SSDGS_OK;
 }
 
-static void print_peak_memory(void)
-{
+static void print_peak_memory(void) {
 #ifndef _WIN32
     struct rusage used;
 #ifdef __APPLE__
@@ -310,13 +376,14 @@ static void print_peak_memory(void)
 #else
     double unit = 1024;
 #endif
-    if (!getrusage(RUSAGE_SELF, &used)) printf(", peak memory %.0f MiB", (double)used.ru_maxrss * unit / 1048576);
+    if (!getrusage(RUSAGE_SELF, &used))
+        printf(", peak memory %.0f MiB", (double)used.ru_maxrss * unit / 1048576);
 #endif
 }
 
-/* No output may be one of the dataset's files, and all must be writable: better known now than after hours of training. */
-static int check_outputs(job *j, const char *train_json, char error[512])
-{
+/* No output may be one of the dataset's files, and all must be writable: better known now than after hours of
+   training. */
+static int check_outputs(job *j, const char *train_json, char error[512]) {
     const char *const outputs[3] = {j->given[OUTPUT], j->checkpoint, j->refined};
     int i;
     if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
@@ -325,29 +392,36 @@ static int check_outputs(job *j, const char *train_json, char error[512])
         olat_guard_folder(&j->guard, j->dataset, "transforms_valid.json", error))
         return 1;
     for (i = 0; i < 3; i++)
-        if (outputs[i] && (olat_guard_output(&j->guard, outputs[i], error) || olat_check_writable(outputs[i], error))) return 1;
+        if (outputs[i] &&
+            (olat_guard_output(&j->guard, outputs[i], error) || olat_check_writable(outputs[i], error)))
+            return 1;
     return 0;
 }
 
 /* A run that is further than this one must not be lost for it. */
-static int check_checkpoint(job *j, char error[512])
-{
+static int check_checkpoint(job *j, char error[512]) {
     FILE *file = fopen(j->checkpoint, "rb");
     int done;
     if (!file) return 0;
     fclose(file);
     if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done))
-        return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o", ssdgs_error_message(j->context)), 1;
+        return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o",
+                       ssdgs_error_message(j->context)),
+               1;
     if (done > j->options.iterations)
-        return sprintf(error, "%.300s holds a run of %d iterations, and this one of %d would replace it: go on with --resume, give "
-                       "another name with -o, or remove it", j->checkpoint, done, j->options.iterations), 1;
+        return sprintf(error,
+                       "%.300s holds a run of %d iterations, and this one of %d would replace it: go on with "
+                       "--resume, give "
+                       "another name with -o, or remove it",
+                       j->checkpoint, done, j->options.iterations),
+               1;
     j->progress.kept = done;
     return 0;
 }
 
-/* The training photographs' cameras and lights as refined, for what follows and in a file beside the model. */
-static int save_refined(job *j, char error[512])
-{
+/* The training photographs' cameras and lights as refined, for what follows and in a file beside the
+   model. */
+static int save_refined(job *j, char error[512]) {
     int i, failed;
     for (i = 0; i < j->train_set.count; i++) {
         olat_frame *frame = &j->train_set.frames[i];
@@ -356,13 +430,15 @@ static int save_refined(job *j, char error[512])
         j->photos[i].light = frame->light;
     }
     failed = olat_save(j->refined, j->dataset, &j->train_set, error);
-    if (!failed) printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n", j->refined);
+    if (!failed)
+        printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n",
+               j->refined);
     return failed;
 }
 
-static int train(job *j)
-{
-    const char *output = j->given[OUTPUT], *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
+static int train(job *j) {
+    const char *output = j->given[OUTPUT],
+               *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
     char error[512] = "", text[32], *test_json = (char *)malloc(strlen(j->dataset) + 32);
     int i, width = 0, height = 0, has_test;
     const int refines = j->options.refine_camera || j->options.refine_light;
@@ -372,7 +448,8 @@ static int train(job *j)
 
     j->checkpoint = (char *)malloc(strlen(output) + 8);
     if (refines) j->refined = (char *)malloc(strlen(output) + 16);
-    if (!j->checkpoint || !test_json || (refines && !j->refined)) return free(test_json), fail("out of memory");
+    if (!j->checkpoint || !test_json || (refines && !j->refined))
+        return free(test_json), fail("out of memory");
     sprintf(j->checkpoint, "%s.ckpt", output);
     if (refines) sprintf(j->refined, "%s.refined.json", output);
     sprintf(test_json, "%s/transforms_test.json", j->dataset);
@@ -383,7 +460,9 @@ static int train(job *j)
     if (check_outputs(j, train_json, error)) return fail(error);
 
     if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
-    if (has_test && olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error)) return fail(error);
+    if (has_test &&
+        olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error))
+        return fail(error);
     olat_print_notes(&j->train_set, "train");
     if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");
     for (i = 0; i < 3; i++) {
@@ -403,10 +482,13 @@ static int train(job *j)
     if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
         ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
         return fail(ssdgs_error_message(j->context));
-    fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s; about %.0f MiB at most beside the photographs\n", j->dataset,
-            j->train_set.count, width, height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)),
+    fprintf(stderr,
+            "%s: %d photographs of %dx%d; %d threads, %s; about %.0f MiB at most beside the photographs\n",
+            j->dataset, j->train_set.count, width, height, ssdgs_context_threads(j->context),
+            ssdgs_isa_string(ssdgs_context_isa(j->context)),
             (double)ssdgs_train_memory(&j->settings, &j->options, width, height) / 1048576);
-    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
+    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint))
+        return fail(ssdgs_error_message(j->context));
 
     j->progress.iterations = j->options.iterations;
     j->progress.terminal = on_terminal();
@@ -415,7 +497,9 @@ static int train(job *j)
     while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
         if (j->progress.done < j->progress.kept) {
             if (!interrupted) continue;
-            fprintf(stderr, "\nstopped; %s stays as it is, of a run that is further (%d iterations): --resume goes on with that\n",
+            fprintf(stderr,
+                    "\nstopped; %s stays as it is, of a run that is further (%d iterations): --resume goes "
+                    "on with that\n",
                     j->checkpoint, j->progress.kept);
             return 130;
         }
@@ -430,9 +514,11 @@ static int train(job *j)
     if (ssdgs_model_save(j->model, output)) {
         fail(ssdgs_error_message(j->context));
         if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
-        return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint), fail(error);
+        return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
+               fail(error);
     }
-    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count, clock_text(seconds_now() - start, text));
+    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count,
+           clock_text(seconds_now() - start, text));
     print_peak_memory();
     printf("\n");
     if (refines && save_refined(j, error)) return fail(error);
@@ -447,14 +533,13 @@ static int train(job *j)
     if (!j->test_photos) return fail("out of memory");
     if (evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test") ||
         (refines && evaluate(j, j->test_photos, j->test_set.count, 1, 200,
-                                      "test (each photograph's pose and light fitted to it)")) ||
+                             "test (each photograph's pose and light fitted to it)")) ||
         evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training"))
         return fail(ssdgs_error_message(j->context));
     return 0;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     job j;
     int status;
     memset(&j, 0, sizeof j);

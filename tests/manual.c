@@ -7,12 +7,12 @@ int manual_main(int argc, char **argv);
 int train(const ssdgs_photo *photos, int count, int iterations, const char *path);
 #include "manual_train.c"
 
-int main(void)
-{
+int main(void) {
     enum { SIZE = 16, STEPS = 5 };
     static unsigned char pixels[SIZE * SIZE * 4]; /* a grey disc on nothing */
     static ssdgs_real eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-    char name[] = "manual", path[] = "build/manual_model.ply", missing[] = "build/manual_missing.ply", *arguments[3];
+    char name[] = "manual", path[] = "build/manual_model.ply", missing[] = "build/manual_missing.ply",
+         *arguments[3];
     ssdgs_photo photo;
     int x, y, c;
     memset(&photo, 0, sizeof photo);
@@ -22,7 +22,8 @@ int main(void)
     for (y = 0; y < SIZE; y++)
         for (x = 0; x < SIZE; x++)
             for (c = 0; c < 4; c++)
-                pixels[(y * SIZE + x) * 4 + c] = (2 * x - 15) * (2 * x - 15) + (2 * y - 15) * (2 * y - 15) < 100 ? c < 3 ? 128 : 255 : 0;
+                pixels[(y * SIZE + x) * 4 + c] =
+                    (2 * x - 15) * (2 * x - 15) + (2 * y - 15) * (2 * y - 15) < 100 ? c < 3 ? 128 : 255 : 0;
     photo.pixels = pixels;
     arguments[0] = name;
     arguments[1] = path;
@@ -30,7 +31,7 @@ int main(void)
     remove(path);
     CHECK(manual_main(1, arguments) == 0);
     CHECK(train(&photo, 1, STEPS, path) == 0);
-    CHECK(manual_main(2, arguments) == 0); /* what was trained renders */
+    CHECK(manual_main(2, arguments) == 0);     /* what was trained renders */
     CHECK(train(&photo, 0, STEPS, path) == 1); /* no photographs */
     arguments[1] = missing;
     CHECK(manual_main(2, arguments) == 1);

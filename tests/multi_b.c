@@ -2,8 +2,7 @@
 #include "../ssdgs.h"
 #include "test.h"
 
-int main(void)
-{
+int main(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     CHECK(ssdgs_context_create(NULL, &context) == SSDGS_OK);

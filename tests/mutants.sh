@@ -14,23 +14,28 @@ cp tests/t_*.c "$work/tests"
 sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests/test.h"
 
 # apply: $header with $MUTANT, "function: old ==> new" or "function#2: old ==> new" for the second place, as the copy's ssdgs.h.
-# A function, by its name without F(), ends where a line begins with }.
+# A function, by its name without F(), ends where a line begins with }. A space in old stands for any white space, line ends
+# included, and between an operator or a parenthesis and what follows there may be some: however the lines are broken, it fits.
 apply() {
-    awk 'BEGIN {
+    awk 'function mutate(text,   at, rest, put) {
+            while (match(rest = substr(text, at + 1), pattern)) {
+                put = ++places == (wanted ? wanted : 1) ? new : substr(rest, RSTART, RLENGTH)
+                printf "%s%s", substr(rest, 1, RSTART - 1), put
+                at += RSTART + RLENGTH - 1
+            }
+            printf "%s", substr(text, at + 1)
+        }
+        BEGIN {
             colon = index(ENVIRON["MUTANT"], ": "); arrow = index(ENVIRON["MUTANT"], " ==> ")
             name = substr(ENVIRON["MUTANT"], 1, colon - 1); new = substr(ENVIRON["MUTANT"], arrow + 5)
-            old = substr(ENVIRON["MUTANT"], colon + 2, arrow - colon - 2)
+            old = pattern = substr(ENVIRON["MUTANT"], colon + 2, arrow - colon - 2)
+            gsub(/[][\\.^$*+?(){}|]/, "[&]", pattern); gsub(/\[\\\]/, "\\\\", pattern); gsub(/\[\^\]/, "\\^", pattern)
+            gsub(/ /, "[ \n]+", pattern); gsub(/\[\(\]/, "[(][ \n]*", pattern)
             if (hash = index(name, "#")) { wanted = substr(name, hash + 1) + 0; name = substr(name, 1, hash - 1) }
         }
-        $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
-        inside && arrow {
-            for (at = 1; found = index(substr($0, at), old); at += found - 1 + length(put)) {
-                put = ++places == (wanted ? wanted : 1) ? new : old
-                $0 = substr($0, 1, at + found - 2) put substr($0, at + found - 1 + length(old))
-            }
-        }
-        /^}/ || /^[A-Za-z].*[;}]$/ { inside = 0 }
-        { print }
+        !inside && $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
+        inside && arrow { body = body $0 "\n" } !(inside && arrow)
+        /^}/ || /^[A-Za-z].*[;}]$/ { if (inside && arrow) mutate(body); body = ""; inside = 0 }
         END { exit !(arrow && old != new && (wanted ? places >= wanted : places == 1)) }' "$header" >"$work/ssdgs.h"
 }
 

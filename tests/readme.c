@@ -5,8 +5,7 @@ int readme_main(void);
 #include "readme_example.c"
 #undef main
 
-int main(void)
-{
+int main(void) {
     CHECK(readme_main() == 0);
     TEST_END();
 }

@@ -1,12 +1,13 @@
-/* Prints a hash of a rendering with every term and network: tests/builds.sh compares builds with and without the trainer. */
+/* Prints a hash of a rendering with every term and network: tests/builds.sh compares builds with and without
+   the trainer. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include <stdio.h>
 
-int main(void)
-{
+int main(void) {
     enum { SIDE = 48, COUNT = 500 };
-    static ssdgs_real color[SIDE * SIDE * 3], depth[SIDE * SIDE], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    static ssdgs_real color[SIDE * SIDE * 3], depth[SIDE * SIDE], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0},
+                                                                  up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
     ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}};
     ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL};
@@ -19,14 +20,19 @@ int main(void)
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
         ssdgs_model_view view;
-        if (ssdgs_context_create(NULL, &context) || ssdgs_model_create(context, &settings[kind], COUNT, &model)) return 1;
+        if (ssdgs_context_create(NULL, &context) ||
+            ssdgs_model_create(context, &settings[kind], COUNT, &model))
+            return 1;
         view = ssdgs_model_get(model);
         for (i = 0; i < COUNT; i++)
             for (c = 0; c < SSDGS_CHANNELS; c++)
-                view.gaussians[(size_t)c * view.stride + (size_t)i] += (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(i * SSDGS_CHANNELS + c)) - 0.4);
+                view.gaussians[(size_t)c * view.stride + (size_t)i] +=
+                    (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(i * SSDGS_CHANNELS + c)) - 0.4);
         if (ssdgs_render(model, &camera, &light, 1, &image)) return 1;
-        for (i = 0; i < (int)sizeof color; i++) hash = (hash ^ ((const unsigned char *)color)[i]) * UINT64_C(0x100000001B3);
-        for (i = 0; i < (int)sizeof depth; i++) hash = (hash ^ ((const unsigned char *)depth)[i]) * UINT64_C(0x100000001B3);
+        for (i = 0; i < (int)sizeof color; i++)
+            hash = (hash ^ ((const unsigned char *)color)[i]) * UINT64_C(0x100000001B3);
+        for (i = 0; i < (int)sizeof depth; i++)
+            hash = (hash ^ ((const unsigned char *)depth)[i]) * UINT64_C(0x100000001B3);
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
     }

@@ -1,9 +1,10 @@
 /* What tests/experiments.sh needs beside train and relight:
-   show pipeline OUT.png DATASET BACKGROUND MODEL      shadow: per ray from the light, coarse, refined, the image (Figure 3)
-   show sweeps OUT.png DATASET BACKGROUND MODEL        one view under six lights, six views under one light (Figure 10)
-   show backlit OUT.png DATASET BACKGROUND MODEL...    the middle of the brightest test view lit from behind, photograph first
-   show strip OUT.png COLUMNS FILE.png...              images side by side
-   show poses TRUE.json FITTED.json                    how far cameras and lights are from the truth */
+   show pipeline OUT.png DATASET BACKGROUND MODEL      shadow: per ray from the light, coarse, refined, the
+   image (Figure 3) show sweeps OUT.png DATASET BACKGROUND MODEL        one view under six lights, six views
+   under one light (Figure 10) show backlit OUT.png DATASET BACKGROUND MODEL...    the middle of the brightest
+   test view lit from behind, photograph first show strip OUT.png COLUMNS FILE.png...              images side
+   by side show poses TRUE.json FITTED.json                    how far cameras and lights are from the
+   truth */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "../examples/olat.h"
@@ -17,18 +18,16 @@ typedef struct show {
     olat_dataset set, other;
     ssdgs_real background[3], *image, *alpha; /* of the view at hand: (h,w,3), (h,w) */
     unsigned char *bytes, *sheet;
-    int width, height, columns, rows;         /* of a cell in pixels; of the sheet in cells */
+    int width, height, columns, rows; /* of a cell in pixels; of the sheet in cells */
     char error[512];
 } show;
 
-static int failed(show *s, const char *message)
-{
+static int failed(show *s, const char *message) {
     snprintf(s->error, sizeof s->error, "%s", message);
     return 1;
 }
 
-static ssdgs_result show_visibility(void *user, ssdgs_frame *frame)
-{
+static ssdgs_result show_visibility(void *user, ssdgs_frame *frame) {
     ssdgs_result result = ssdgs_stage_cpu(frame, SSDGS_STAGE_SHADE);
     int i, c;
     (void)user;
@@ -38,8 +37,7 @@ static ssdgs_result show_visibility(void *user, ssdgs_frame *frame)
     return result;
 }
 
-static int open_dataset(show *s, const char *folder, const char *background)
-{
+static int open_dataset(show *s, const char *folder, const char *background) {
     int i;
     for (i = 0; i < 3; i++) s->background[i] = (ssdgs_real)!strcmp(background, "white");
     if (olat_load(folder, "transforms_test.json", 0, &s->set, s->error)) return 1;
@@ -55,8 +53,7 @@ static int open_dataset(show *s, const char *folder, const char *background)
     return 0;
 }
 
-static int open_model(show *s, const char *path)
-{
+static int open_model(show *s, const char *path) {
     ssdgs_context_desc desc;
     ssdgs_model_destroy(s->model);
     s->model = NULL;
@@ -64,56 +61,61 @@ static int open_model(show *s, const char *path)
     desc.gpu.stage[SSDGS_STAGE_SHADE] = show_visibility;
     if (!s->context && (ssdgs_context_create(NULL, &s->context) || ssdgs_context_create(&desc, &s->coarse)))
         return failed(s, "no context");
-    if (ssdgs_model_load(s->context, path, &s->model, NULL)) return failed(s, ssdgs_error_message(s->context));
+    if (ssdgs_model_load(s->context, path, &s->model, NULL))
+        return failed(s, ssdgs_error_message(s->context));
     return 0;
 }
 
-static int make_sheet(show *s, int columns, int rows)
-{
+static int make_sheet(show *s, int columns, int rows) {
     s->columns = columns;
     s->rows = rows;
-    s->sheet = (unsigned char *)calloc((size_t)columns * (size_t)rows * (size_t)s->width * (size_t)s->height, 3);
+    s->sheet =
+        (unsigned char *)calloc((size_t)columns * (size_t)rows * (size_t)s->width * (size_t)s->height, 3);
     return s->sheet ? 0 : failed(s, "out of memory");
 }
 
 /* Copies a cell's size of (.., stride) pixels of RGB from x, y on. */
-static void paste(show *s, int row, int column, const unsigned char *from, int stride, int x, int y)
-{
+static void paste(show *s, int row, int column, const unsigned char *from, int stride, int x, int y) {
     int line;
     for (line = 0; line < s->height; line++)
-        memcpy(s->sheet + 3 * (((size_t)row * (size_t)s->height + (size_t)line) * (size_t)s->columns + (size_t)column) * (size_t)s->width,
-               from + 3 * ((size_t)(y + line) * (size_t)stride + (size_t)x), 3 * (size_t)s->width);
+        memcpy(
+            s->sheet +
+                3 * (((size_t)row * (size_t)s->height + (size_t)line) * (size_t)s->columns + (size_t)column) *
+                    (size_t)s->width,
+            from + 3 * ((size_t)(y + line) * (size_t)stride + (size_t)x), 3 * (size_t)s->width);
 }
 
 /* The model in this view and light as stored values, into bytes. */
-static int render(show *s, const ssdgs_camera *camera, const ssdgs_light *light)
-{
+static int render(show *s, const ssdgs_camera *camera, const ssdgs_light *light) {
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_image planes;
     memset(&planes, 0, sizeof planes);
     planes.color = s->image;
     planes.alpha = s->alpha;
     if (ssdgs_render(s->model, camera, light, 1, &planes)) return failed(s, ssdgs_error_message(s->context));
-    ssdgs_compose(s->image, s->alpha, pixels, ssdgs_model_settings(s->model)->transfer, s->background, s->image);
+    ssdgs_compose(s->image, s->alpha, pixels, ssdgs_model_settings(s->model)->transfer, s->background,
+                  s->image);
     ssdgs_to_bytes(s->image, 3 * pixels, SSDGS_TRANSFER_NONE, s->bytes);
     return 0;
 }
 
 /* ---- pictures ---- */
 
-static int pipeline(show *s, const char *model)
-{
+static int pipeline(show *s, const char *model) {
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     const int rows = s->set.count < ROWS ? s->set.count : ROWS;
     int row, column, c;
     size_t i;
-    if (ssdgs_model_load(s->coarse, model, &s->coarse_model, NULL)) return failed(s, ssdgs_error_message(s->coarse));
+    if (ssdgs_model_load(s->coarse, model, &s->coarse_model, NULL))
+        return failed(s, ssdgs_error_message(s->coarse));
     if (make_sheet(s, 4, rows)) return 1;
     for (row = 0; row < rows; row++) {
         const olat_frame *frame = &s->set.frames[(2 * row + 1) * s->set.count / (2 * rows)];
         const ssdgs_settings *settings = ssdgs_model_settings(s->model);
-        const ssdgs_real up[3] = {0, 0, 1}, field = (ssdgs_real)(2 * atan(0.5 * s->width / (double)frame->camera.fx));
-        const ssdgs_camera from_light = ssdgs_camera_look_at(frame->light.position, settings->centre, up, field, s->width, s->height);
+        const ssdgs_real up[3] = {0, 0, 1},
+                         field = (ssdgs_real)(2 * atan(0.5 * s->width / (double)frame->camera.fx));
+        const ssdgs_camera from_light =
+            ssdgs_camera_look_at(frame->light.position, settings->centre, up, field, s->width, s->height);
         for (column = 0; column < 4; column++) {
             ssdgs_image planes;
             ssdgs_result result = SSDGS_OK;
@@ -121,12 +123,16 @@ static int pipeline(show *s, const char *model)
             planes.color = s->image;
             if (column == 0) planes.alpha = s->alpha;
             if (column == 2) planes.shadow = s->alpha;
-            if (column == 1) result = ssdgs_render(s->coarse_model, &frame->camera, &frame->light, 1, &planes);
-            else if (column < 3) result = ssdgs_render(s->model, column ? &frame->camera : &from_light, &frame->light, 1, &planes);
+            if (column == 1)
+                result = ssdgs_render(s->coarse_model, &frame->camera, &frame->light, 1, &planes);
+            else if (column < 3)
+                result =
+                    ssdgs_render(s->model, column ? &frame->camera : &from_light, &frame->light, 1, &planes);
             if (result) return failed(s, ssdgs_error_message(column == 1 ? s->coarse : s->context));
             if (column < 3) {
                 for (i = 0; i < pixels && column != 1; i++)
-                    for (c = 0; c < 3; c++) s->image[3 * i + (size_t)c] = column ? s->alpha[i] : 1 - s->alpha[i];
+                    for (c = 0; c < 3; c++)
+                        s->image[3 * i + (size_t)c] = column ? s->alpha[i] : 1 - s->alpha[i];
                 ssdgs_to_bytes(s->image, 3 * pixels, SSDGS_TRANSFER_NONE, s->bytes);
             } else if (render(s, &frame->camera, &frame->light)) {
                 return 1;
@@ -137,8 +143,7 @@ static int pipeline(show *s, const char *model)
     return 0;
 }
 
-static int sweeps(show *s)
-{
+static int sweeps(show *s) {
     int row, column;
     if (make_sheet(s, COLUMNS, 2)) return 1;
     for (row = 0; row < 2; row++)
@@ -153,8 +158,7 @@ static int sweeps(show *s)
 }
 
 /* The cosine of the angle at the centre between the eye and the light. */
-static double facing(const olat_frame *frame, const ssdgs_real centre[3])
-{
+static double facing(const olat_frame *frame, const ssdgs_real centre[3]) {
     double to_eye[3], to_light[3];
     ssdgs_real eye[3];
     int i;
@@ -167,25 +171,25 @@ static double facing(const olat_frame *frame, const ssdgs_real centre[3])
 }
 
 /* The sum of a photograph's values. */
-static double brightness(show *s, const olat_frame *frame)
-{
+static double brightness(show *s, const olat_frame *frame) {
     const ssdgs_real black[3] = {0, 0, 0};
     double sum = 0;
     size_t i;
     olat_compose(frame, black, s->image);
-    for (i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++) sum += (double)s->image[i];
+    for (i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++)
+        sum += (double)s->image[i];
     return sum;
 }
 
-static int backlit(show *s, const char *const *models, int count)
-{
+static int backlit(show *s, const char *const *models, int count) {
     const int width = s->width, height = s->height;
     const olat_frame *chosen = s->set.frames;
     double most = 0;
     int i;
     for (i = 0; i < s->set.count; i++) {
         const double light = brightness(s, s->set.frames + i);
-        if (facing(s->set.frames + i, ssdgs_model_settings(s->model)->centre) > -0.25 || light <= most) continue;
+        if (facing(s->set.frames + i, ssdgs_model_settings(s->model)->centre) > -0.25 || light <= most)
+            continue;
         most = light;
         chosen = s->set.frames + i;
     }
@@ -202,8 +206,7 @@ static int backlit(show *s, const char *const *models, int count)
     return 0;
 }
 
-static int strip(show *s, int columns, const char *const *files, int count)
-{
+static int strip(show *s, int columns, const char *const *files, int count) {
     int i;
     for (i = 0; i < count; i++) {
         void *pixels = NULL;
@@ -217,7 +220,8 @@ static int strip(show *s, int columns, const char *const *files, int count)
             s->bytes = (unsigned char *)malloc(3 * (size_t)width * (size_t)height);
             if (make_sheet(s, columns, (count + columns - 1) / columns)) s->columns = 0;
         }
-        bad = !s->bytes || !s->sheet || width != s->width || height != s->height || format != SSDGS_PIXELS_RGBA8;
+        bad = !s->bytes || !s->sheet || width != s->width || height != s->height ||
+              format != SSDGS_PIXELS_RGBA8;
         for (p = 0; !bad && p < (size_t)width * (size_t)height; p++)
             for (c = 0; c < 3; c++) s->bytes[3 * p + c] = ((const uint8_t *)pixels)[4 * p + c];
         free(pixels);
@@ -229,10 +233,9 @@ static int strip(show *s, int columns, const char *const *files, int count)
 
 /* ---- poses ---- */
 
-/* How far apart, in px, two cameras see the corners of a cube as wide as half of the bounds, on average: what turns and moves that
-   make up for each other leave. */
-static double shift(const ssdgs_camera *a, const ssdgs_camera *b)
-{
+/* How far apart, in px, two cameras see the corners of a cube as wide as half of the bounds, on average: what
+   turns and moves that make up for each other leave. */
+static double shift(const ssdgs_camera *a, const ssdgs_camera *b) {
     const ssdgs_camera *const cameras[2] = {a, b};
     double sum = 0;
     int corner, c, k;
@@ -242,22 +245,24 @@ static double shift(const ssdgs_camera *a, const ssdgs_camera *b)
             double x[3];
             for (k = 0; k < 3; k++) {
                 const ssdgs_real *row = cameras[c]->view + 4 * k;
-                x[k] = (double)row[3] + 0.25 * ((corner & 1 ? 1 : -1) * (double)row[0] + (corner & 2 ? 1 : -1) * (double)row[1] +
+                x[k] = (double)row[3] + 0.25 * ((corner & 1 ? 1 : -1) * (double)row[0] +
+                                                (corner & 2 ? 1 : -1) * (double)row[1] +
                                                 (corner & 4 ? 1 : -1) * (double)row[2]);
             }
             at[c][0] = (double)cameras[c]->fx * x[0] / x[2];
             at[c][1] = (double)cameras[c]->fy * x[1] / x[2];
         }
-        sum += sqrt((at[0][0] - at[1][0]) * (at[0][0] - at[1][0]) + (at[0][1] - at[1][1]) * (at[0][1] - at[1][1]));
+        sum += sqrt((at[0][0] - at[1][0]) * (at[0][0] - at[1][0]) +
+                    (at[0][1] - at[1][1]) * (at[0][1] - at[1][1]));
     }
     return sum / 8;
 }
 
-static int poses(show *s, const char *truth, const char *fitted)
-{
+static int poses(show *s, const char *truth, const char *fitted) {
     double distance = 0, turn = 0, apart_px = 0, light = 0;
     int i, k, m;
-    if (olat_load("", truth, OLAT_NO_IMAGES, &s->set, s->error) || olat_load("", fitted, OLAT_NO_IMAGES, &s->other, s->error))
+    if (olat_load("", truth, OLAT_NO_IMAGES, &s->set, s->error) ||
+        olat_load("", fitted, OLAT_NO_IMAGES, &s->other, s->error))
         return 1;
     if (s->set.count != s->other.count) return failed(s, "the files differ in frames");
     for (i = 0; i < s->set.count; i++) {
@@ -265,10 +270,12 @@ static int poses(show *s, const char *truth, const char *fitted)
         double apart[3] = {0, 0, 0}, trace = 0, lights[3];
         for (k = 0; k < 3; k++) {
             for (m = 0; m < 3; m++) {
-                apart[k] += (double)a[4 * m + k] * (double)a[4 * m + 3] - (double)b[4 * m + k] * (double)b[4 * m + 3];
+                apart[k] +=
+                    (double)a[4 * m + k] * (double)a[4 * m + 3] - (double)b[4 * m + k] * (double)b[4 * m + 3];
                 trace += (double)a[4 * k + m] * (double)b[4 * k + m];
             }
-            lights[k] = (double)s->set.frames[i].light.position[k] - (double)s->other.frames[i].light.position[k];
+            lights[k] =
+                (double)s->set.frames[i].light.position[k] - (double)s->other.frames[i].light.position[k];
         }
         distance += sqrt(olat__dot(apart, apart)) / s->set.count;
         turn += acos(trace < 3 ? (trace - 1) / 2 : 1) * (180 / 3.14159265358979323846) / s->set.count;
@@ -279,19 +286,22 @@ static int poses(show *s, const char *truth, const char *fitted)
     return 0;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     const char *what = argc > 1 ? argv[1] : "", *const *files = (const char *const *)argv + 5;
     int status, columns = argc > 3 ? atoi(argv[3]) : 0;
     show s;
     memset(&s, 0, sizeof s);
     if (!strcmp(what, "poses") && argc == 4) status = poses(&s, argv[2], argv[3]);
-    else if (!strcmp(what, "strip") && argc > 4 && columns > 0) status = strip(&s, columns, files - 1, argc - 4);
+    else if (!strcmp(what, "strip") && argc > 4 && columns > 0)
+        status = strip(&s, columns, files - 1, argc - 4);
     else if (argc > 5 && (!strcmp(what, "pipeline") || !strcmp(what, "sweeps") || !strcmp(what, "backlit"))) {
         status = open_dataset(&s, argv[3], argv[4]) || open_model(&s, argv[5]) ||
-                 (*what == 'p' ? pipeline(&s, argv[5]) : *what == 's' ? sweeps(&s) : backlit(&s, files, argc - 5));
+                 (*what == 'p'   ? pipeline(&s, argv[5])
+                  : *what == 's' ? sweeps(&s)
+                                 : backlit(&s, files, argc - 5));
     } else status = failed(&s, "usage: see the first lines of tests/show.c");
-    if (!status && s.sheet) status = olat_write_png(argv[2], s.columns * s.width, s.rows * s.height, 3, s.sheet, s.error);
+    if (!status && s.sheet)
+        status = olat_write_png(argv[2], s.columns * s.width, s.rows * s.height, 3, s.sheet, s.error);
     if (status) fprintf(stderr, "show: %s\n", s.error);
     ssdgs_model_destroy(s.model);
     ssdgs_model_destroy(s.coarse_model);

@@ -1,33 +1,34 @@
-/* How accurate elementary functions, dipole and ASG are, against oracles that share nothing with them; again in double, real64,
-   where dipole and ASG hold to rounding. `full` tries every float in the elementary functions alone (an hour), `full exp` in one of
-   them (minutes), `shading` is all the rest. */
+/* How accurate elementary functions, dipole and ASG are, against oracles that share nothing with them; again
+   in double, real64, where dipole and ASG hold to rounding. `full` tries every float in the elementary
+   functions alone (an hour), `full exp` in one of them (minutes), `shading` is all the rest. */
 #ifdef SSDGS__ISA
-/* The header includes itself for every instruction set through SSDGS_SELF, which is this file: ahead of the kernels' table it
-   slips in functions that apply the elementary ones to arrays. */
-#define EACH(name, value)                                                                                                  \
-    SSDGS__FN void F(name)(const R *a, const R *b, R *out, size_t n) {                                                     \
-        size_t i;                                                                                                          \
-        V s, c;                                                                                                            \
-        for (i = 0; i < n; i += (size_t)F(lanes)) {                                                                        \
-            const V x = VLOAD(a + i), y = VLOAD(b + i);                                                                    \
-            s = x, c = y;                                                                                                  \
-            VSTORE(out + i, value);                                                                                        \
-        }                                                                                                                  \
-        (void)s, (void)c;                                                                                                  \
+/* The header includes itself for every instruction set through SSDGS_SELF, which is this file: ahead of the
+   kernels' table it slips in functions that apply the elementary ones to arrays. */
+#define EACH(name, value) \
+    SSDGS__FN void F(name)(const R *a, const R *b, R *out, size_t n) { \
+        size_t i; \
+        V s, c; \
+        for (i = 0; i < n; i += (size_t)F(lanes)) { \
+            const V x = VLOAD(a + i), y = VLOAD(b + i); \
+            s = x, c = y; \
+            VSTORE(out + i, value); \
+        } \
+        (void)s, (void)c; \
     }
-#define ssdgs__kernels                                                                                                     \
-    int F(lanes) = SSDGS__VW;                                                                                              \
-    EACH(each_exp2, F(exp2)(x))                                                                                            \
-    EACH(each_exp, F(exp)(x))                                                                                              \
-    EACH(each_log, F(log)(x))                                                                                              \
-    EACH(each_log1p, F(log1p)(x))                                                                                          \
-    EACH(each_sin, (F(sincos)(x, &s, &c), s))                                                                              \
-    EACH(each_cos, (F(sincos)(x, &s, &c), c))                                                                              \
-    EACH(each_sigmoid, F(sigmoid)(x))                                                                                      \
-    EACH(each_softplus, F(softplus)(x))                                                                                    \
-    EACH(each_atan2, F(atan2_upper)(y, x))                                                                                 \
-    static each_function *const F(elementary)[MAPS] = {F(each_exp2), F(each_exp), F(each_log), F(each_log1p), F(each_sin), \
-                                                       F(each_cos), F(each_sigmoid), F(each_softplus), F(each_atan2)};     \
+#define ssdgs__kernels \
+    int F(lanes) = SSDGS__VW; \
+    EACH(each_exp2, F(exp2)(x)) \
+    EACH(each_exp, F(exp)(x)) \
+    EACH(each_log, F(log)(x)) \
+    EACH(each_log1p, F(log1p)(x)) \
+    EACH(each_sin, (F(sincos)(x, &s, &c), s)) \
+    EACH(each_cos, (F(sincos)(x, &s, &c), c)) \
+    EACH(each_sigmoid, F(sigmoid)(x)) \
+    EACH(each_softplus, F(softplus)(x)) \
+    EACH(each_atan2, F(atan2_upper)(y, x)) \
+    static each_function *const F(elementary)[MAPS] = {F(each_exp2),    F(each_exp),      F(each_log), \
+                                                       F(each_log1p),   F(each_sin),      F(each_cos), \
+                                                       F(each_sigmoid), F(each_softplus), F(each_atan2)}; \
     static const ssdgs__kernels
 #include "../ssdgs.h"
 #undef ssdgs__kernels
@@ -46,10 +47,13 @@ typedef void each_function(const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
 
 #define PI 3.14159265358979323846
 enum { BLOCK = SSDGS__BLOCK };
-static const double eps = sizeof(ssdgs_real) == 4 ? 1.0 / 16777216 : 1.0 / 9007199254740992.0; /* of rounding: 2^-24, 2^-53 */
+static const double eps =
+    sizeof(ssdgs_real) == 4 ? 1.0 / 16777216 : 1.0 / 9007199254740992.0; /* of rounding: 2^-24, 2^-53 */
 static int isa;
 static const ssdgs__kernels *k;
-#define EVERY_ISA for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) if ((k = ssdgs__table(isa)) != NULL)
+#define EVERY_ISA \
+    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) \
+        if ((k = ssdgs__table(isa)) != NULL)
 
 static const char *isa_name(void) { return ssdgs_isa_string((ssdgs_isa)isa); }
 static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
@@ -68,20 +72,20 @@ static void apply(int map) {
     if (map == SRGB_DECODE) k->srgb_decode(out, in[0], CHUNK);
     if (map >= MAPS) return;
     switch (isa) {
-        case SSDGS_ISA_SCALAR: ssdgs__elementary_scalar[map](in[0], in[1], out, CHUNK); break;
+    case SSDGS_ISA_SCALAR: ssdgs__elementary_scalar[map](in[0], in[1], out, CHUNK); break;
 #if SSDGS__X86 >= 1
-        case SSDGS_ISA_SSE2: ssdgs__elementary_sse2[map](in[0], in[1], out, CHUNK); break;
+    case SSDGS_ISA_SSE2: ssdgs__elementary_sse2[map](in[0], in[1], out, CHUNK); break;
 #endif
 #if SSDGS__X86 >= 2
-        case SSDGS_ISA_AVX2: ssdgs__elementary_avx2[map](in[0], in[1], out, CHUNK); break;
+    case SSDGS_ISA_AVX2: ssdgs__elementary_avx2[map](in[0], in[1], out, CHUNK); break;
 #endif
 #if SSDGS__X86 >= 3
-        case SSDGS_ISA_AVX512: ssdgs__elementary_avx512[map](in[0], in[1], out, CHUNK); break;
+    case SSDGS_ISA_AVX512: ssdgs__elementary_avx512[map](in[0], in[1], out, CHUNK); break;
 #endif
 #if SSDGS__NEON
-        case SSDGS_ISA_NEON: ssdgs__elementary_neon[map](in[0], in[1], out, CHUNK); break;
+    case SSDGS_ISA_NEON: ssdgs__elementary_neon[map](in[0], in[1], out, CHUNK); break;
 #endif
-        default: break;
+    default: break;
     }
 }
 
@@ -90,9 +94,10 @@ static double softplus(double x) { return (x > 0 ? x : 0) + log1p(exp(-fabs(x)))
 static double srgb_encode(double x) { return x < 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055; }
 static double srgb_decode(double x) { return x < 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4); }
 
-/* A function holds from low to high. Below and above it takes the value there, or is not called (SAME, NONE). Its errors count
-   in units in the last place: of the value, or of `least` where the value is smaller. The bounds are the worst seen in one of 67
-   floats, on any instruction set, rounded up: without FMA pi / 2 runs out of bits beyond 1e4, and powers multiply log's error. */
+/* A function holds from low to high. Below and above it takes the value there, or is not called (SAME, NONE).
+   Its errors count in units in the last place: of the value, or of `least` where the value is smaller. The
+   bounds are the worst seen in one of 67 floats, on any instruction set, rounded up: without FMA pi / 2 runs
+   out of bits beyond 1e4, and powers multiply log's error. */
 enum { NONE = 0, SAME_BELOW = 1, SAME_ABOVE = 2, SAME = 3 };
 static const struct law {
     const char *name;
@@ -136,13 +141,17 @@ static float from_bits(uint64_t bits) {
     return x;
 }
 
-static float law_input(const struct law *law, float x) { return x < law->low ? law->low : x > law->high ? law->high : x; }
+static float law_input(const struct law *law, float x) {
+    return x < law->low ? law->low : x > law->high ? law->high : x;
+}
 
-/* All floats of the domain in steps (4001 is prime to the mantissas: each exponent gets 2097), those beyond it in the wide ones;
-   at last those next to the ends of the domain, to where the polynomials' pieces meet, and to nothing. */
+/* All floats of the domain in steps (4001 is prime to the mantissas: each exponent gets 2097), those beyond
+   it in the wide ones; at last those next to the ends of the domain, to where the polynomials' pieces meet,
+   and to nothing. */
 static void test_law(const struct law *law, uint64_t step) {
-    const float corners[] = {law->low, law->high, 0, -0.0f, FLT_MIN, -FLT_MIN, 1, -1, 1.41421356f, 0.70710678f, 0.78539816f,
-                             1.57079633f, 0.0031308f, 0.04045f, 0.5f, 86.5f, 1e-30f};
+    const float corners[] = {law->low,   law->high, 0,           -0.0f,       FLT_MIN,     -FLT_MIN,
+                             1,          -1,        1.41421356f, 0.70710678f, 0.78539816f, 1.57079633f,
+                             0.0031308f, 0.04045f,  0.5f,        86.5f,       1e-30f};
     static double want[CHUNK], scale[CHUNK];
     double worst[SSDGS_ISA_COUNT], value = 0, inverse = 0;
     float at[SSDGS_ISA_COUNT], last = -1;
@@ -163,9 +172,11 @@ static void test_law(const struct law *law, uint64_t step) {
                 x = from_bits((uint64_t)bits + (uint64_t)(i % 9) - 4);
                 c = law_input(law, x);
             }
-            if (!test_finite((double)x) || (c > x && !(law->beyond & SAME_BELOW)) || (c < x && !(law->beyond & SAME_ABOVE)))
+            if (!test_finite((double)x) || (c > x && !(law->beyond & SAME_BELOW)) ||
+                (c < x && !(law->beyond & SAME_ABOVE)))
                 x = c = 0.5f;
-            if (c != last) value = law->truth((double)c), inverse = per_ulp(max(fabs(value), law->least)), last = c;
+            if (c != last)
+                value = law->truth((double)c), inverse = per_ulp(max(fabs(value), law->least)), last = c;
             in[0][i] = in[1][i] = x, want[i] = value, scale[i] = inverse;
         }
         EVERY_ISA {
@@ -177,7 +188,8 @@ static void test_law(const struct law *law, uint64_t step) {
             }
             if (!k->finite(out, CHUNK)) most = 1e300;
             for (i = 0; most > worst[isa] && i < CHUNK; i++)
-                if (!test_finite((double)out[i]) || fabs((double)out[i] - want[i]) * scale[i] >= most) at[isa] = in[0][i];
+                if (!test_finite((double)out[i]) || fabs((double)out[i] - want[i]) * scale[i] >= most)
+                    at[isa] = in[0][i];
             worst[isa] = most;
         }
     }
@@ -191,8 +203,10 @@ static void test_law(const struct law *law, uint64_t step) {
 
 /* What is not a number stays so, for the caller to find; infinities saturate. */
 static void test_not_numbers(void) {
-    static const struct { int map; float below, above; } ends[] = {
-        {EXP, -87, 87}, {SIGMOID, -87, 87}, {SOFTPLUS, -87, 0}, {EXP2, -126, 0}};
+    static const struct {
+        int map;
+        float below, above;
+    } ends[] = {{EXP, -87, 87}, {SIGMOID, -87, 87}, {SOFTPLUS, -87, 0}, {EXP2, -126, 0}};
     const float infinite = from_bits(0x7F800000u);
     float limit[2];
     size_t e;
@@ -209,7 +223,8 @@ static void test_not_numbers(void) {
             for (i = 0; i < CHUNK; i++) in[0][i] = i & 1 ? ends[e].above : ends[e].below;
             apply(ends[e].map);
             memcpy(limit, out, sizeof limit);
-            for (i = 0; i < CHUNK; i++) in[0][i] = i & 1 && ends[e].above > 0 ? infinite : i & 1 ? ends[e].above : -infinite;
+            for (i = 0; i < CHUNK; i++)
+                in[0][i] = i & 1 && ends[e].above > 0 ? infinite : i & 1 ? ends[e].above : -infinite;
             apply(ends[e].map);
             CHECK(limit[0] > 0 && !memcmp(out, limit, sizeof limit));
         }
@@ -245,7 +260,8 @@ static void test_atan2(void) {
     }
 }
 
-/* sin and cos by doubling the angle: each level doubles the error of the one before. Far out and beyond it stays finite. */
+/* sin and cos by doubling the angle: each level doubles the error of the one before. Far out and beyond it
+   stays finite. */
 static void test_encode(void) {
     enum { LEVELS = 4 };
     static float x[BLOCK], code[(1 + 2 * LEVELS) * BLOCK];
@@ -290,7 +306,10 @@ static double slope(function *f, double *p, int i, const void *with, double h) {
 
 enum { FORMS = 4, NODES = 256 };
 static const char *const form_name[FORMS] = {"jensen", "printed", "released", "burley"};
-typedef struct medium { double ss, sa, eta; int form; } medium;
+typedef struct medium {
+    double ss, sa, eta;
+    int form;
+} medium;
 
 /* 4 A / 3 + 1: how much deeper the virtual source lies, by Jensen's fit. */
 static double boundary(double eta) {
@@ -307,12 +326,15 @@ static double profile(const double *p, const void *with) {
     const medium *m = (const medium *)with;
     const double st = p[0] + p[1], alpha = p[0] / st, r = p[2];
     if (m->form == SSDGS_DIPOLE_BURLEY) {
-        const double a = burley_albedo(alpha, sqrt(p[1] / st)), s = 1.85 - a + 7 * pow(fabs(a - 0.8), 3), x = s * r * st;
+        const double a = burley_albedo(alpha, sqrt(p[1] / st)), s = 1.85 - a + 7 * pow(fabs(a - 0.8), 3),
+                     x = s * r * st;
         return a * s * st * (exp(-x) + exp(-x / 3)) / (8 * PI * r);
     } else {
-        const double zr = 1 / st, zv = zr * boundary(m->eta), dr = sqrt(r * r + zr * zr), dv = sqrt(r * r + zv * zv);
+        const double zr = 1 / st, zv = zr * boundary(m->eta), dr = sqrt(r * r + zr * zr),
+                     dv = sqrt(r * r + zv * zv);
         const double s = m->form == SSDGS_DIPOLE_PRINTED ? st : sqrt(3 * p[1] * st);
-        const double inner = m->form == SSDGS_DIPOLE_PRINTED ? dr : dv, outer = m->form == SSDGS_DIPOLE_JENSEN ? zv : zr * zv;
+        const double inner = m->form == SSDGS_DIPOLE_PRINTED ? dr : dv,
+                     outer = m->form == SSDGS_DIPOLE_JENSEN ? zv : zr * zv;
         const double real = zr * (s * dr + 1) * exp(-s * dr) / pow(dr, 3);
         const double image = outer * (s * inner + 1) * exp(-s * dv) / pow(dv, 3);
         return alpha / (4 * PI) * (real + image);
@@ -320,14 +342,16 @@ static double profile(const double *p, const void *with) {
 }
 
 /* The kernel's R and derivatives at n places, a multiple of 16. */
-static void kernel_profile(const medium *m, const ssdgs_real *r, int n, ssdgs_real *f, ssdgs_real *derivatives) {
+static void kernel_profile(const medium *m, const ssdgs_real *r, int n, ssdgs_real *f,
+                           ssdgs_real *derivatives) {
     ssdgs_real ss[NODES], sa[NODES];
     int i;
     for (i = 0; i < n; i++) ss[i] = (ssdgs_real)m->ss, sa[i] = (ssdgs_real)m->sa;
     k->dipole_profile(m->form, ss, sa, r, (ssdgs_real)boundary(m->eta), f, derivatives, (size_t)n);
 }
 
-/* The integral of R over the plane: the trapezoid rule in ln r, whose error falls as e^(-pi^2 / step): 1e-17. */
+/* The integral of R over the plane: the trapezoid rule in ln r, whose error falls as e^(-pi^2 / step):
+   1e-17. */
 static double total(const medium *m, int by_kernel) {
     ssdgs_real r[NODES], f[NODES], derivatives[3 * NODES];
     double sum = 0;
@@ -344,17 +368,22 @@ static double total(const medium *m, int by_kernel) {
 
 /* What it must be; of the printed form there is no closed one. */
 static double closed(const medium *m) {
-    const double st = m->ss + m->sa, alpha = m->ss / st, q = sqrt(3 * (1 - alpha)), virtual_source = exp(-boundary(m->eta) * q);
+    const double st = m->ss + m->sa, alpha = m->ss / st, q = sqrt(3 * (1 - alpha)),
+                 virtual_source = exp(-boundary(m->eta) * q);
     if (m->form == SSDGS_DIPOLE_BURLEY) return burley_albedo(alpha, sqrt(m->sa / st));
     if (m->form == SSDGS_DIPOLE_PRINTED) return total(m, 0);
     return alpha / 2 * (exp(-q) + (m->form == SSDGS_DIPOLE_JENSEN ? 1 : 1 / st) * virtual_source);
 }
 
 static void test_dipole_total(void) {
-    static const struct { double ss, sa, eta, closed, released, printed, digits; } published[] = {
-        {0.05, 0.05, 1.3, 0.074507, 1.127, 1.462, 1e-3}, {1.05, 0.05, 1.3, 0.421528, 0.980, 0.424, 1e-3},
-        {2.05, 0.05, 1.3, 0.521446, 0.852, 0.347, 1e-3}, {2.05, 2.05, 1.3, 0.074507, 0.989, 1.240, 1e-3},
-        {0.05, 2.05, 1.3, 0.002156, 0.999, 2.049, 1e-3}, {10, 0.01, 1.5, 0.82709, 0.50827 / 0.82709, 0.18380 / 0.82709, 2e-5}};
+    static const struct {
+        double ss, sa, eta, closed, released, printed, digits;
+    } published[] = {{0.05, 0.05, 1.3, 0.074507, 1.127, 1.462, 1e-3},
+                     {1.05, 0.05, 1.3, 0.421528, 0.980, 0.424, 1e-3},
+                     {2.05, 0.05, 1.3, 0.521446, 0.852, 0.347, 1e-3},
+                     {2.05, 2.05, 1.3, 0.074507, 0.989, 1.240, 1e-3},
+                     {0.05, 2.05, 1.3, 0.002156, 0.999, 2.049, 1e-3},
+                     {10, 0.01, 1.5, 0.82709, 0.50827 / 0.82709, 0.18380 / 0.82709, 2e-5}};
     static const double etas[3] = {1, 1.3, 2.5};
     double worst[FORMS] = {0, 0, 0, 0}, least[FORMS] = {9, 9, 9, 9}, most[FORMS] = {0, 0, 0, 0};
     char key[64];
@@ -376,11 +405,14 @@ static void test_dipole_total(void) {
                 for (grid = 0; grid < 81; grid++) {
                     medium right;
                     double all, factor;
-                    m.ss = 0.05 + 2 * pow(grid % 9 / 8.0, 2), m.sa = 0.05 + 2 * pow(grid / 9 / 8.0, 2), m.eta = etas[e];
+                    m.ss = 0.05 + 2 * pow(grid % 9 / 8.0, 2), m.sa = 0.05 + 2 * pow(grid / 9 / 8.0, 2),
+                    m.eta = etas[e];
                     right = m, right.form = SSDGS_DIPOLE_JENSEN;
                     all = total(&m, 1), factor = all / closed(&right);
                     worst[m.form] = max(worst[m.form], gap(all / closed(&m), 1));
-                    if (e == 1) most[m.form] = max(most[m.form], factor), least[m.form] = -max(-least[m.form], -factor);
+                    if (e == 1)
+                        most[m.form] = max(most[m.form], factor),
+                        least[m.form] = -max(-least[m.form], -factor);
                 }
     }
     for (m.form = 0; m.form < FORMS; m.form++) {
@@ -395,7 +427,8 @@ static void test_dipole_total(void) {
     }
 }
 
-/* Lengths in another unit: R(k sigma, r / k) = k^2 R(sigma, r). With k = 2 to the bit, where the form has a dimension. */
+/* Lengths in another unit: R(k sigma, r / k) = k^2 R(sigma, r). With k = 2 to the bit, where the form has a
+   dimension. */
 static void test_dipole_units(void) {
     ssdgs_real r[2][16], f[2][16], derivatives[48];
     medium m[2];
@@ -409,15 +442,16 @@ static void test_dipole_units(void) {
             for (i = 0; i < 16; i++) r[0][i] = (ssdgs_real)(0.1 + 0.2 * i), r[1][i] = r[0][i] / 2;
             for (i = 0; i < 2; i++) kernel_profile(m + i, r[i], 16, f[i], derivatives);
             for (i = 0; i < 16; i++) apart = max(apart, gap((double)f[1][i] / (4 * (double)f[0][i]), 1));
-            CHECK(m[0].form == SSDGS_DIPOLE_JENSEN || m[0].form == SSDGS_DIPOLE_BURLEY ? apart == 0 : apart > 1e-3);
+            CHECK(m[0].form == SSDGS_DIPOLE_JENSEN || m[0].form == SSDGS_DIPOLE_BURLEY ? apart == 0
+                                                                                       : apart > 1e-3);
         }
     }
 }
 
 /* Value and derivatives against the formula, over the networks' box and far outside it. */
 static void test_dipole_points(void) {
-    static const double extremes[][3] = {{1, 1e-12, 1}, {1e-12, 1, 1}, {1e6, 1e3, 1e-5}, {1e6, 1, 1e-8},
-                                         {1, 1, 1e-8}, {1, 1, 1e8}, {0.05, 1e-12, 1e3}, {1e-3, 1e-3, 1e4}};
+    static const double extremes[][3] = {{1, 1e-12, 1}, {1e-12, 1, 1}, {1e6, 1e3, 1e-5},   {1e6, 1, 1e-8},
+                                         {1, 1, 1e-8},  {1, 1, 1e8},   {0.05, 1e-12, 1e3}, {1e-3, 1e-3, 1e4}};
     double worst[2] = {0, 0}, far;
     ssdgs_real r[16], f[16], derivatives[48];
     medium m;
@@ -435,7 +469,8 @@ static void test_dipole_points(void) {
                     p[0] = m.ss, p[1] = m.sa, p[2] = (double)r[i];
                     want = profile(p, &m);
                     worst[0] = max(worst[0], gap((double)f[i] / want, 1));
-                    for (j = 0; j < 3; j++) { /* as a share of R / p, which is the derivative's size where it does not pass 0 */
+                    for (j = 0; j < 3; j++) { /* as a share of R / p, which is the derivative's size where it
+                                                 does not pass 0 */
                         const double d = slope(profile, p, j, &m, j < 2 ? 5e-5 : 1e-4);
                         worst[1] = max(worst[1], gap((double)derivatives[16 * j + i], d) * p[j] / want);
                     }
@@ -446,8 +481,10 @@ static void test_dipole_points(void) {
                 for (i = 0; i < 16; i++) r[i] = (ssdgs_real)extremes[grid][2];
                 kernel_profile(&m, r, 16, f, derivatives);
                 far = profile(extremes[grid], &m); /* exponents beyond 87 saturate */
-                if (!CHECK(gap((double)f[0], far) <= 1e-36 + 100 * eps * far) || !CHECK(k->finite(derivatives, 48)))
-                    printf("    %s, %s, extreme %d: got %g, want %g\n", isa_name(), form_name[m.form], grid, (double)f[0], far);
+                if (!CHECK(gap((double)f[0], far) <= 1e-36 + 100 * eps * far) ||
+                    !CHECK(k->finite(derivatives, 48)))
+                    printf("    %s, %s, extreme %d: got %g, want %g\n", isa_name(), form_name[m.form], grid,
+                           (double)f[0], far);
             }
         }
     }
@@ -457,8 +494,8 @@ static void test_dipole_points(void) {
     figure("dipole_derivative_error", worst[1]);
 }
 
-/* Chandrasekhar's exact reflectance of a half space of isotropic scatterers, lit along its normal: 1 - sqrt(1 - alpha) H(1), with
-   H(u) = 1 / (sqrt(1 - alpha) + alpha / 2 int v H(v) / (u + v) dv). */
+/* Chandrasekhar's exact reflectance of a half space of isotropic scatterers, lit along its normal: 1 - sqrt(1
+   - alpha) H(1), with H(u) = 1 / (sqrt(1 - alpha) + alpha / 2 int v H(v) / (u + v) dv). */
 static double half_space(double alpha) {
     enum { STEPS = 400 };
     double h[STEPS + 1], sum = 0;
@@ -478,9 +515,13 @@ static double half_space(double alpha) {
 
 /* What diffusion theory misses of it at eta 1, and how well Burley's albedo fits. */
 static void test_half_space(void) {
-    static const struct { double ss, sa, exact, dipole; } published[] = {
-        {0.05, 2.05, 0.003709, -0.36}, {1.05, 1.05, 0.115226, -0.238}, {0.5, 0.05, 0.432242, -0.065}, {1.05, 0.05, 0.551029, -9},
-        {2.05, 0.05, 0.647681, -0.019}};
+    static const struct {
+        double ss, sa, exact, dipole;
+    } published[] = {{0.05, 2.05, 0.003709, -0.36},
+                     {1.05, 1.05, 0.115226, -0.238},
+                     {0.5, 0.05, 0.432242, -0.065},
+                     {1.05, 0.05, 0.551029, -9},
+                     {2.05, 0.05, 0.647681, -0.019}};
     double burley = 0;
     size_t i;
     k = ssdgs__table(isa = SSDGS_ISA_SCALAR);
@@ -503,13 +544,21 @@ static void test_half_space(void) {
 
 /* ---- the highlight: Fresnel x ASG ---- */
 
-enum { POSITION = 0, TURN = 3, WEIGHTS = 7, LIGHT = 15, EYE = 18, PARAMETERS = 21 }; /* of a Gaussian's highlight */
+enum {
+    POSITION = 0,
+    TURN = 3,
+    WEIGHTS = 7,
+    LIGHT = 15,
+    EYE = 18,
+    PARAMETERS = 21
+}; /* of a Gaussian's highlight */
 typedef struct lobes {
     int angular;
     double eta, q[SSDGS_ASG_COUNT][4], sharpness[SSDGS_ASG_COUNT][2], sigma[SSDGS_ASG_COUNT];
 } lobes;
 static ssdgs_real gauss[SSDGS_CHANNELS * BLOCK], rows[SSDGS__ROWS * BLOCK];
-static ssdgs_real dgauss[SSDGS_CHANNELS * BLOCK], drows[SSDGS__ROWS * BLOCK], lane_sums[SSDGS__LANE_SUMS * 16];
+static ssdgs_real dgauss[SSDGS_CHANNELS * BLOCK], drows[SSDGS__ROWS * BLOCK],
+    lane_sums[SSDGS__LANE_SUMS * 16];
 
 /* v seen from the frame q: v' = v + 2 u x (u x v - w v) of the unit quaternion (w, u). */
 static void into_frame(const double q[4], const double v[3], double to[3]) {
@@ -545,10 +594,12 @@ static double highlight(const double *p, const void *with) {
         if (!l->angular) {
             d += weight * exp(-exp(s[0]) * b[0] * b[0] - exp(s[1]) * b[1] * b[1]);
         } else {
-            const double across = sqrt(b[0] * b[0] + b[1] * b[1]), turn = across > 0 ? atan2(across, b[2]) / across : 1;
+            const double across = sqrt(b[0] * b[0] + b[1] * b[1]),
+                         turn = across > 0 ? atan2(across, b[2]) / across : 1;
             const double x = turn * b[0] * (1 + exp(-s[0])) / 10, y = turn * b[1] * (1 + exp(-s[1])) / 10;
             const double sigma = log1p(exp(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1))) / (1 + exp(-l->sigma[j]));
-            d += weight * exp(-(x * x + y * y) / (2 * sigma * sigma)) / (sqrt(2.0) * pow(PI, 2.0 / 3) * sigma);
+            d +=
+                weight * exp(-(x * x + y * y) / (2 * sigma * sigma)) / (sqrt(2.0) * pow(PI, 2.0 / 3) * sigma);
         }
     }
     return (0.04 + 0.96 * pow(1 - cosine, 5)) * d;
@@ -567,18 +618,22 @@ static ssdgs__lighting lighting(const lobes *l, const double *p) {
     frame.settings.asg = l->angular ? SSDGS_ASG_ANGULAR : SSDGS_ASG_GEOMETRIC;
     frame.terms = SSDGS_SPECULAR_TERM;
     frame.lights = &light;
-    for (i = 0; i < 3; i++) light.position[i] = (ssdgs_real)p[LIGHT + i], frame.eye[i] = (ssdgs_real)p[EYE + i];
+    for (i = 0; i < 3; i++)
+        light.position[i] = (ssdgs_real)p[LIGHT + i], frame.eye[i] = (ssdgs_real)p[EYE + i];
     for (j = 0; j < SSDGS_ASG_COUNT; j++) {
         for (i = 0; i < 4; i++) basis[4 * j + i] = (ssdgs_real)l->q[j][i];
         for (i = 0; i < 2; i++) sharpness[2 * j + i] = (ssdgs_real)l->sharpness[j][i];
         sigma[j] = (ssdgs_real)l->sigma[j];
     }
-    frame.gaussians.asg_basis = basis, frame.gaussians.asg_sharpness = sharpness, frame.gaussians.asg_sigma = sigma;
+    frame.gaussians.asg_basis = basis, frame.gaussians.asg_sharpness = sharpness,
+    frame.gaussians.asg_sigma = sigma;
     return ssdgs__lighting_of(&frame, 0);
 }
 
 static int channel_of(int parameter) {
-    const int group = parameter < TURN ? SSDGS_POSITION : parameter < WEIGHTS ? SSDGS_FRAME - TURN : SSDGS_ASG_WEIGHT - WEIGHTS;
+    const int group = parameter < TURN      ? SSDGS_POSITION
+                      : parameter < WEIGHTS ? SSDGS_FRAME - TURN
+                                            : SSDGS_ASG_WEIGHT - WEIGHTS;
     return parameter + group;
 }
 
@@ -599,7 +654,7 @@ static int reflect(const ssdgs__lighting *light) {
     k->reflect(light, gauss, rows);
     k->reflect_backward(light, gauss, drows, dgauss, lane_sums);
     return k->finite(rows, SSDGS__ROWS * BLOCK) && k->finite(dgauss, SSDGS_CHANNELS * BLOCK) &&
-        k->finite(lane_sums, SSDGS__LANE_SUMS * 16);
+           k->finite(lane_sums, SSDGS__LANE_SUMS * 16);
 }
 
 /* Lobes turned at random, each moderate; p: frame and weights at random, light and eye apart. */
@@ -629,7 +684,8 @@ static void test_asg_points(void) {
                 memset(sums, 0, sizeof sums);
                 for (i = 0; i < BLOCK; i++) {
                     random_lobes(&l, p, form, 5000 * (uint64_t)round);
-                    for (c = 0; c < LIGHT; c++) p[c] = 2 * draw((uint64_t)(100000 * round + LIGHT * i + c)) - 1;
+                    for (c = 0; c < LIGHT; c++)
+                        p[c] = 2 * draw((uint64_t)(100000 * round + LIGHT * i + c)) - 1;
                     put(p, i);
                     want[i] = highlight(p, &l);
                     for (c = 0; c < PARAMETERS; c++) {
@@ -642,7 +698,8 @@ static void test_asg_points(void) {
                 CHECK(reflect(&light));
                 for (i = 0; i < BLOCK; i++) {
                     worst[form] = max(worst[form], gap((double)rows[SSDGS__GLOSS * BLOCK + i] / want[i], 1));
-                    for (c = 0; c < LIGHT; c++) got[LIGHT * i + c] = (double)dgauss[channel_of(c) * BLOCK + i];
+                    for (c = 0; c < LIGHT; c++)
+                        got[LIGHT * i + c] = (double)dgauss[channel_of(c) * BLOCK + i];
                 }
                 for (c = 0; c < 6; c++)
                     for (lane = 0; lane < 16; lane++) sums[1][c] += (double)lane_sums[16 * c + lane];
@@ -662,147 +719,158 @@ static double bessel_i0(double x) {
     return sum;
 }
 
-/* Light and eye in one place make h any direction at F = F0. One lobe, turned within a turned frame, over the hemisphere about
-   its own pole, by the cosine: the midpoint rule around, Simpson's in the angle; against the one integral that is left when the
-   other is done by hand. */
+/* Light and eye in one place make h any direction at F = F0. One lobe, turned within a turned frame, over the
+   hemisphere about its own pole, by the cosine: the midpoint rule around, Simpson's in the angle; against the
+   one integral that is left when the other is done by hand. */
 static void test_asg_integral(void) {
-    static const struct { int angular; double a, b; } cases[] = {{0, 1, 1}, {0, 2, 2}, {0, 10, 10}, {0, 1, 20}, {0, 30, 3},
-        {1, 0, 0}, {1, -2, 1}, {1, -3, -2}};
+    static const struct {
+        int angular;
+        double a, b;
+    } cases[] = {{0, 1, 1},  {0, 2, 2}, {0, 10, 10}, {0, 1, 20},
+                 {0, 30, 3}, {1, 0, 0}, {1, -2, 1},  {1, -3, -2}};
     enum { AROUND = 64, DOWN = 200 };
     double worst = 0;
     size_t c;
     int i, j, n;
     EVERY_ISA
-        for (c = 0; c < sizeof cases / sizeof *cases; c++) {
-            double p[PARAMETERS], back[4], sum = 0, want = 0, sigma;
-            const int lobe = 3;
-            lobes l;
-            ssdgs__lighting light;
-            random_lobes(&l, p, cases[c].angular, 700 + c);
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) p[WEIGHTS + j] = -100;
-            p[WEIGHTS + lobe] = log(exp(1.0) - 1); /* softplus makes it 1 */
-            for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
-            l.sharpness[lobe][0] = cases[c].angular ? cases[c].a : log(cases[c].a);
-            l.sharpness[lobe][1] = cases[c].angular ? cases[c].b : log(cases[c].b);
-            sigma = log1p(exp(-2 + 2.0 * lobe / 7)) / (1 + exp(-l.sigma[lobe]));
-            light = lighting(&l, p);
-            for (n = 0; n <= DOWN; n++) {
-                const double theta = PI / 2 * n / DOWN, simpson = (n == 0 || n == DOWN ? 1 : n % 2 ? 4 : 2) * PI / 2 / DOWN / 3;
-                const double ring = 2 * PI * simpson * cos(theta) * sin(theta);
-                for (i = 0; i < AROUND; i++) {
-                    const double phi = 2 * PI * (i + 0.5) / AROUND;
-                    double h[3];
-                    h[0] = sin(theta) * cos(phi), h[1] = sin(theta) * sin(phi), h[2] = cos(theta);
-                    for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * l.q[lobe][j];
-                    into_frame(back, h, h);
-                    for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * p[TURN + j];
-                    into_frame(back, h, h);
-                    for (j = 0; j < 3; j++) p[j] = -h[j]; /* the light stands at the origin */
-                    put(p, i);
-                }
-                k->reflect(&light, gauss, rows);
-                for (i = 0; i < AROUND; i++) sum += ring / AROUND * (double)rows[SSDGS__GLOSS * BLOCK + i] / 0.04;
-                if (cases[c].angular) {
-                    const double a = pow((1 + exp(-cases[c].a)) / 10, 2), b = pow((1 + exp(-cases[c].b)) / 10, 2);
-                    const double t = theta * theta / (2 * sigma * sigma), peak = 1 / (sqrt(2.0) * pow(PI, 2.0 / 3) * sigma);
-                    want += ring * peak * exp(-t * (a + b) / 2) * bessel_i0(t * (a - b) / 2);
-                }
+    for (c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double p[PARAMETERS], back[4], sum = 0, want = 0, sigma;
+        const int lobe = 3;
+        lobes l;
+        ssdgs__lighting light;
+        random_lobes(&l, p, cases[c].angular, 700 + c);
+        for (j = 0; j < SSDGS_ASG_COUNT; j++) p[WEIGHTS + j] = -100;
+        p[WEIGHTS + lobe] = log(exp(1.0) - 1); /* softplus makes it 1 */
+        for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+        l.sharpness[lobe][0] = cases[c].angular ? cases[c].a : log(cases[c].a);
+        l.sharpness[lobe][1] = cases[c].angular ? cases[c].b : log(cases[c].b);
+        sigma = log1p(exp(-2 + 2.0 * lobe / 7)) / (1 + exp(-l.sigma[lobe]));
+        light = lighting(&l, p);
+        for (n = 0; n <= DOWN; n++) {
+            const double theta = PI / 2 * n / DOWN, simpson = (n == 0 || n == DOWN ? 1
+                                                               : n % 2             ? 4
+                                                                                   : 2) *
+                                                              PI / 2 / DOWN / 3;
+            const double ring = 2 * PI * simpson * cos(theta) * sin(theta);
+            for (i = 0; i < AROUND; i++) {
+                const double phi = 2 * PI * (i + 0.5) / AROUND;
+                double h[3];
+                h[0] = sin(theta) * cos(phi), h[1] = sin(theta) * sin(phi), h[2] = cos(theta);
+                for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * l.q[lobe][j];
+                into_frame(back, h, h);
+                for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * p[TURN + j];
+                into_frame(back, h, h);
+                for (j = 0; j < 3; j++) p[j] = -h[j]; /* the light stands at the origin */
+                put(p, i);
             }
-            for (i = 0; !cases[c].angular && i < 4096; i++) {
-                const double phi = 2 * PI * i / 4096, g = cases[c].a * pow(cos(phi), 2) + cases[c].b * pow(sin(phi), 2);
-                want -= 2 * PI / 4096 * expm1(-g) / (2 * g);
+            k->reflect(&light, gauss, rows);
+            for (i = 0; i < AROUND; i++) sum += ring / AROUND * (double)rows[SSDGS__GLOSS * BLOCK + i] / 0.04;
+            if (cases[c].angular) {
+                const double a = pow((1 + exp(-cases[c].a)) / 10, 2), b = pow((1 + exp(-cases[c].b)) / 10, 2);
+                const double t = theta * theta / (2 * sigma * sigma),
+                             peak = 1 / (sqrt(2.0) * pow(PI, 2.0 / 3) * sigma);
+                want += ring * peak * exp(-t * (a + b) / 2) * bessel_i0(t * (a - b) / 2);
             }
-            worst = max(worst, gap(sum / want, 1));
         }
+        for (i = 0; !cases[c].angular && i < 4096; i++) {
+            const double phi = 2 * PI * i / 4096,
+                         g = cases[c].a * pow(cos(phi), 2) + cases[c].b * pow(sin(phi), 2);
+            want -= 2 * PI / 4096 * expm1(-g) / (2 * g);
+        }
+        worst = max(worst, gap(sum / want, 1));
+    }
     CHECK(worst < 1e-6); /* Simpson's rule is left with 1e-8 */
     figure("asg_integral_error", worst);
 }
 
-/* Around a lobe's pole the angular form takes theta / s from its series. At the other pole its direction is undefined. */
+/* Around a lobe's pole the angular form takes theta / s from its series. At the other pole its direction is
+   undefined. */
 static void test_asg_poles(void) {
-    static const double theta[] = {0, 1e-12, 1e-9, 1e-8, 1e-6, 9e-5, 1.1e-4, 1e-3, 1e-2,
-                                   0.1, 0.41, 0.42, 1.5, 1.5707963, 1.6, 3, 3.14, PI};
+    static const double theta[] = {0,   1e-12, 1e-9, 1e-8, 1e-6,      9e-5, 1.1e-4, 1e-3, 1e-2,
+                                   0.1, 0.41,  0.42, 1.5,  1.5707963, 1.6,  3,      3.14, PI};
     enum { CASES = sizeof theta / sizeof *theta };
     double worst[2] = {0, 0};
     int form, i, j, c;
     EVERY_ISA
-        for (form = 0; form < 2; form++) {
-            double p[PARAMETERS];
-            lobes l;
-            ssdgs__lighting light;
-            random_lobes(&l, p, form, 900);
-            for (j = 0; j < SSDGS_ASG_COUNT; j++)
-                for (i = 0; i < 4; i++) l.q[j][i] = i == 0;
-            for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
-            for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
-            light = lighting(&l, p);
-            for (i = 0; i < BLOCK; i++) {
-                p[0] = -sin(theta[i % CASES]) * 0.6, p[1] = -sin(theta[i % CASES]) * 0.8, p[2] = -cos(theta[i % CASES]);
-                put(p, i);
-            }
-            CHECK(reflect(&light));
-            for (i = 0; i < CASES - 1; i++) {
-                double want, size = 0, off = 0;
-                for (c = 0; c < 3; c++) p[c] = (double)gauss[(SSDGS_POSITION + c) * BLOCK + i];
-                want = highlight(p, &l);
-                worst[0] = max(worst[0], gap((double)rows[SSDGS__GLOSS * BLOCK + i] / want, 1));
-                for (c = 0; c < 3; c++) {
-                    const double d = slope(highlight, p, c, &l, 1e-5);
-                    size += fabs(d), off += gap((double)dgauss[(SSDGS_POSITION + c) * BLOCK + i], d);
-                }
-                worst[1] = max(worst[1], off / (size + want));
-            }
+    for (form = 0; form < 2; form++) {
+        double p[PARAMETERS];
+        lobes l;
+        ssdgs__lighting light;
+        random_lobes(&l, p, form, 900);
+        for (j = 0; j < SSDGS_ASG_COUNT; j++)
+            for (i = 0; i < 4; i++) l.q[j][i] = i == 0;
+        for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
+        for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+        light = lighting(&l, p);
+        for (i = 0; i < BLOCK; i++) {
+            p[0] = -sin(theta[i % CASES]) * 0.6, p[1] = -sin(theta[i % CASES]) * 0.8,
+            p[2] = -cos(theta[i % CASES]);
+            put(p, i);
         }
+        CHECK(reflect(&light));
+        for (i = 0; i < CASES - 1; i++) {
+            double want, size = 0, off = 0;
+            for (c = 0; c < 3; c++) p[c] = (double)gauss[(SSDGS_POSITION + c) * BLOCK + i];
+            want = highlight(p, &l);
+            worst[0] = max(worst[0], gap((double)rows[SSDGS__GLOSS * BLOCK + i] / want, 1));
+            for (c = 0; c < 3; c++) {
+                const double d = slope(highlight, p, c, &l, 1e-5);
+                size += fabs(d), off += gap((double)dgauss[(SSDGS_POSITION + c) * BLOCK + i], d);
+            }
+            worst[1] = max(worst[1], off / (size + want));
+        }
+    }
     CHECK(worst[0] < 30 * eps);
     CHECK(worst[1] < 20 * eps + 3e-8); /* 3e-8: the differences' own */
     figure("asg_pole_error", worst[0]);
     figure("asg_pole_gradient_error", worst[1]);
 }
 
-/* With lambda = mu = 0 the highlight is Fresnel's factor alone. The Gaussian lies between light and eye, off their line by all
-   orders: wi turns into -wo, wo.h goes from 1 to 0, where h has no direction left. The sum wi + wo keeps what its size leaves of
-   eps. */
+/* With lambda = mu = 0 the highlight is Fresnel's factor alone. The Gaussian lies between light and eye, off
+   their line by all orders: wi turns into -wo, wo.h goes from 1 to 0, where h has no direction left. The sum
+   wi + wo keeps what its size leaves of eps. */
 static void test_fresnel(void) {
     double worst = 0, lowest = 1, highest = 0;
     int i, j, round;
     EVERY_ISA
-        for (round = 0; round < 40; round++) {
-            double p[PARAMETERS];
-            lobes l;
-            ssdgs__lighting light;
-            random_lobes(&l, p, 0, 1000 + 100 * (uint64_t)round);
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                l.sharpness[j][0] = l.sharpness[j][1] = -100;
-                p[WEIGHTS + j] = j ? -100 : log(exp(1.0) - 1);
-            }
-            for (j = 0; j < 3; j++) { /* every other round in one place: wo.h = 1, or an ulp more or less */
-                p[LIGHT + j] = 2 * draw((uint64_t)(7 * round + j)) - 1;
-                p[EYE + j] = (round % 2 ? 1 : -1) * p[LIGHT + j];
-            }
-            light = lighting(&l, p);
-            for (i = 0; i < BLOCK; i++) {
-                const double off = i == 0 ? 0 : pow(10, -9.0 * i / (BLOCK - 1) + 1);
-                for (j = 0; j < 3; j++) p[j] = off * (2 * draw((uint64_t)(BLOCK * 3 * round + 3 * i + j)) - 1);
-                put(p, i);
-            }
-            CHECK(reflect(&light));
-            for (i = 0; i < BLOCK; i++) {
-                const double got = (double)rows[SSDGS__GLOSS * BLOCK + i];
-                double sum[3], apart, want;
-                for (j = 0; j < 3; j++) {
-                    p[j] = (double)gauss[(SSDGS_POSITION + j) * BLOCK + i];
-                    sum[j] = (double)(rows[(SSDGS__WI + j) * BLOCK + i] + rows[(SSDGS__WO + j) * BLOCK + i]);
-                }
-                apart = unit(sum);
-                if (apart < 1.1e-6) {
-                    if (apart < 0.9e-6) CHECK(got == 0 && dgauss[SSDGS_POSITION * BLOCK + i] == 0); /* no half vector */
-                    continue;
-                }
-                want = highlight(p, &l);
-                lowest = -max(-lowest, -got), highest = max(highest, got);
-                worst = max(worst, gap(got, want) * apart / eps);
-            }
+    for (round = 0; round < 40; round++) {
+        double p[PARAMETERS];
+        lobes l;
+        ssdgs__lighting light;
+        random_lobes(&l, p, 0, 1000 + 100 * (uint64_t)round);
+        for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+            l.sharpness[j][0] = l.sharpness[j][1] = -100;
+            p[WEIGHTS + j] = j ? -100 : log(exp(1.0) - 1);
         }
+        for (j = 0; j < 3; j++) { /* every other round in one place: wo.h = 1, or an ulp more or less */
+            p[LIGHT + j] = 2 * draw((uint64_t)(7 * round + j)) - 1;
+            p[EYE + j] = (round % 2 ? 1 : -1) * p[LIGHT + j];
+        }
+        light = lighting(&l, p);
+        for (i = 0; i < BLOCK; i++) {
+            const double off = i == 0 ? 0 : pow(10, -9.0 * i / (BLOCK - 1) + 1);
+            for (j = 0; j < 3; j++) p[j] = off * (2 * draw((uint64_t)(BLOCK * 3 * round + 3 * i + j)) - 1);
+            put(p, i);
+        }
+        CHECK(reflect(&light));
+        for (i = 0; i < BLOCK; i++) {
+            const double got = (double)rows[SSDGS__GLOSS * BLOCK + i];
+            double sum[3], apart, want;
+            for (j = 0; j < 3; j++) {
+                p[j] = (double)gauss[(SSDGS_POSITION + j) * BLOCK + i];
+                sum[j] = (double)(rows[(SSDGS__WI + j) * BLOCK + i] + rows[(SSDGS__WO + j) * BLOCK + i]);
+            }
+            apart = unit(sum);
+            if (apart < 1.1e-6) {
+                if (apart < 0.9e-6)
+                    CHECK(got == 0 && dgauss[SSDGS_POSITION * BLOCK + i] == 0); /* no half vector */
+                continue;
+            }
+            want = highlight(p, &l);
+            lowest = -max(-lowest, -got), highest = max(highest, got);
+            worst = max(worst, gap(got, want) * apart / eps);
+        }
+    }
     CHECK(lowest >= 0.04 * (1 - 2 * eps) && highest <= 1 + 4 * eps);
     CHECK(worst < 40);
     figure("fresnel_least", lowest);
@@ -815,31 +883,36 @@ static void test_asg_extremes(void) {
     static const double raw[3] = {-100, 0, 100};
     int form, grid, i, j;
     EVERY_ISA
-        for (form = 0; form < 2; form++)
-            for (grid = 0; grid < 27; grid++) {
-                double p[PARAMETERS];
-                lobes l;
-                ssdgs__lighting light;
-                random_lobes(&l, p, form, 900);
-                for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                    l.sharpness[j][0] = raw[grid % 3], l.sharpness[j][1] = raw[grid / 3 % 3], l.sigma[j] = raw[grid / 9];
-                    for (i = 0; i < 4; i++) l.q[j][i] = j % 2 ? l.q[j][i] : i == 0; /* half of them: poles that h may meet */
-                }
-                for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
-                for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
-                light = lighting(&l, p);
-                for (i = 0; i < BLOCK; i++) {
-                    for (j = 0; j < 3; j++) p[j] = i ? 2 * draw((uint64_t)(3 * i + j)) - 1 : j == 2 ? -1 : 0;
-                    put(p, i);
-                }
-                if (!CHECK(reflect(&light))) printf("    %s, form %d, case %d\n", isa_name(), form, grid);
+    for (form = 0; form < 2; form++)
+        for (grid = 0; grid < 27; grid++) {
+            double p[PARAMETERS];
+            lobes l;
+            ssdgs__lighting light;
+            random_lobes(&l, p, form, 900);
+            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+                l.sharpness[j][0] = raw[grid % 3], l.sharpness[j][1] = raw[grid / 3 % 3],
+                l.sigma[j] = raw[grid / 9];
+                for (i = 0; i < 4; i++)
+                    l.q[j][i] = j % 2 ? l.q[j][i] : i == 0; /* half of them: poles that h may meet */
             }
+            for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
+            for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+            light = lighting(&l, p);
+            for (i = 0; i < BLOCK; i++) {
+                for (j = 0; j < 3; j++) p[j] = i ? 2 * draw((uint64_t)(3 * i + j)) - 1 : j == 2 ? -1 : 0;
+                put(p, i);
+            }
+            if (!CHECK(reflect(&light))) printf("    %s, form %d, case %d\n", isa_name(), form, grid);
+        }
 }
 
-/* The index of refraction sets the virtual source's depth, and is refused where its fit breaks down (3.85: infinite). */
+/* The index of refraction sets the virtual source's depth, and is refused where its fit breaks down (3.85:
+   infinite). */
 static void test_eta(void) {
-    static const struct { double eta; int good; } etas[] = {
-        {1, 1}, {1.3, 1}, {2.5, 1}, {0.8, 0}, {2.6, 0}, {3.84, 0}, {3.85, 0}, {-1.3, 0}};
+    static const struct {
+        double eta;
+        int good;
+    } etas[] = {{1, 1}, {1.3, 1}, {2.5, 1}, {0.8, 0}, {2.6, 0}, {3.84, 0}, {3.85, 0}, {-1.3, 0}};
     ssdgs_context *context = NULL;
     double p[PARAMETERS];
     lobes l;
@@ -853,7 +926,9 @@ static void test_eta(void) {
         ssdgs_model_destroy(model);
         random_lobes(&l, p, 0, 1);
         l.eta = etas[i].eta;
-        if (etas[i].good) CHECK(gap((double)lighting(&l, p).virtual_depth / boundary((double)(ssdgs_real)l.eta), 1) < 4 * eps + 16 * DBL_EPSILON); /* at 2.5 doubles cancel to 0.12 */
+        if (etas[i].good)
+            CHECK(gap((double)lighting(&l, p).virtual_depth / boundary((double)(ssdgs_real)l.eta), 1) <
+                  4 * eps + 16 * DBL_EPSILON); /* at 2.5 doubles cancel to 0.12 */
     }
     ssdgs_context_destroy(context);
 }

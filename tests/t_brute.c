@@ -1,4 +1,5 @@
-/* Both passes against every pixel x every Gaussian, sorted, no tiles, in double and from the formulas alone; also as real64. */
+/* Both passes against every pixel x every Gaussian, sorted, no tiles, in double and from the formulas alone;
+   also as real64. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -12,12 +13,16 @@ typedef struct scene {
     ssdgs_render_options options;
     ssdgs_camera camera;
     ssdgs_light lights[2];
-    ssdgs_real raw[SSDGS_CHANNELS][MOST], basis[SSDGS_ASG_COUNT * 4], sharpness[SSDGS_ASG_COUNT * 2], sigma[SSDGS_ASG_COUNT];
+    ssdgs_real raw[SSDGS_CHANNELS][MOST], basis[SSDGS_ASG_COUNT * 4], sharpness[SSDGS_ASG_COUNT * 2],
+        sigma[SSDGS_ASG_COUNT];
 } scene;
 
-typedef struct planes { ssdgs_real color[PIXELS * 3], alpha[PIXELS], depth[PIXELS]; } planes;
+typedef struct planes {
+    ssdgs_real color[PIXELS * 3], alpha[PIXELS], depth[PIXELS];
+} planes;
 
-static ssdgs_context *contexts[SSDGS_ISA_COUNT][2]; /* with one thread and with three; NULL where the CPU lacks it */
+static ssdgs_context
+    *contexts[SSDGS_ISA_COUNT][2]; /* with one thread and with three; NULL where the CPU lacks it */
 static scene s;
 static planes image[2];
 
@@ -90,7 +95,8 @@ static ssdgs_model *make_model(ssdgs_context *context) {
     size_t c, i;
     if (!CHECK(!ssdgs_model_create(context, &s.settings, s.count, &model))) exit(1);
     v = ssdgs_model_get(model);
-    for (c = 0; c < SSDGS_CHANNELS; c++) memcpy(v.gaussians + c * v.stride, s.raw[c], (size_t)s.count * sizeof(ssdgs_real));
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        memcpy(v.gaussians + c * v.stride, s.raw[c], (size_t)s.count * sizeof(ssdgs_real));
     memcpy(v.asg_basis, s.basis, sizeof s.basis);
     memcpy(v.asg_sharpness, s.sharpness, sizeof s.sharpness);
     memcpy(v.asg_sigma, s.sigma, sizeof s.sigma);
@@ -122,9 +128,15 @@ typedef struct lens {
 
 /* A Gaussian's colour; deferred, what pixels blend instead, of two lights. V: its visibility. */
 enum { COLOR = 0, Q = 3, F0 = 12, SOFT = 13, V = 14, N = 16, M = 19, D = 25, VALUES = 31 };
-typedef struct shaded { double value[VALUES]; int sure; } shaded;
+typedef struct shaded {
+    double value[VALUES];
+    int sure;
+} shaded;
 
-typedef struct splat { double x, y, a, b, c, opacity, depth; int index; } splat; /* centre, conic */
+typedef struct splat {
+    double x, y, a, b, c, opacity, depth;
+    int index;
+} splat; /* centre, conic */
 
 static gaussian all[MOST];
 static lens faces[6]; /* of the first light's map */
@@ -164,8 +176,10 @@ static void read_gaussians(void) {
         g->f0 = sigmoid(RAW(SSDGS_ASG_WEIGHT + 2) + log(0.04 / 0.96));
         g->soft = sigmoid(RAW(SSDGS_ASG_WEIGHT + 3));
         g->opacity = sigmoid(RAW(SSDGS_OPACITY));
-        rotation(RAW(SSDGS_ROTATION), RAW(SSDGS_ROTATION + 1), RAW(SSDGS_ROTATION + 2), RAW(SSDGS_ROTATION + 3), g->axes);
-        rotation(RAW(SSDGS_FRAME), RAW(SSDGS_FRAME + 1), RAW(SSDGS_FRAME + 2), RAW(SSDGS_FRAME + 3), g->frame);
+        rotation(RAW(SSDGS_ROTATION), RAW(SSDGS_ROTATION + 1), RAW(SSDGS_ROTATION + 2),
+                 RAW(SSDGS_ROTATION + 3), g->axes);
+        rotation(RAW(SSDGS_FRAME), RAW(SSDGS_FRAME + 1), RAW(SSDGS_FRAME + 2), RAW(SSDGS_FRAME + 3),
+                 g->frame);
 #undef RAW
     }
 }
@@ -174,7 +188,8 @@ static lens camera_lens(void) {
     lens l;
     int i;
     memset(&l, 0, sizeof l);
-    l.fx = (double)s.camera.fx, l.fy = (double)s.camera.fy, l.cx = (double)s.camera.cx, l.cy = (double)s.camera.cy;
+    l.fx = (double)s.camera.fx, l.fy = (double)s.camera.fy, l.cx = (double)s.camera.cx,
+    l.cy = (double)s.camera.cy;
     for (i = 0; i < 12; i++) l.view[i] = (double)s.camera.view[i];
     l.near_plane = s.camera.near_plane > 0 ? (double)s.camera.near_plane : 0.01;
     l.variance = (double)s.settings.pixel_variance;
@@ -216,16 +231,19 @@ static int project(const lens *l, const gaussian *g, splat *out) {
             for (k = 0, sigma[3 * i + j] = 0; k < 3; k++)
                 sigma[3 * i + j] += g->axes[3 * i + k] * g->scale[k] * g->scale[k] * g->axes[3 * j + k];
     for (j = 0; j < 3; j++) {
-        w[j] = l->orthographic ? l->fx * l->view[j] : l->fx / t[2] * l->view[j] - l->fx * t[0] / (t[2] * t[2]) * l->view[8 + j];
-        w[3 + j] = l->orthographic ? l->fy * l->view[4 + j]
-            : l->fy / t[2] * l->view[4 + j] - l->fy * t[1] / (t[2] * t[2]) * l->view[8 + j];
+        w[j] = l->orthographic ? l->fx * l->view[j]
+                               : l->fx / t[2] * l->view[j] - l->fx * t[0] / (t[2] * t[2]) * l->view[8 + j];
+        w[3 + j] = l->orthographic
+                       ? l->fy * l->view[4 + j]
+                       : l->fy / t[2] * l->view[4 + j] - l->fy * t[1] / (t[2] * t[2]) * l->view[8 + j];
     }
     for (m = 0; m < 3; m++) /* xx, xy, yy */
         for (i = 0, cov[m] = 0; i < 3; i++)
             for (j = 0; j < 3; j++) cov[m] += w[(m > 1) * 3 + i] * sigma[3 * i + j] * w[(m > 0) * 3 + j];
     det0 = cov[0] * cov[2] - cov[1] * cov[1];
     h = l->variance;
-    if (l->floor) h -= 0.5 * (cov[0] + cov[2]) - sqrt(0.25 * (cov[0] - cov[2]) * (cov[0] - cov[2]) + cov[1] * cov[1]);
+    if (l->floor)
+        h -= 0.5 * (cov[0] + cov[2]) - sqrt(0.25 * (cov[0] - cov[2]) * (cov[0] - cov[2]) + cov[1] * cov[1]);
     h = h > 0 ? h : 0;
     det = (cov[0] + h) * (cov[2] + h) - cov[1] * cov[1];
     out->a = (cov[2] + h) / det, out->b = -cov[1] / det, out->c = (cov[0] + h) / det;
@@ -241,8 +259,8 @@ static int nearer(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Beside the camera and reaching back to the plane z = 0: not drawn, as the affine projection is off by nearly half there (the table
-   of projection_error()). */
+/* Beside the camera and reaching back to the plane z = 0: not drawn, as the affine projection is off by
+   nearly half there (the table of projection_error()). */
 static int beside(const lens *l, const gaussian *g) {
     double t[3], variance = 0;
     int k;
@@ -251,7 +269,8 @@ static int beside(const lens *l, const gaussian *g) {
         const double axis[3] = {g->axes[k], g->axes[3 + k], g->axes[6 + k]};
         variance += pow(g->scale[k] * dot(axis, l->view + 8), 2);
     }
-    return !l->orthographic && (fabs(t[0]) > 1.5 * t[2] || fabs(t[1]) > 1.5 * t[2]) && 5 * sqrt(variance) >= t[2];
+    return !l->orthographic && (fabs(t[0]) > 1.5 * t[2] || fabs(t[1]) > 1.5 * t[2]) &&
+           5 * sqrt(variance) >= t[2];
 }
 
 static int project_all(const lens *l, splat *out) {
@@ -269,12 +288,14 @@ static double response(const splat *p, double x, double y) {
 
 static void camera_centre(double eye[3]) {
     int i;
-    for (i = 0; i < 3; i++) eye[i] = -((double)s.camera.view[i] * (double)s.camera.view[3] + (double)s.camera.view[4 + i] *
-        (double)s.camera.view[7] + (double)s.camera.view[8 + i] * (double)s.camera.view[11]);
+    for (i = 0; i < 3; i++)
+        eye[i] = -((double)s.camera.view[i] * (double)s.camera.view[3] +
+                   (double)s.camera.view[4 + i] * (double)s.camera.view[7] +
+                   (double)s.camera.view[8 + i] * (double)s.camera.view[11]);
 }
 
-/* Eqs. 3, 9 to 12 without scattering; visibility: S per light and Gaussian, NULL = 1. Not sure where wi + wo nearly cancels,
-   so float knows no half vector. */
+/* Eqs. 3, 9 to 12 without scattering; visibility: S per light and Gaussian, NULL = 1. Not sure where wi + wo
+   nearly cancels, so float knows no half vector. */
 static void shade(const gaussian *g, int index, const double *visibility, shaded *out) {
     double wo[3], eye[3], *color = out->value + COLOR;
     int i, j, light;
@@ -286,7 +307,8 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
     out->value[SOFT] = g->soft;
     for (i = 0; i < 3; i++) out->value[N + i] = g->frame[3 * i + 2];
     for (i = 0; i < 9; i++)
-        for (j = 0, out->value[Q + i] = 0; j < 2; j++) out->value[Q + i] += g->sharp[j] * g->frame[i / 3 * 3 + j] * g->frame[i % 3 * 3 + j];
+        for (j = 0, out->value[Q + i] = 0; j < 2; j++)
+            out->value[Q + i] += g->sharp[j] * g->frame[i / 3 * 3 + j] * g->frame[i % 3 * 3 + j];
     for (light = 0; light < s.light_count; light++) {
         const ssdgs_light *lamp = s.lights + light;
         const int directional = lamp->kind == SSDGS_LIGHT_DIRECTIONAL;
@@ -298,20 +320,27 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
         for (i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
         if (dot(h, h) < 0.01) out->sure = 0;
         normalise(h);
-        for (i = 0; i < 3; i++) local[i] = g->frame[i] * h[0] + g->frame[3 + i] * h[1] + g->frame[6 + i] * h[2];
+        for (i = 0; i < 3; i++)
+            local[i] = g->frame[i] * h[0] + g->frame[3 + i] * h[1] + g->frame[6 + i] * h[2];
         for (j = 0; j < SSDGS_ASG_COUNT; j++) {
             const ssdgs_real *q = s.basis + 4 * j, *sharp = s.sharpness + 2 * j;
             double r[9], p[3];
             rotation((double)q[0], (double)q[1], (double)q[2], (double)q[3], r);
             for (i = 0; i < 3; i++) p[i] = r[i] * local[0] + r[3 + i] * local[1] + r[6 + i] * local[2];
             if (s.settings.asg == SSDGS_ASG_GEOMETRIC) {
-                d += g->weight[j] * exp(-exp((double)sharp[0]) * p[0] * p[0] - exp((double)sharp[1]) * p[1] * p[1]);
+                d += g->weight[j] *
+                     exp(-exp((double)sharp[0]) * p[0] * p[0] - exp((double)sharp[1]) * p[1] * p[1]);
             } else {
-                const double theta = acos(p[2] < -1 ? -1 : p[2] > 1 ? 1 : p[2]), in_plane = sqrt(p[0] * p[0] + p[1] * p[1]);
+                const double theta = acos(p[2] < -1  ? -1
+                                          : p[2] > 1 ? 1
+                                                     : p[2]),
+                             in_plane = sqrt(p[0] * p[0] + p[1] * p[1]);
                 const double x = p[0] / in_plane / (10 * sigmoid((double)sharp[0]));
                 const double y = p[1] / in_plane / (10 * sigmoid((double)sharp[1]));
-                const double width = sigmoid((double)s.sigma[j]) * softplus(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
-                d += g->weight[j] * exp(-0.5 * pow(theta / width, 2) * (x * x + y * y)) / (sqrt(2.0) * pow(PI, 2.0 / 3) * width);
+                const double width =
+                    sigmoid((double)s.sigma[j]) * softplus(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
+                d += g->weight[j] * exp(-0.5 * pow(theta / width, 2) * (x * x + y * y)) /
+                     (sqrt(2.0) * pow(PI, 2.0 / 3) * width);
             }
         }
         fresnel = 0.04 + 0.96 * pow(1 - dot(wo, h), 5);
@@ -320,7 +349,8 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
         out->value[V + light] = visibility ? visibility[light * s.count + index] : 1;
         for (i = 0; i < 3; i++) {
             const double arrives = falloff * (double)lamp->intensity[i];
-            color[i] += (g->diffuse[i] * diffuse + g->specular[i] * fresnel * d) * arrives * out->value[V + light];
+            color[i] +=
+                (g->diffuse[i] * diffuse + g->specular[i] * fresnel * d) * arrives * out->value[V + light];
             out->value[M + 3 * light + i] = g->specular[i] * arrives;
             out->value[D + 3 * light + i] = g->diffuse[i] * diffuse * arrives;
             if (s.settings.asg == SSDGS_ASG_DEFERRED) color[i] = 0;
@@ -328,8 +358,9 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
     }
 }
 
-/* Transmittance to a distance along the ray of a map's pixel, of which the falls below three levels are known, all of these a
-   little higher or lower: from the light bias before a fall on it goes straight to what there was just before it. */
+/* Transmittance to a distance along the ray of a map's pixel, of which the falls below three levels are
+   known, all of these a little higher or lower: from the light bias before a fall on it goes straight to what
+   there was just before it. */
 static double passed(const splat *p, int n, int x, int y, double distance, double higher) {
     static const double level[3] = {0.9, 0.5, 0.1};
     const double thick = ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
@@ -339,14 +370,16 @@ static double passed(const splat *p, int n, int x, int y, double distance, doubl
         const double raw = response(p + k, x + 0.5, y + 0.5), above = t;
         if (raw < (double)s.options.alpha_threshold) continue;
         t *= 1 - (raw < 0.999 ? raw : 0.999);
-        for (; falls < 3 && t < level[falls] * higher; falls++) fall[falls] = p[k].depth, before[falls] = above, left[falls] = t;
+        for (; falls < 3 && t < level[falls] * higher; falls++)
+            fall[falls] = p[k].depth, before[falls] = above, left[falls] = t;
     }
     for (k = 0; k < falls && distance > fall[k]; k++) {}
     if (!k) return 1;
     if (k == 3) return t;
     if (k == falls) return left[k - 1];
     since = distance - fmax(fall[k] - thick, fall[k - 1]);
-    return since <= 0 ? left[k - 1] : left[k - 1] + (before[k] - left[k - 1]) * since / (since + fall[k] - distance);
+    return since <= 0 ? left[k - 1]
+                      : left[k - 1] + (before[k] - left[k - 1]) * since / (since + fall[k] - distance);
 }
 
 /* Visibility of a place from the first light. 0 where the last bits of float decide what is in the way. */
@@ -358,11 +391,12 @@ static int look(const double at[3], double *visibility) {
         double t[3], x, y, distance, sum[4] = {0, 0, 0, 0};
         int i, n, column, row;
         to_view(l, at, t);
-        x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx, y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
+        x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx,
+        y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
         if (!(t[2] > l->near_plane) || x < 0 || y < 0 || x > l->width || y > l->height) continue;
         n = project_all(l, p);
         distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-6) -
-            ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
+                   ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
         x = fmin(fmax(x - 0.5, 0), l->width - 1), y = fmin(fmax(y - 0.5, 0), l->height - 1);
         column = x < l->width - 1 ? (int)x : l->width - 2, row = y < l->height - 1 ? (int)y : l->height - 2;
         x -= column, y -= row;
@@ -379,28 +413,32 @@ static int look(const double at[3], double *visibility) {
     return -1;
 }
 
-/* Adds the diffuse and specular terms of a pixel whose Gaussians blend to b, at a depth; out[5]: what an error of the normal
-   is multiplied by. 0: not sure. */
+/* Adds the diffuse and specular terms of a pixel whose Gaussians blend to b, at a depth; out[5]: what an
+   error of the normal is multiplied by. 0: not sure. */
 static int highlight(const double b[VALUES], double depth, double x, double y, double out[6]) {
-    const double at[3] = {(x - (double)s.camera.cx) / (double)s.camera.fx, (y - (double)s.camera.cy) / (double)s.camera.fy, 1};
+    const double at[3] = {(x - (double)s.camera.cx) / (double)s.camera.fx,
+                          (y - (double)s.camera.cy) / (double)s.camera.fy, 1};
     double eye[3], ray[3], place[3], wo[3];
     int light, i, j, sure = 1;
     camera_centre(eye);
     for (i = 0; i < 3; i++) {
-        ray[i] = (double)s.camera.view[i] * at[0] + (double)s.camera.view[4 + i] * at[1] + (double)s.camera.view[8 + i];
+        ray[i] = (double)s.camera.view[i] * at[0] + (double)s.camera.view[4 + i] * at[1] +
+                 (double)s.camera.view[8 + i];
         place[i] = eye[i] + depth * ray[i];
         wo[i] = -ray[i];
     }
     normalise(wo);
     for (light = 0; light < s.light_count; light++) {
         const ssdgs_light *lamp = s.lights + light;
-        double wi[3], h[3], n[3], p[3], q[2] = {0, 0}, sum = 0, fresnel, microfacet, woh, visible = 1, arrives = 1;
+        double wi[3], h[3], n[3], p[3], q[2] = {0, 0}, sum = 0, fresnel, microfacet, woh, visible = 1,
+                                        arrives = 1;
         if (s.settings.terms & SSDGS_SHADOW_TERM) {
             const int known = look(place, &visible);
             sure &= known;
             arrives = known < 0 ? b[V + light] : visible + b[SOFT] * (b[V + light] - visible);
         }
-        for (i = 0; i < 3; i++) wi[i] = (double)lamp->position[i] - (lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? 0 : place[i]);
+        for (i = 0; i < 3; i++)
+            wi[i] = (double)lamp->position[i] - (lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? 0 : place[i]);
         normalise(wi);
         for (i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
         if (dot(h, h) < 0.01) sure = 0;
@@ -408,27 +446,34 @@ static int highlight(const double b[VALUES], double depth, double x, double y, d
         for (i = 0; i < 3; i++) n[i] = b[N + i];
         normalise(n);
         for (i = 0; i < 3; i++) p[i] = h[i] - n[i] * dot(n, h);
-        for (i = 0; i < 9; i++) q[0] += p[i / 3] * b[Q + i] * p[i % 3], q[1] += h[i / 3] * b[Q + i] * h[i % 3];
+        for (i = 0; i < 9; i++)
+            q[0] += p[i / 3] * b[Q + i] * p[i % 3], q[1] += h[i / 3] * b[Q + i] * h[i % 3];
         for (j = 0; j < SSDGS_ASG_COUNT; j++) {
             const double part = sigmoid((double)s.sharpness[2 * j + 1]);
-            sum += softplus((double)s.sigma[j]) * exp(-exp((double)s.sharpness[2 * j]) * ((1 - part) * q[0] + part * q[1]));
+            sum += softplus((double)s.sigma[j]) *
+                   exp(-exp((double)s.sharpness[2 * j]) * ((1 - part) * q[0] + part * q[1]));
         }
         woh = dot(wo, h);
         fresnel = b[F0] + (1 - b[F0]) * pow(1 - woh, 5);
-        microfacet = dot(n, wi) > 0 && dot(b + N, b + N) >= 1e-12 ? dot(n, wi) / (woh > 0.25 ? woh * woh : 0.0625) : 0;
+        microfacet =
+            dot(n, wi) > 0 && dot(b + N, b + N) >= 1e-12 ? dot(n, wi) / (woh > 0.25 ? woh * woh : 0.0625) : 0;
         for (i = 0; i < 3 && microfacet > 0; i++) {
-            const double steep = b[M + 3 * light + i] * fresnel * sum / (woh > 0.25 ? woh * woh : 0.0625) / sqrt(dot(b + N, b + N));
+            const double steep = b[M + 3 * light + i] * fresnel * sum / (woh > 0.25 ? woh * woh : 0.0625) /
+                                 sqrt(dot(b + N, b + N));
             out[5] = fmax(out[5], steep);
         }
         for (i = 0; i < 3; i++)
-            out[i] += ((microfacet > 0 ? b[M + 3 * light + i] * microfacet * fresnel * sum : 0) + b[D + 3 * light + i]) * arrives;
+            out[i] += ((microfacet > 0 ? b[M + 3 * light + i] * microfacet * fresnel * sum : 0) +
+                       b[D + 3 * light + i]) *
+                      arrives;
     }
     return sure;
 }
 
 /* Eq. 1 at a pixel: red, green, blue, alpha, depth. 0 where the last bit of float decides what is drawn. */
 static int blend(const splat *p, int n, double x, double y, const shaded *of, double out[6]) {
-    const double threshold = (double)s.options.alpha_threshold > 1e-9 ? (double)s.options.alpha_threshold : 1e-9;
+    const double threshold =
+        (double)s.options.alpha_threshold > 1e-9 ? (double)s.options.alpha_threshold : 1e-9;
     const double stop = (double)s.options.stop;
     double t = 1, last = -1, sum[VALUES];
     int k, c, sure = 1;
@@ -458,15 +503,18 @@ static int blend(const splat *p, int n, double x, double y, const shaded *of, do
 
 /* ---- 1. the camera pass ---- */
 
-typedef struct errors { double most, sum, count; int unsure, pixels; } errors;
+typedef struct errors {
+    double most, sum, count;
+    int unsure, pixels;
+} errors;
 
 static void count_error(errors *e, double error) {
     e->most = error <= e->most ? e->most : error; /* NaN is the most */
     e->sum += error, e->count++;
 }
 
-/* What a colour's error is told by: of deferred highlights above 1, bright where seen nearly against the light, the colour, or
-   how steep they are. */
+/* What a colour's error is told by: of deferred highlights above 1, bright where seen nearly against the
+   light, the colour, or how steep they are. */
 static double scale_of(double color, double steep) {
     return s.settings.asg == SSDGS_ASG_DEFERRED ? fmax(1, fmax(fabs(color), steep)) : 1;
 }
@@ -475,7 +523,9 @@ static void compare(const planes *got, double (*want)[6], const unsigned char *s
     int i, c;
     for (i = 0; i < pixels; i++)
         for (c = 0; sure[i] && c < 5; c++) {
-            const double value = (double)(c < 3 ? got->color[3 * i + c] : c < 4 ? got->alpha[i] : got->depth[i]);
+            const double value = (double)(c < 3   ? got->color[3 * i + c]
+                                          : c < 4 ? got->alpha[i]
+                                                  : got->depth[i]);
             count_error(e, fabs(value - want[i][c]) / (c < 3 ? scale_of(want[i][c], want[i][5]) : 1));
         }
 }
@@ -495,7 +545,8 @@ static void camera_scene(int index) {
     int width, height, c;
     random_scene((uint64_t)index, 200, 0.01, 0.2);
     s.count = index % 10 == 5 ? integer(100, 200) : integer(1, 60); /* tiles are walked 64 at a time */
-    width = integer(16, 40), height = integer(16, 40); /* one after the other: compilers differ in the order of arguments */
+    width = integer(16, 40),
+    height = integer(16, 40); /* one after the other: compilers differ in the order of arguments */
     random_camera(uniform(0.9, 3), width, height);
     s.camera.fy = (ssdgs_real)((double)s.camera.fx * (index % 4 == 1 ? uniform(0.25, 4) : 1));
     if (index % 4 == 2) {
@@ -524,7 +575,8 @@ static void test_camera(int scenes) {
     int index, isa, i, unsure = 0, pixels = 0;
     memset(e, 0, sizeof e);
     s.options = ssdgs_render_options_exact(); /* the oracle takes these from them */
-    CHECK(fabs((double)s.options.alpha_threshold * 255 - 1) < 1e-6 && fabs((double)s.options.stop * 1e4 - 1) < 1e-6);
+    CHECK(fabs((double)s.options.alpha_threshold * 255 - 1) < 1e-6 &&
+          fabs((double)s.options.stop * 1e4 - 1) < 1e-6);
     for (index = 0; index < scenes; index++) {
         camera_scene(index);
         read_gaussians();
@@ -534,28 +586,33 @@ static void test_camera(int scenes) {
         for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
             if (!contexts[isa][0]) continue;
             render(contexts[isa][0], image);
-            compare(image, want, sure, s.camera.width * s.camera.height, e[isa] + (s.settings.asg == SSDGS_ASG_DEFERRED));
+            compare(image, want, sure, s.camera.width * s.camera.height,
+                    e[isa] + (s.settings.asg == SSDGS_ASG_DEFERRED));
             if (index % 4 == isa % 4) { /* every kind of scene for some instruction set */
                 const size_t size = (size_t)(s.camera.width * s.camera.height) * sizeof(ssdgs_real);
                 render(contexts[isa][1], image + 1);
-                CHECK(!memcmp(image[0].color, image[1].color, 3 * size) && !memcmp(image[0].alpha, image[1].alpha, size) &&
+                CHECK(!memcmp(image[0].color, image[1].color, 3 * size) &&
+                      !memcmp(image[0].alpha, image[1].alpha, size) &&
                       !memcmp(image[0].depth, image[1].depth, size));
             }
         }
     }
     for (isa = 0; isa < SSDGS_ISA_COUNT; isa++)
         for (i = 0; i < 2 && contexts[isa][0]; i++) {
-            printf("%s%s: at most %.3g, on average %.3g\n", ssdgs_isa_string((ssdgs_isa)isa), i ? ", deferred" : "", e[isa][i].most,
-                   e[isa][i].sum / e[isa][i].count);
+            printf("%s%s: at most %.3g, on average %.3g\n", ssdgs_isa_string((ssdgs_isa)isa),
+                   i ? ", deferred" : "", e[isa][i].most, e[isa][i].sum / e[isa][i].count);
             most[i] = e[isa][i].most > most[i] ? e[isa][i].most : most[i];
             sum += e[isa][i].sum, count += e[isa][i].count;
         }
     printf("%d of %d pixels left out\n", unsure, pixels);
     CHECK(unsure < 0.01 * pixels && count > 0);
-    CHECK(most[0] < (DOUBLE ? 1e-12 : 2.5e-5) && most[1] < (DOUBLE ? 1e-12 : 2.5e-5) && sum / count < (DOUBLE ? 1e-15 : 1e-7)); /* some roundings */
-    if (!DOUBLE) printf("figure bruteforce_max_abs %.3g\nfigure bruteforce_max_abs_deferred %.3g\nfigure bruteforce_mean_abs %.3g\n", most[0], most[1], sum / count);
+    CHECK(most[0] < (DOUBLE ? 1e-12 : 2.5e-5) && most[1] < (DOUBLE ? 1e-12 : 2.5e-5) &&
+          sum / count < (DOUBLE ? 1e-15 : 1e-7)); /* some roundings */
+    if (!DOUBLE)
+        printf("figure bruteforce_max_abs %.3g\nfigure bruteforce_max_abs_deferred %.3g\nfigure "
+               "bruteforce_mean_abs %.3g\n",
+               most[0], most[1], sum / count);
 }
-
 
 /* ---- 2. the light pass ---- */
 
@@ -590,8 +647,8 @@ static void check_light_camera(void) {
     for (g = 0; g < s.count; g++)
         for (f = 0; f < face_count; f++) {
             splat p;
-            if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 && p.x <= faces[f].width &&
-                p.y <= faces[f].height) {
+            if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 &&
+                p.x <= faces[f].width && p.y <= faces[f].height) {
                 on++;
                 break;
             }
@@ -599,10 +656,13 @@ static void check_light_camera(void) {
     CHECK(on == s.count);
 }
 
-typedef struct light_truth { double v[MOST], cue[MOST], flux[MOST]; unsigned char doubt[MOST]; } light_truth;
+typedef struct light_truth {
+    double v[MOST], cue[MOST], flux[MOST];
+    unsigned char doubt[MOST];
+} light_truth;
 
-/* Eqs. 6, 7, depth cue and flux, over all pixels of all faces. rho carries the splat's opacity, which cancels on one face; over
-   several it makes each count by its mass, blurred more or less as it is there. */
+/* Eqs. 6, 7, depth cue and flux, over all pixels of all faces. rho carries the splat's opacity, which cancels
+   on one face; over several it makes each count by its mass, blurred more or less as it is there. */
 static void oracle_light(light_truth *out) {
     static splat p[MOST];
     static double raw[MOST], rho[MOST], v[MOST], cue[MOST];
@@ -615,13 +675,16 @@ static void oracle_light(light_truth *out) {
         const lens *l = faces + f;
         n = project_all(l, p);
         for (i = 0; i < l->width * l->height; i++) {
-            const double x = i % l->width + 0.5, y = i / l->width + 0.5, u = (x - l->cx) / l->fx, w = (y - l->cy) / l->fy;
-            const double solid = l->orthographic ? pow(l->fx * l->distance, -2) : pow(1 + u * u + w * w, -1.5) / (l->fx * l->fy);
+            const double x = i % l->width + 0.5, y = i / l->width + 0.5, u = (x - l->cx) / l->fx,
+                         w = (y - l->cy) / l->fy;
+            const double solid = l->orthographic ? pow(l->fx * l->distance, -2)
+                                                 : pow(1 + u * u + w * w, -1.5) / (l->fx * l->fy);
             double beam = 1;
             for (k = 0; k < n; k++) {
                 raw[k] = response(p + k, x, y);
                 if (fabs(raw[k] - threshold) < 1e-4 * threshold)
-                    for (g = 0; g < n; g++) if (response(p + g, x, y) > 0.9 * threshold) out->doubt[p[g].index] = 1;
+                    for (g = 0; g < n; g++)
+                        if (response(p + g, x, y) > 0.9 * threshold) out->doubt[p[g].index] = 1;
                 raw[k] = raw[k] < threshold ? 0 : raw[k];
                 out->flux[p[k].index] += solid * beam * (raw[k] < 0.999 ? raw[k] : 0.999);
                 beam *= 1 - (raw[k] < 0.999 ? raw[k] : 0.999);
@@ -630,7 +693,8 @@ static void oracle_light(light_truth *out) {
                 double t = 1, depth = 0;
                 if (raw[g] <= 0) continue;
                 for (k = 0; k < n; k++) {
-                    const double ahead = p[g].depth - bias - p[k].depth, alpha = raw[k] < 0.999 ? raw[k] : 0.999;
+                    const double ahead = p[g].depth - bias - p[k].depth,
+                                 alpha = raw[k] < 0.999 ? raw[k] : 0.999;
                     if (k != g && raw[k] > 0 && fabs(ahead) < 3e-6 * p[g].depth) out->doubt[p[g].index] = 1;
                     if (k == g || raw[k] <= 0 || ahead <= 0) continue;
                     depth += t * alpha * (p[g].depth - p[k].depth);
@@ -648,10 +712,15 @@ static void oracle_light(light_truth *out) {
     }
 }
 
-typedef struct light_case { const char *name; int kind; double distance, bias; int faces, map; } light_case;
+typedef struct light_case {
+    const char *name;
+    int kind;
+    double distance, bias;
+    int faces, map;
+} light_case;
 static const light_case light_cases[] = {
-    {"outside", SSDGS_LIGHT_POINT, 3, 0, 1, 64}, {"outside, bias", SSDGS_LIGHT_POINT, 3, 0.3, 1, 64},
-    {"far", SSDGS_LIGHT_POINT, 3e4, 0.1, 1, 48}, {"directional", SSDGS_LIGHT_DIRECTIONAL, 1, 0.1, 1, 64},
+    {"outside", SSDGS_LIGHT_POINT, 3, 0, 1, 64},    {"outside, bias", SSDGS_LIGHT_POINT, 3, 0.3, 1, 64},
+    {"far", SSDGS_LIGHT_POINT, 3e4, 0.1, 1, 48},    {"directional", SSDGS_LIGHT_DIRECTIONAL, 1, 0.1, 1, 64},
     {"close", SSDGS_LIGHT_POINT, 0.9, 0.05, 6, 32}, {"inside", SSDGS_LIGHT_POINT, 0.2, 0, 6, 32}};
 
 static void test_light(int rounds) {
@@ -668,7 +737,8 @@ static void test_light(int rounds) {
         int known = 0;
         random_scene(1000000 + (uint64_t)index, 200, 0.01, 0.1);
         s.count = index % 8 == 5 ? 200 : integer(2, 40); /* tiles are walked 64 at a time */
-        for (i = 0; i < 6; i++) s.raw[SSDGS_POSITION + i / 2][i % 2] = (ssdgs_real)(i % 2 - 0.5); /* always as large a scene */
+        for (i = 0; i < 6; i++)
+            s.raw[SSDGS_POSITION + i / 2][i % 2] = (ssdgs_real)(i % 2 - 0.5); /* always as large a scene */
         for (i = 0; i < s.count; i++) s.raw[SSDGS_OPACITY][i] += 2;
         read_gaussians();
         random_light(s.lights, c->distance);
@@ -712,8 +782,10 @@ static void test_light(int rounds) {
             colors.pixels += s.camera.width * s.camera.height;
         }
     }
-    printf("light: v at most %.3g, cue %.3g, flux %.3g; %d of %d left out; shadowed image %.3g, on average %.3g, %d of %d left out\n",
-           v.most, cue.most, flux.most, doubtful, total, colors.most, colors.sum / colors.count, colors.unsure, colors.pixels);
+    printf("light: v at most %.3g, cue %.3g, flux %.3g; %d of %d left out; shadowed image %.3g, on average "
+           "%.3g, %d of %d left out\n",
+           v.most, cue.most, flux.most, doubtful, total, colors.most, colors.sum / colors.count,
+           colors.unsure, colors.pixels);
     CHECK(doubtful < 0.05 * total && v.count > 0 && colors.unsure < 0.05 * colors.pixels && colors.count > 0);
     CHECK(v.most < (DOUBLE ? 1e-12 : 1e-5) && cue.most < (DOUBLE ? 1e-12 : 1e-5));
     CHECK(flux.most < (DOUBLE ? 1e-12 : 1.5e-5) && colors.most < (DOUBLE ? 1e-12 : 2.5e-5));
@@ -721,7 +793,8 @@ static void test_light(int rounds) {
 }
 
 /* Largest response of g along the ray from `eye`. */
-static double ray_response(const gaussian *g, const double eye[3], const double direction[3], double farthest) {
+static double ray_response(const gaussian *g, const double eye[3], const double direction[3],
+                           double farthest) {
     double o[3], d[3], cross[3], d2;
     int i, j;
     for (i = 0; i < 3; i++)
@@ -747,14 +820,19 @@ static void trace_visibility(const lens *light, double *v) {
     for (i = 0; i < 3; i++) eye[i] = (double)s.lights[0].position[i];
     for (g = 0; g < n; g++) {
         const double bias = (double)s.settings.light_bias * (double)s.settings.length_unit;
-        const double det = p[g].a * p[g].c - p[g].b * p[g].b, xx = p[g].c / det, xy = -p[g].b / det, yy = p[g].a / det;
-        const double lx = sqrt(xx), ly = xy / lx, lyy = sqrt(yy - ly * ly), reach = sqrt(2 * log(255 * p[g].opacity) + 1e-9);
+        const double det = p[g].a * p[g].c - p[g].b * p[g].b, xx = p[g].c / det, xy = -p[g].b / det,
+                     yy = p[g].a / det;
+        const double lx = sqrt(xx), ly = xy / lx, lyy = sqrt(yy - ly * ly),
+                     reach = sqrt(2 * log(255 * p[g].opacity) + 1e-9);
         double sum = 0, rho = 0;
         for (i = 0; p[g].opacity > 1.0 / 255 && i < GRID * GRID; i++) {
-            const double a = reach * ((2 * (i % GRID) + 1.0) / GRID - 1), b = reach * ((2 * (i / GRID) + 1.0) / GRID - 1);
-            const double u = (p[g].x + lx * a - light->cx) / light->fx, w = (p[g].y + ly * a + lyy * b - light->cy) / light->fy;
+            const double a = reach * ((2 * (i % GRID) + 1.0) / GRID - 1),
+                         b = reach * ((2 * (i / GRID) + 1.0) / GRID - 1);
+            const double u = (p[g].x + lx * a - light->cx) / light->fx,
+                         w = (p[g].y + ly * a + lyy * b - light->cy) / light->fy;
             double direction[3], weight, t = 1;
-            for (j = 0; j < 3; j++) direction[j] = u * light->view[j] + w * light->view[4 + j] + light->view[8 + j];
+            for (j = 0; j < 3; j++)
+                direction[j] = u * light->view[j] + w * light->view[4 + j] + light->view[8 + j];
             weight = ray_response(all + p[g].index, eye, direction, 12);
             if (weight < 1.0 / 255) continue;
             for (k = 0; k < n && p[k].depth < p[g].depth - bias; k++) {
@@ -796,7 +874,8 @@ static double shadow_error(int range, int count, int blur, int map, double bias)
 
 static void test_shadow_error(int count) {
     static const char *const names[3] = {"_large", "", "_small"};
-    static const double default_most[3] = {0.012, 0.005, 0.0005}; /* what the affine projection leaves of the large ones stays */
+    static const double default_most[3] = {
+        0.012, 0.005, 0.0005}; /* what the affine projection leaves of the large ones stays */
     int range, m;
     for (range = 0; range < 3; range++) {
         const ssdgs_settings d = ssdgs_settings_default();
@@ -808,9 +887,11 @@ static void test_shadow_error(int count) {
             add[m] = shadow_error(range, count, SSDGS_BLUR_ADD, 64 << m, 0);
             floored[m] = shadow_error(range, count, SSDGS_BLUR_FLOOR, 64 << m, 0);
             if (!DOUBLE) printf("figure shadow_mean_abs_add_%d%s %.5f\n", 64 << m, names[range], add[m]);
-            if (!DOUBLE) printf("figure shadow_mean_abs_floor_%d%s %.5f\n", 64 << m, names[range], floored[m]);
+            if (!DOUBLE)
+                printf("figure shadow_mean_abs_floor_%d%s %.5f\n", 64 << m, names[range], floored[m]);
         }
-        CHECK(4 * floored[0] < add[0] && 3 * floored[1] < add[1] && floored[1] < add[2] && floored[2] < add[3]);
+        CHECK(4 * floored[0] < add[0] && 3 * floored[1] < add[1] && floored[1] < add[2] &&
+              floored[2] < add[3]);
         for (m = 1; m < 4; m++) CHECK(add[m] < 0.8 * add[m - 1] && floored[m] < 1.1 * floored[m - 1]);
     }
 }
@@ -837,7 +918,8 @@ static void test_unity(void) {
     s.settings.baked = 1;
     for (c = 0; c < 3; c++) {
         s.options.background[c] = 1;
-        for (i = 0; i < s.count; i++) s.raw[SSDGS_DIFFUSE + c][i] = (ssdgs_real)0.54132485461291806; /* softplus: 1 */
+        for (i = 0; i < s.count; i++)
+            s.raw[SSDGS_DIFFUSE + c][i] = (ssdgs_real)0.54132485461291806; /* softplus: 1 */
     }
     for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         if (!contexts[isa][0]) continue;
@@ -900,7 +982,8 @@ static void test_coincident(void) {
         CHECK(fabs((double)image->alpha[8 * 17 + 8] - both) < tolerance);
         axis_scene(1, log(both / (1 - both)));
         render(best(), image + 1);
-        if (both < 0.999) CHECK(fabs((double)(image[1].alpha[8 * 17 + 8] - image->alpha[8 * 17 + 8])) < tolerance);
+        if (both < 0.999)
+            CHECK(fabs((double)(image[1].alpha[8 * 17 + 8] - image->alpha[8 * 17 + 8])) < tolerance);
     }
 }
 
@@ -931,7 +1014,9 @@ static void test_layers(void) {
                 for (i = 0; i <= layers; i++) {
                     for (c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = c == 0;
                     for (c = 0; c < 3; c++)
-                        s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)(i == 0 ? log(0.15) : c < 2 ? log(8.0) : -7);
+                        s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)(i == 0  ? log(0.15)
+                                                                     : c < 2 ? log(8.0)
+                                                                             : -7);
                     s.raw[SSDGS_POSITION + 2][i] = (ssdgs_real)(0.1 * i); /* the bias is 0.25 */
                 }
                 visibility(v);
@@ -951,7 +1036,8 @@ static void test_occluder(void) {
         s.settings.light_bias = 0;
         s.settings.light_map_size = 64;
         random_light(s.lights, trial % 4 < 2 ? 3 : 0.3);
-        for (i = 0; i < 3; i++) s.raw[SSDGS_POSITION + i][0] *= (ssdgs_real)0.5; /* does not stretch what the map must cover */
+        for (i = 0; i < 3; i++)
+            s.raw[SSDGS_POSITION + i][0] *= (ssdgs_real)0.5; /* does not stretch what the map must cover */
         s.raw[SSDGS_OPACITY][0] = -20;
         visibility(without);
         CHECK(without[0] >= 1 && without[0] <= 1);
@@ -968,8 +1054,8 @@ static void test_occluder(void) {
     CHECK(most <= 1e-6 && darker > 100);
 }
 
-/* Light passes freely where its map has no Gaussian, whatever a frame before left there: the place that two blend to lies between
-   them. A third one is the nearest to the light. */
+/* Light passes freely where its map has no Gaussian, whatever a frame before left there: the place that two
+   blend to lies between them. A third one is the nearest to the light. */
 static void test_gap(void) {
     int dense, i, c;
     for (dense = 1; dense >= 0; dense--) {
@@ -993,11 +1079,13 @@ static void test_gap(void) {
     CHECK(fabs((double)(image->color[3 * (8 * 17 + 8)] - image[1].color[3 * (8 * 17 + 8)])) < 1e-6);
 }
 
-/* What a veil leaves arrives on the floor behind it, all along the gap: also where it is no level of the light's map. */
+/* What a veil leaves arrives on the floor behind it, all along the gap: also where it is no level of the
+   light's map. */
 static void test_veil(void) {
     enum { ROW = 60, FLOOR = ROW * ROW, PX = 32 };
     static ssdgs_real values[PX * PX * 5];
-    const ssdgs_real eye[3] = {(ssdgs_real)0.9, 0, (ssdgs_real)0.25}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    const ssdgs_real eye[3] = {(ssdgs_real)0.9, 0, (ssdgs_real)0.25}, target[3] = {0, 0, 0},
+                     up[3] = {0, 0, 1};
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, PX, PX);
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_settings settings = ssdgs_settings_default();
@@ -1016,21 +1104,30 @@ static void test_veil(void) {
         double shadow;
         for (i = 0; i <= FLOOR; i++) {
             ssdgs_real *p = v.gaussians + i;
-            for (c = 0; c < 2; c++) p[(size_t)c * v.stride] = (ssdgs_real)(i == FLOOR ? 0 : ((c ? i / ROW : i % ROW) + 0.5) / ROW - 0.5);
+            for (c = 0; c < 2; c++)
+                p[(size_t)c * v.stride] =
+                    (ssdgs_real)(i == FLOOR ? 0 : ((c ? i / ROW : i % ROW) + 0.5) / ROW - 0.5);
             p[2 * v.stride] = (ssdgs_real)(i == FLOOR ? 0.4 : 0);
-            for (c = 0; c < 3; c++) p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = (ssdgs_real)log(c == 2 ? 0.002 : i == FLOOR ? 1 : 0.016);
-            p[SSDGS_OPACITY * v.stride] = (ssdgs_real)(i < FLOOR ? 6 : tenth ? log(tenth / (10.0 - tenth)) : -20);
+            for (c = 0; c < 3; c++)
+                p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = (ssdgs_real)log(c == 2       ? 0.002
+                                                                              : i == FLOOR ? 1
+                                                                                           : 0.016);
+            p[SSDGS_OPACITY * v.stride] = (ssdgs_real)(i < FLOOR ? 6
+                                                       : tenth   ? log(tenth / (10.0 - tenth))
+                                                                 : -20);
             p[(SSDGS_ASG_WEIGHT + 3) * v.stride] = -20; /* hard */
         }
         if (!CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &out, NULL))) exit(1);
         i = PX / 2 * PX + PX / 2;
         shadow = (double)(out.shadow[i] / out.alpha[i]);
-        if (!CHECK(fabs(shadow - (tenth < 2 ? 1 : 1 - 0.1 * tenth)) < 0.01)) printf("    a veil of %d tenths leaves %g\n", tenth, shadow);
+        if (!CHECK(fabs(shadow - (tenth < 2 ? 1 : 1 - 0.1 * tenth)) < 0.01))
+            printf("    a veil of %d tenths leaves %g\n", tenth, shadow);
     }
     ssdgs_model_destroy(model);
 }
 
-/* Without a map, as where a hook walks the lights and makes none, pixels take the visibility of their Gaussians. */
+/* Without a map, as where a hook walks the lights and makes none, pixels take the visibility of their
+   Gaussians. */
 static void test_no_map(void) {
     ssdgs_model *model;
     ssdgs_frame frame;
@@ -1043,7 +1140,8 @@ static void test_no_map(void) {
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
     for (i = 0; i < 60 * 40; i++) {
         const ssdgs_real *of_gaussians = ssdgs__layer_plane(&frame, SSDGS__LIGHT_LAYER + 2, 1) + i;
-        const double cover = (double)ssdgs__layer_plane(&frame, SSDGS__DEPTH_LAYER, 2)[i], want = (double)*of_gaussians / cover;
+        const double cover = (double)ssdgs__layer_plane(&frame, SSDGS__DEPTH_LAYER, 2)[i],
+                     want = (double)*of_gaussians / cover;
         if (!(cover > 0.1 && want < 0.9)) continue;
         checked++;
         CHECK(fabs((double)frame.pixel_visibility[i] - want) < 1e-6);
@@ -1052,7 +1150,8 @@ static void test_no_map(void) {
     ssdgs_model_destroy(model);
 }
 
-static double largest_difference(int x0, int y0, int width, int height, int whole, double depth_scale, int spared) {
+static double largest_difference(int x0, int y0, int width, int height, int whole, double depth_scale,
+                                 int spared) {
     double most[3] = {0, 0, 0}; /* of pixels, the largest first */
     int x, y, c, i;
     for (y = 0; y < height; y++)
@@ -1060,9 +1159,10 @@ static double largest_difference(int x0, int y0, int width, int height, int whol
             double worst = 0;
             for (c = 0; c < 5; c++) {
                 const int a = y * width + x, b = (y + y0) * whole + x + x0;
-                const double difference = c < 3 ? (double)(image[1].color[3 * a + c] - image->color[3 * b + c])
+                const double difference =
+                    c < 3   ? (double)(image[1].color[3 * a + c] - image->color[3 * b + c])
                     : c < 4 ? (double)(image[1].alpha[a] - image->alpha[b])
-                    : (double)image[1].depth[a] / depth_scale - (double)image->depth[b];
+                            : (double)image[1].depth[a] / depth_scale - (double)image->depth[b];
                 const double size = c < 3 ? scale_of((double)image->color[3 * b + c], 0) : 1;
                 worst = fabs(difference) <= worst * size ? worst : fabs(difference) / size;
             }
@@ -1077,9 +1177,9 @@ static double largest_difference(int x0, int y0, int width, int height, int whol
 
 /* A crop has the bits of the whole where the origin stays; elsewhere cx, cy round differently. */
 static void test_crop(void) {
-    static const int crops[][4] = { /* from x, y; width, height */
-        {0, 0, 90, 1}, {0, 0, 1, 70}, {0, 0, 37, 41}, {0, 0, 1, 1}, {16, 16, 48, 32}, {32, 0, 17, 13}, {5, 3, 40, 50},
-        {77, 69, 1, 1}};
+    static const int crops[][4] = {/* from x, y; width, height */
+                                   {0, 0, 90, 1},    {0, 0, 1, 70},   {0, 0, 37, 41}, {0, 0, 1, 1},
+                                   {16, 16, 48, 32}, {32, 0, 17, 13}, {5, 3, 40, 50}, {77, 69, 1, 1}};
     double most = 0;
     size_t i;
     for (i = 0; i < sizeof crops / sizeof *crops; i++) {
@@ -1099,11 +1199,13 @@ static void test_crop(void) {
     if (!DOUBLE) printf("figure crop_max_abs %.3g\n", most);
 }
 
-/* Everything moved, turned and scaled together looks the same. Networks see absolute directions and light maps stand along the
-   axes, so both are off where anything turns. */
+/* Everything moved, turned and scaled together looks the same. Networks see absolute directions and light
+   maps stand along the axes, so both are off where anything turns. */
 static void test_similarity(void) {
-    static const struct { double scale, turn, move; } cases[] = {
-        {1, 0, 0.7}, {1e-6, 0, 0}, {1e-3, 0, 2e-4}, {31, 0, 5}, {1e6, 0, 0}, {1, 1, 0}, {1, 2.5, 0.3}, {0.01, 4, 0}};
+    static const struct {
+        double scale, turn, move;
+    } cases[] = {{1, 0, 0.7}, {1e-6, 0, 0}, {1e-3, 0, 2e-4}, {31, 0, 5},
+                 {1e6, 0, 0}, {1, 1, 0},    {1, 2.5, 0.3},   {0.01, 4, 0}};
     double most = 0;
     size_t n;
     for (n = 0; n < sizeof cases / sizeof *cases; n++) {
@@ -1121,15 +1223,16 @@ static void test_similarity(void) {
         s.options.terms = cases[n].turn > 0 ? SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM : SSDGS_ALL_TERMS;
         render(best(), image);
         rotation(w, x, y, z, r);
-#define MOVED(out, in, by, how)                                                                                       \
-    do {                                                                                                              \
-        double from_[3];                                                                                              \
-        for (c = 0; c < 3; c++) from_[c] = (double)(in);                                                              \
-        for (c = 0; c < 3; c++) (out) = (ssdgs_real)((by) * dot(r + 3 * c, from_) + (how) * move[c]);                 \
+#define MOVED(out, in, by, how) \
+    do { \
+        double from_[3]; \
+        for (c = 0; c < 3; c++) from_[c] = (double)(in); \
+        for (c = 0; c < 3; c++) (out) = (ssdgs_real)((by)*dot(r + 3 * c, from_) + (how)*move[c]); \
     } while (0)
         for (i = 0; i < s.count; i++) {
             MOVED(s.raw[SSDGS_POSITION + c][i], s.raw[SSDGS_POSITION + c][i], k, 1);
-            for (c = 0; c < 3; c++) s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)((double)s.raw[SSDGS_LOG_SCALE + c][i] + log(k));
+            for (c = 0; c < 3; c++)
+                s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)((double)s.raw[SSDGS_LOG_SCALE + c][i] + log(k));
             for (j = SSDGS_ROTATION; j <= SSDGS_FRAME; j += SSDGS_FRAME - SSDGS_ROTATION) {
                 const double a = (double)s.raw[j][i], b = (double)s.raw[j + 1][i];
                 const double d = (double)s.raw[j + 2][i], f = (double)s.raw[j + 3][i];
@@ -1153,7 +1256,8 @@ static void test_similarity(void) {
             row[3] = (ssdgs_real)(k * (double)row[3] - dot(axis, move));
         }
         render(best(), image + 1);
-        e = largest_difference(0, 0, 70, 50, 70, k, DOUBLE ? 0 : 2); /* places near a map's jumps may change sides */
+        e = largest_difference(0, 0, 70, 50, 70, k,
+                               DOUBLE ? 0 : 2); /* places near a map's jumps may change sides */
         if (!CHECK(e < (DOUBLE ? 3e-13 : 5e-5)))
             printf("    scale %g, turn %g, move %g: %.3g\n", k, cases[n].turn, cases[n].move, e);
         most = e <= most ? most : e;
@@ -1163,7 +1267,8 @@ static void test_similarity(void) {
 
 /* ---- 4. projection ---- */
 
-/* L1 error of the affine projection of a round Gaussian of size sigma at distance 1, `degrees` off the axis. */
+/* L1 error of the affine projection of a round Gaussian of size sigma at distance 1, `degrees` off the
+   axis. */
 static double projection_error(double sigma, double degrees) {
     enum { GRID = 160 };
     const double angle = degrees * PI / 180, eye[3] = {0, 0, 0};
@@ -1188,12 +1293,14 @@ static double projection_error(double sigma, double degrees) {
     return sum / whole;
 }
 
-/* The oracle's own projection, which the camera pass is held to, against rays: the published table (stability.md 3.4). */
+/* The oracle's own projection, which the camera pass is held to, against rays: the published table
+   (stability.md 3.4). */
 static void test_projection(void) {
     static const double sigmas[6] = {0.005, 0.02, 0.05, 0.1, 0.2, 0.3};
     static const double published[6][5] = {
-        {0.0001, 0.0032, 0.0069, 0.012, 0.021}, {0.0016, 0.013, 0.028, 0.048, 0.083}, {0.010, 0.033, 0.070, 0.12, 0.21},
-        {0.041, 0.073, 0.15, 0.25, 0.43}, {0.18, 0.21, 0.35, 0.54, 0.76}, {0.44, 0.47, 0.59, 0.74, 0.88}};
+        {0.0001, 0.0032, 0.0069, 0.012, 0.021}, {0.0016, 0.013, 0.028, 0.048, 0.083},
+        {0.010, 0.033, 0.070, 0.12, 0.21},      {0.041, 0.073, 0.15, 0.25, 0.43},
+        {0.18, 0.21, 0.35, 0.54, 0.76},         {0.44, 0.47, 0.59, 0.74, 0.88}};
     int i, j;
     for (i = 0; i < 6; i++)
         for (j = 0; j < 5; j++) {
@@ -1214,7 +1321,8 @@ static int fill_turned(double sigma, double aspect, int step) {
         turned[SSDGS_POSITION + 2][n] = 1;
         turned[SSDGS_ROTATION][n] = (ssdgs_real)cos(n * step * PI / 360);
         turned[SSDGS_ROTATION + 3][n] = (ssdgs_real)sin(n * step * PI / 360);
-        for (c = 0; c < 3; c++) turned[SSDGS_LOG_SCALE + c][n] = (ssdgs_real)log(sigma / FOCAL / (c ? aspect : 1));
+        for (c = 0; c < 3; c++)
+            turned[SSDGS_LOG_SCALE + c][n] = (ssdgs_real)log(sigma / FOCAL / (c ? aspect : 1));
         turned[SSDGS_OPACITY][n] = 2;
     }
     return n;
@@ -1222,18 +1330,22 @@ static int fill_turned(double sigma, double aspect, int step) {
 
 /* Conic times -log2(e) / 2 as in a record, xy counted twice; the determinant has no difference in it. */
 static void true_conic(int n, double variance, double conic[3]) {
-    const long double log0 = (long double)turned[SSDGS_LOG_SCALE][n], log1 = (long double)turned[SSDGS_LOG_SCALE + 1][n];
+    const long double log0 = (long double)turned[SSDGS_LOG_SCALE][n],
+                      log1 = (long double)turned[SSDGS_LOG_SCALE + 1][n];
     const long double s0 = expl(log0) * FOCAL, s1 = expl(log1) * FOCAL, h = (long double)variance;
-    const long double w = (long double)turned[SSDGS_ROTATION][n], z = (long double)turned[SSDGS_ROTATION + 3][n];
+    const long double w = (long double)turned[SSDGS_ROTATION][n],
+                      z = (long double)turned[SSDGS_ROTATION + 3][n];
     const long double co = (w * w - z * z) / (w * w + z * z), si = 2 * w * z / (w * w + z * z);
-    const long double det = s0 * s0 * s1 * s1 + h * (s0 * s0 + s1 * s1) + h * h, k = -0.72134752044448170368L / det;
+    const long double det = s0 * s0 * s1 * s1 + h * (s0 * s0 + s1 * s1) + h * h,
+                      k = -0.72134752044448170368L / det;
     conic[0] = (double)(k * (s0 * s0 * si * si + s1 * s1 * co * co + h));
     conic[1] = (double)(-2 * k * (s0 * s0 - s1 * s1) * si * co);
     conic[2] = (double)(k * (s0 * s0 * co * co + s1 * s1 * si * si + h));
 }
 
-/* Records of giants and needles against long double; the exponent over the screen must not be positive. In float it is, for
-   needles of more than 2000 : 1, by the rounding of the conic's entries times (px from the centre)^2; the walks cut that off. */
+/* Records of giants and needles against long double; the exponent over the screen must not be positive. In
+   float it is, for needles of more than 2000 : 1, by the rounding of the conic's entries times (px from the
+   centre)^2; the walks cut that off. */
 static void test_conic(int step) {
     static ssdgs_real record[TURNS][8], depth[TURNS];
     double worst = 0, excess = -1, needle_excess = 0;
@@ -1247,7 +1359,8 @@ static void test_conic(int step) {
                 p.fx = p.fy = FOCAL, p.cx = p.cy = SCREEN / 2, p.near_plane = (ssdgs_real)0.01;
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
                 n = fill_turned(pow(10, size), pow(10, aspect), step);
-                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record[0], depth);
+                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record[0],
+                                           depth);
                 while (n--) {
                     const ssdgs_real *r = record[n];
                     double want[3], norm;
@@ -1260,7 +1373,8 @@ static void test_conic(int step) {
                     }
                     for (y = 0; y < SCREEN; y += 37)
                         for (x = 0; x < SCREEN; x++) {
-                            const ssdgs_real dx = (ssdgs_real)(x + 0.5) - r[0], dy = (ssdgs_real)(y + 0.5) - r[1];
+                            const ssdgs_real dx = (ssdgs_real)(x + 0.5) - r[0],
+                                             dy = (ssdgs_real)(y + 0.5) - r[1];
                             const double power = (double)((r[4] * dy + r[3] * dx) * dy + r[2] * dx * dx);
                             if (aspect > 3) needle_excess = power <= needle_excess ? needle_excess : power;
                             else excess = power <= excess ? excess : power;
@@ -1270,7 +1384,8 @@ static void test_conic(int step) {
     printf("conic: %.3g, exponent %.3g, of needles %.3g\n", worst, excess, needle_excess);
     CHECK(worst < (DOUBLE ? 4e-15 : 1.5e-6));
     CHECK(excess <= 0 && needle_excess <= (DOUBLE ? 0 : 0.4));
-    if (!DOUBLE) printf("figure conic_max_rel %.3g\nfigure needle_exponent_excess %.3g\n", worst, needle_excess);
+    if (!DOUBLE)
+        printf("figure conic_max_rel %.3g\nfigure needle_exponent_excess %.3g\n", worst, needle_excess);
 }
 
 static void make_contexts(void) {
@@ -1290,8 +1405,8 @@ static void make_contexts(void) {
 
 /* ---- 5. the normals of a depth image ---- */
 
-/* Towards the camera, in its axes, of the triangle from a pixel to the nearer neighbours in its row and column. 0: none, or the
-   last bit decides which neighbour. */
+/* Towards the camera, in its axes, of the triangle from a pixel to the nearer neighbours in its row and
+   column. 0: none, or the last bit decides which neighbour. */
 static int depth_normal(const double *depth, int width, int x, int y, double n[3]) {
     double way[2][3];
     int i, c;
@@ -1309,7 +1424,8 @@ static int depth_normal(const double *depth, int width, int x, int y, double n[3
         if (fabs(distance[0] - distance[1]) < 1e-6) return 0;
         for (c = 0; c < 3; c++) way[i][c] = distance[0] < distance[1] ? p[1][c] - p[0][c] : p[2][c] - p[1][c];
     }
-    for (c = 0; c < 3; c++) n[c] = way[1][(c + 1) % 3] * way[0][(c + 2) % 3] - way[1][(c + 2) % 3] * way[0][(c + 1) % 3];
+    for (c = 0; c < 3; c++)
+        n[c] = way[1][(c + 1) % 3] * way[0][(c + 2) % 3] - way[1][(c + 2) % 3] * way[0][(c + 1) % 3];
     normalise(n);
     return 1;
 }
@@ -1332,7 +1448,9 @@ static void test_normals(void) {
             const double d = index < 10 ? 1.5 / (plane[0] * u + plane[1] * v + 1) : uniform(1, 1.5);
             layers[3 * 3 * SIZE + i] = (ssdgs_real)(alpha * d);
             layers[3 * 3 * SIZE + 2 * SIZE + i] = (ssdgs_real)alpha;
-            depth[i] = alpha < 0.5 ? 0 : (double)layers[3 * 3 * SIZE + i] / (double)layers[3 * 3 * SIZE + 2 * SIZE + i];
+            depth[i] = alpha < 0.5
+                           ? 0
+                           : (double)layers[3 * 3 * SIZE + i] / (double)layers[3 * 3 * SIZE + 2 * SIZE + i];
         }
         normalise(plane);
         for (isa = 0; isa < SSDGS_ISA_COUNT; isa++)
@@ -1351,16 +1469,21 @@ static void test_normals(void) {
                         const ssdgs_real *got = frame.normal_gradient + y * WIDTH + x;
                         double n[3];
                         const int inside = x > 0 && y > 0 && x < WIDTH - 1 && y < HEIGHT - 1;
-                        const int known = inside && depth[y * WIDTH + x] > 0 && depth[y * WIDTH + x - 1] > 0 && depth[y * WIDTH + x + 1] > 0 &&
+                        const int known = inside && depth[y * WIDTH + x] > 0 &&
+                                          depth[y * WIDTH + x - 1] > 0 && depth[y * WIDTH + x + 1] > 0 &&
                                           depth[(y - 1) * WIDTH + x] > 0 && depth[(y + 1) * WIDTH + x] > 0;
                         most = fmax(most, fabs((double)got[3 * SIZE] / weight - known));
-                        for (c = 0; c < 3 && !known; c++) most = fmax(most, fabs((double)got[c * SIZE]) / weight);
+                        for (c = 0; c < 3 && !known; c++)
+                            most = fmax(most, fabs((double)got[c * SIZE]) / weight);
                         if (!known) continue;
-                        if (index < 10) for (c = 0; c < 3; c++) n[c] = -plane[c]; /* plane . p = constant */
+                        if (index < 10)
+                            for (c = 0; c < 3; c++) n[c] = -plane[c]; /* plane . p = constant */
                         else if (!depth_normal(depth, WIDTH, x, y, n)) continue;
                         told++, flat += index < 10;
                         for (c = 0; c < 3; c++) {
-                            const double world = (double)s.camera.view[c] * n[0] + (double)s.camera.view[4 + c] * n[1] + (double)s.camera.view[8 + c] * n[2];
+                            const double world = (double)s.camera.view[c] * n[0] +
+                                                 (double)s.camera.view[4 + c] * n[1] +
+                                                 (double)s.camera.view[8 + c] * n[2];
                             most = fmax(most, fabs((double)got[c * SIZE] / weight + world));
                         }
                     }

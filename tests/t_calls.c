@@ -1,6 +1,7 @@
-/* Calls that the manual does not allow, and what must come of them: from hooks, tasks, the allocator and the log; after a fork; in the
-   wrong order; with NULL; with shared parameters that are not finite. And the bytes that images become.
-   cc -o build/t_calls tests/t_calls.c -lm -lpthread && build/t_calls       (writes under build/) */
+/* Calls that the manual does not allow, and what must come of them: from hooks, tasks, the allocator and the
+   log; after a fork; in the wrong order; with NULL; with shared parameters that are not finite. And the bytes
+   that images become. cc -o build/t_calls tests/t_calls.c -lm -lpthread && build/t_calls       (writes under
+   build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* fork, alarm */
 #endif
@@ -42,10 +43,13 @@ static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
     photo.format = SSDGS_PIXELS_RGBA8;
     image.color = color;
     image.alpha = alpha;
-    if (!CHECK(!ssdgs_context_create(desc, &all.context) && !ssdgs_model_create(all.context, NULL, MANY, &all.model))) exit(1);
+    if (!CHECK(!ssdgs_context_create(desc, &all.context) &&
+               !ssdgs_model_create(all.context, NULL, MANY, &all.model)))
+        exit(1);
     for (i = 0; i < MANY; i++)
         for (c = 0; c < 3; c++) {
-            all.model->gaussians[(size_t)c * all.model->capacity + (size_t)i] = (ssdgs_real)(ssdgs__uniform(1, (uint64_t)(3 * i + c)) - 0.5);
+            all.model->gaussians[(size_t)c * all.model->capacity + (size_t)i] =
+                (ssdgs_real)(ssdgs__uniform(1, (uint64_t)(3 * i + c)) - 0.5);
             all.model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * all.model->capacity + (size_t)i] = -2;
         }
     options.iterations = 3;
@@ -152,9 +156,12 @@ static void test_from_within(void) {
                 photo.camera.near_plane = bad;
             } else if (with_trainer) CHECK(!ssdgs_trainer_run(all.trainer, NULL, NULL));
             else CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
-            if (!CHECK(all.tries > 0 && all.calls == all.tries)) printf("    %d: %d of %d refused\n", from, all.calls, all.tries);
+            if (!CHECK(all.tries > 0 && all.calls == all.tries))
+                printf("    %d: %d of %d refused\n", from, all.calls, all.tries);
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image)); /* all are still there */
-            if (from < 2) CHECK(strstr(ssdgs_error_message(all.context), "ssdgs_context_destroy: another call on this context is at work") != NULL);
+            if (from < 2)
+                CHECK(strstr(ssdgs_error_message(all.context),
+                             "ssdgs_context_destroy: another call on this context is at work") != NULL);
             all.depth = 1;
             tear_down();
         }
@@ -180,7 +187,8 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
 
 static void test_progress(void) {
     set_up(NULL, 1);
-    CHECK(ssdgs_trainer_run(all.trainer, progress, NULL) == SSDGS_ERR_CANCELLED && all.trainer->iteration == 2);
+    CHECK(ssdgs_trainer_run(all.trainer, progress, NULL) == SSDGS_ERR_CANCELLED &&
+          all.trainer->iteration == 2);
     ssdgs_trainer_destroy(all.trainer);
     remove(FILE_NAME);
 }
@@ -204,7 +212,8 @@ static void count_out(void *user, void *memory) {
 
 static void count_notes(void *user, ssdgs_result code, const char *message) {
     (void)user;
-    notes += code == SSDGS_OK && (strstr(message, "go with the last") || strstr(message, "goes with it") || strstr(message, "the context goes"));
+    notes += code == SSDGS_OK && (strstr(message, "go with the last") || strstr(message, "goes with it") ||
+                                  strstr(message, "the context goes"));
 }
 
 /* Whatever goes first, everything works as long as it is there, is told, and nothing is left over. */
@@ -227,11 +236,13 @@ static void test_order(void) {
             if (gone == 't') ssdgs_trainer_destroy(all.trainer);
             if (gone == 'm') ssdgs_model_destroy(all.model);
             if (gone == 'c') ssdgs_context_destroy(all.context);
-            if (k == 0 && gone != 'm') CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+            if (k == 0 && gone != 'm')
+                CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
             if (k == 0 && gone != 't') CHECK(!ssdgs_trainer_step(all.trainer, NULL));
             if (k == 1 && orders[i][2] == 't') CHECK(!ssdgs_trainer_step(all.trainer, NULL));
         }
-        if (!CHECK(blocks == 0 && notes == told[i])) printf("    %s: %d blocks left, told %d times\n", orders[i], blocks, notes);
+        if (!CHECK(blocks == 0 && notes == told[i]))
+            printf("    %s: %d blocks left, told %d times\n", orders[i], blocks, notes);
     }
 }
 
@@ -260,8 +271,10 @@ static void test_fork(void) {
             tear_down();
             _exit(good ? 0 : 1);
         }
-        CHECK(child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
-        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) && !memcmp(first, color, sizeof first));
+        CHECK(child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) &&
+              WEXITSTATUS(status) == 0);
+        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) &&
+              !memcmp(first, color, sizeof first));
         tear_down();
     }
 #endif
@@ -269,11 +282,12 @@ static void test_fork(void) {
 
 /* ---- arguments ---- */
 
-#define NAMES(call, text)                                                                                            \
-    do {                                                                                                             \
-        CHECK(ssdgs_model_create(all.context, NULL, -7, &other) == SSDGS_ERR_ARGUMENT); /* another call's message */ \
-        if (!CHECK((call) == SSDGS_ERR_ARGUMENT && !strcmp(ssdgs_error_message(all.context), text)))                 \
-            printf("    \"%s\", not \"%s\"\n", ssdgs_error_message(all.context), text);                              \
+#define NAMES(call, text) \
+    do { \
+        CHECK(ssdgs_model_create(all.context, NULL, -7, &other) == \
+              SSDGS_ERR_ARGUMENT); /* another call's message */ \
+        if (!CHECK((call) == SSDGS_ERR_ARGUMENT && !strcmp(ssdgs_error_message(all.context), text))) \
+            printf("    \"%s\", not \"%s\"\n", ssdgs_error_message(all.context), text); \
     } while (0)
 
 static void test_null(void) {
@@ -294,7 +308,8 @@ static void test_null(void) {
     NAMES(ssdgs_model_save(all.model, NULL), "ssdgs_model_save: path is NULL");
     NAMES(ssdgs_model_load(all.context, NULL, &other, NULL), "ssdgs_model_load: path is NULL");
     NAMES(ssdgs_model_load(all.context, FILE_NAME, NULL, NULL), "ssdgs_model_load: out is NULL");
-    NAMES(ssdgs_model_load_memory(all.context, NULL, 3, &other, NULL), "ssdgs_model_load_memory: bytes is NULL");
+    NAMES(ssdgs_model_load_memory(all.context, NULL, 3, &other, NULL),
+          "ssdgs_model_load_memory: bytes is NULL");
     NAMES(ssdgs_model_load_memory(all.context, "ply", 3, NULL, NULL), "ssdgs_model_load_memory: out is NULL");
     NAMES(ssdgs_compare(all.context, NULL, color, 4, 4, &metrics), "ssdgs_compare: image is NULL");
     NAMES(ssdgs_compare(all.context, color, color, 4, 4, NULL), "ssdgs_compare: metrics is NULL");
@@ -310,12 +325,15 @@ static void test_null(void) {
     NAMES(ssdgs_trainer_refined(all.trainer, 1, &camera, &light), "ssdgs_trainer_refined: photograph 1 of 1");
     NAMES(ssdgs_trainer_save(all.trainer, NULL), "ssdgs_trainer_save: path is NULL");
     NAMES(ssdgs_trainer_load(all.trainer, NULL), "ssdgs_trainer_load: path is NULL");
-    NAMES(ssdgs_checkpoint_iteration(all.context, NULL, &iteration), "ssdgs_checkpoint_iteration: path is NULL");
-    NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL), "ssdgs_checkpoint_iteration: iteration is NULL");
+    NAMES(ssdgs_checkpoint_iteration(all.context, NULL, &iteration),
+          "ssdgs_checkpoint_iteration: path is NULL");
+    NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
+          "ssdgs_checkpoint_iteration: iteration is NULL");
     NAMES(ssdgs_model_adopt(all.model, all.model), "ssdgs_model_adopt: a trainer has the model");
     CHECK(!other);
-    CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) && ssdgs_model_adopt(NULL, all.model) &&
-          ssdgs_model_save(NULL, FILE_NAME) && ssdgs_trainer_step(NULL, NULL) && ssdgs_trainer_run(NULL, NULL, NULL) &&
+    CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) &&
+          ssdgs_model_adopt(NULL, all.model) && ssdgs_model_save(NULL, FILE_NAME) &&
+          ssdgs_trainer_step(NULL, NULL) && ssdgs_trainer_run(NULL, NULL, NULL) &&
           ssdgs_trainer_create(NULL, &photo, 1, NULL, &none) && ssdgs_stage_cpu(NULL, SSDGS_STAGE_SORT));
     camera = ssdgs_camera_look_at(NULL, three, three, 1, 4, 4);
     CHECK(camera.width == 0 && ssdgs_render(all.model, &camera, NULL, 0, &image) == SSDGS_ERR_ARGUMENT);
@@ -338,9 +356,11 @@ static void test_null(void) {
     tear_down();
 }
 
-/* A shared parameter that is no number is in every Gaussian: no frame is drawn with it, none is trained, and the message names it. */
+/* A shared parameter that is no number is in every Gaussian: no frame is drawn with it, none is trained, and
+   the message names it. */
 static void test_shared(void) {
-    static const char *const names[5] = {"asg_basis", "asg_sharpness", "asg_sigma", "the scattering network", "the shadow network"};
+    static const char *const names[5] = {"asg_basis", "asg_sharpness", "asg_sigma", "the scattering network",
+                                         "the shadow network"};
     int group, kind;
     for (group = 0; group < 5; group++)
         for (kind = 0; kind < 2; kind++) {
@@ -350,14 +370,17 @@ static void test_shared(void) {
             set_up(NULL, 1);
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
             view = ssdgs_model_get(all.model);
-            at[0] = view.asg_basis, at[1] = view.asg_sharpness, at[2] = view.asg_sigma, at[3] = view.scattering, at[4] = view.shadow;
+            at[0] = view.asg_basis, at[1] = view.asg_sharpness, at[2] = view.asg_sigma,
+            at[3] = view.scattering, at[4] = view.shadow;
             at[group][5] = kind ? (ssdgs_real)NAN : (ssdgs_real)INFINITY;
             snprintf(text, sizeof text, "model: value 5 of %s is not finite", names[group]);
             CHECK(ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_NONFINITE);
-            if (!CHECK(!strcmp(ssdgs_error_message(all.context), text))) printf("    %s\n", ssdgs_error_message(all.context));
+            if (!CHECK(!strcmp(ssdgs_error_message(all.context), text)))
+                printf("    %s\n", ssdgs_error_message(all.context));
             CHECK(ssdgs_trainer_run(all.trainer, NULL, NULL) == SSDGS_ERR_NONFINITE);
             snprintf(text, sizeof text, FILE_NAME ": model: value 5 of %s is not finite", names[group]);
-            CHECK(ssdgs_model_save(all.model, FILE_NAME) == SSDGS_ERR_NONFINITE && !strcmp(ssdgs_error_message(all.context), text));
+            CHECK(ssdgs_model_save(all.model, FILE_NAME) == SSDGS_ERR_NONFINITE &&
+                  !strcmp(ssdgs_error_message(all.context), text));
             view = ssdgs_model_get(all.model);
             at[group][5] = 0;
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
@@ -369,9 +392,11 @@ static void test_shared(void) {
 
 static double curve(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055; }
 
-/* Every 97th float of 0 .. 1 and beyond: at most one level off, every byte comes back, steps never go down. */
+/* Every 97th float of 0 .. 1 and beyond: at most one level off, every byte comes back, steps never go
+   down. */
 static void test_bytes(void) {
-    const ssdgs_real odd[8] = {-1, (ssdgs_real)-1e30, (ssdgs_real)NAN, 0, 1, 2, (ssdgs_real)INFINITY, (ssdgs_real)-INFINITY};
+    const ssdgs_real odd[8] = {-1, (ssdgs_real)-1e30,    (ssdgs_real)NAN,      0, 1,
+                               2,  (ssdgs_real)INFINITY, (ssdgs_real)-INFINITY};
     const unsigned char want[8] = {0, 0, 0, 0, 255, 255, 255, 0};
     unsigned char got[8];
     int transfer, i;
@@ -390,14 +415,17 @@ static void test_bytes(void) {
             }
             ssdgs_to_bytes(many, 4096, transfer, out);
             for (i = 0; i < 4096; i++) {
-                const double x = many[i] < 1 ? (double)many[i] : 1, level = 255 * (transfer == SSDGS_TRANSFER_SRGB ? curve(x) : x);
+                const double x = many[i] < 1 ? (double)many[i] : 1,
+                             level = 255 * (transfer == SSDGS_TRANSFER_SRGB ? curve(x) : x);
                 off += fabs(out[i] - level) > 1;
                 falls += out[i] < before;
                 before = out[i];
             }
         }
         CHECK(off == 0 && falls == 0);
-        for (i = 0; i < 256; i++) values[i] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode((ssdgs_real)(i / 255.0)) : (ssdgs_real)(i / 255.0);
+        for (i = 0; i < 256; i++)
+            values[i] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode((ssdgs_real)(i / 255.0))
+                                                        : (ssdgs_real)(i / 255.0);
         ssdgs_to_bytes(values, 256, transfer, bytes);
         for (i = 0; i < 256 && bytes[i] == i; i++) {}
         CHECK(i == 256);
@@ -406,7 +434,8 @@ static void test_bytes(void) {
     }
 }
 
-/* Rows, strides and orders of ssdgs_to_pixels(), and straight colours; ssdgs_compose() to 2e-5 of the formula, beyond 1 too. */
+/* Rows, strides and orders of ssdgs_to_pixels(), and straight colours; ssdgs_compose() to 2e-5 of the
+   formula, beyond 1 too. */
 static void test_pixels(void) {
     enum { W = 5, H = 4, STRIDE = 7, PITCH = 32 };
     ssdgs_real colors[H * STRIDE * 3], alphas[H * STRIDE], background[3] = {(ssdgs_real)0.2, 0, 1}, stored[3];
@@ -418,7 +447,8 @@ static void test_pixels(void) {
     from.color = colors;
     for (y = 0; y < H * STRIDE; y++) {
         alphas[y] = (ssdgs_real)(y % 5) / 4;
-        for (c = 0; c < 3; c++) colors[3 * y + c] = alphas[y] * (ssdgs_real)ssdgs__uniform(2, (uint64_t)(3 * y + c));
+        for (c = 0; c < 3; c++)
+            colors[3 * y + c] = alphas[y] * (ssdgs_real)ssdgs__uniform(2, (uint64_t)(3 * y + c));
     }
     for (opaque = 0; opaque < 2; opaque++)
         for (bgra = 0; bgra < 2; bgra++)
@@ -426,16 +456,21 @@ static void test_pixels(void) {
                 int wrong = 0;
                 from.alpha = opaque ? NULL : alphas;
                 memset(out, 77, sizeof out);
-                ssdgs_to_pixels(&from, W, H, SSDGS_TRANSFER_SRGB, bgra ? SSDGS_BGRA8 : SSDGS_RGBA8, up ? out + (H - 1) * PITCH : out,
-                                up ? -PITCH : PITCH);
+                ssdgs_to_pixels(&from, W, H, SSDGS_TRANSFER_SRGB, bgra ? SSDGS_BGRA8 : SSDGS_RGBA8,
+                                up ? out + (H - 1) * PITCH : out, up ? -PITCH : PITCH);
                 for (y = 0; y < H; y++)
                     for (x = 0; x < PITCH; x++) {
                         const unsigned char *p = out + (up ? H - 1 - y : y) * PITCH + x;
-                        const int at = y * STRIDE + x / 4, channel = x % 4 == 3 ? 3 : bgra ? 2 - x % 4 : x % 4;
+                        const int at = y * STRIDE + x / 4, channel = x % 4 == 3 ? 3
+                                                                     : bgra     ? 2 - x % 4
+                                                                                : x % 4;
                         const double a = opaque || x >= 4 * W ? 1 : (double)alphas[at];
                         if (x >= 4 * W) wrong += *p != 77;
-                        else if (channel == 3) wrong += a > 0 && a < 1 ? fabs(*p - 255 * a) > 1 : *p != (int)(255 * a);
-                        else wrong += fabs(*p - 255 * (a > 0 ? curve((double)colors[3 * at + channel] / a) : 0)) > 1;
+                        else if (channel == 3)
+                            wrong += a > 0 && a < 1 ? fabs(*p - 255 * a) > 1 : *p != (int)(255 * a);
+                        else
+                            wrong += fabs(*p - 255 * (a > 0 ? curve((double)colors[3 * at + channel] / a)
+                                                            : 0)) > 1;
                     }
                 CHECK(wrong == 0);
             }

@@ -1,4 +1,5 @@
-/* What is skipped changes nothing, or no more than it says: kept frames, dead neurons, frozen networks, max_error, presets. */
+/* What is skipped changes nothing, or no more than it says: kept frames, dead neurons, frozen networks,
+   max_error, presets. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -9,7 +10,8 @@ static ssdgs_real image[2][PIXELS * 3];
 
 static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
-/* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to say. */
+/* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to
+   say. */
 static ssdgs_model *make_model(ssdgs_context *context) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
@@ -20,14 +22,19 @@ static ssdgs_model *make_model(ssdgs_context *context) {
     v = ssdgs_model_get(model);
     for (i = 0; i < COUNT; i++) {
         const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
-        const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z, -r * sin(turn), r * cos(turn), 0};
+        const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z,
+                               -r * sin(turn),      r * cos(turn),       0};
         for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
         for (c = 0; c < 4; c++)
-            v.gaussians[(SSDGS_ROTATION + c) * v.stride + i] = v.gaussians[(SSDGS_FRAME + c) * v.stride + i] = (ssdgs_real)raw[3 + c];
-        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + i] = (ssdgs_real)(c < 2 ? -3.6 : -6);
+            v.gaussians[(SSDGS_ROTATION + c) * v.stride + i] = v.gaussians[(SSDGS_FRAME + c) * v.stride + i] =
+                (ssdgs_real)raw[3 + c];
+        for (c = 0; c < 3; c++)
+            v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + i] = (ssdgs_real)(c < 2 ? -3.6 : -6);
         v.gaussians[SSDGS_OPACITY * v.stride + i] = (ssdgs_real)(3 * draw(50 * i) - 1);
-        for (c = SSDGS_DIFFUSE; c < SSDGS_FRAME; c++) v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
-        for (c = SSDGS_ASG_WEIGHT; c < SSDGS_CHANNELS; c++) v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
+        for (c = SSDGS_DIFFUSE; c < SSDGS_FRAME; c++)
+            v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
+        for (c = SSDGS_ASG_WEIGHT; c < SSDGS_CHANNELS; c++)
+            v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
     }
     for (i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * draw(1000000 + i) - 0.1);
     return model;
@@ -59,10 +66,12 @@ static void render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
 
 /* The frame from a context that has kept frames has the bits of one that has not. */
 static void check_same(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
-                       const ssdgs_render_options *options, int camera_kept, int lights_kept, const char *name) {
+                       const ssdgs_render_options *options, int camera_kept, int lights_kept,
+                       const char *name) {
     ssdgs_render_stats stats;
     render(model, camera, lights, count, options, image[0], &stats);
-    if (!test_check(stats.camera_kept == camera_kept && stats.lights_kept == lights_kept, __FILE__, __LINE__, name))
+    if (!test_check(stats.camera_kept == camera_kept && stats.lights_kept == lights_kept, __FILE__, __LINE__,
+                    name))
         printf("    camera kept %d, lights kept %d\n", stats.camera_kept, stats.lights_kept);
     (void)ssdgs_model_get(model); /* forget */
     render(model, camera, lights, count, options, image[1], &stats);
@@ -135,8 +144,13 @@ static void test_kept(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Blocks of powers of two bytes, the last one given back first, as engines' allocators are: what grows may stay where it was. */
-typedef union block { union block *next; size_t size; unsigned char room[64]; } block;
+/* Blocks of powers of two bytes, the last one given back first, as engines' allocators are: what grows may
+   stay where it was. */
+typedef union block {
+    union block *next;
+    size_t size;
+    unsigned char room[64];
+} block;
 static block *pool[64];
 
 static int size_class(size_t bytes) {
@@ -174,9 +188,9 @@ static void pool_empty(void) {
         }
 }
 
-/* A random walk: each frame one thing or two change, of camera, lights, options, planes asked for and model, now and then a call
-   fails or another model is evaluated. A context that keeps what it can, its memory from a pool, has the bits of one that forgets
-   each time. */
+/* A random walk: each frame one thing or two change, of camera, lights, options, planes asked for and model,
+   now and then a call fails or another model is evaluated. A context that keeps what it can, its memory from
+   a pool, has the bits of one that forgets each time. */
 static void test_walk(void) {
     enum { FRAMES = 400, VIEWS = 3, LIGHTS = 3, MODELS = 2, PLANE_COUNT = 8, VALUES = 17 };
     static ssdgs_real planes[2][PIXELS * VALUES];
@@ -187,7 +201,8 @@ static void test_walk(void) {
     ssdgs_camera cameras[VIEWS];
     ssdgs_light lights[LIGHTS];
     ssdgs_render_options options = ssdgs_render_options_default();
-    int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_kept = 0, failures = 0;
+    int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0,
+                             lights_kept = 0, failures = 0;
     uint64_t at = 7000000;
 #define PICK(n) ((int)(draw(at++) * (n)))
     memset(&desc, 0, sizeof desc);
@@ -207,56 +222,63 @@ static void test_walk(void) {
         ssdgs_metrics metrics;
         ssdgs_light other;
         for (change = 0; change < changes; change++) {
-            const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS), gaussian = PICK(COUNT), light = PICK(LIGHTS);
+            const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
+                      gaussian = PICK(COUNT), light = PICK(LIGHTS);
             const ssdgs_real value = (ssdgs_real)draw(at++);
             switch (kind) {
-                case 0: view = PICK(VIEWS); break;
-                case 1: which = PICK(MODELS); break;
-                case 2: light_count = PICK(LIGHTS + 1); break;
-                case 3: lights[light].position[PICK(3)] += value - (ssdgs_real)0.5; break;
-                case 4: lights[light].intensity[PICK(3)] = value; break;
-                case 5: other = lights[light], lights[light] = lights[0], lights[0] = other; break;
-                case 6: wanted = PICK(1 << (PLANE_COUNT - 1)); break;
-                case 7: options.max_error = PICK(2) ? 0 : value / 4; break;
-                case 8: options.terms = PICK(SSDGS_ALL_TERMS + 1); break;
-                case 9: options.light_detail = PICK(2) ? 1 : (ssdgs_real)0.3 + value; break;
-                case 10: options.alpha_threshold = (ssdgs_real)0.001 + value / 50; break;
-                case 11: options.stop = PICK(2) ? 0 : value / 50; break;
-                case 12: options.antialias = PICK(2); break;
-                case 13: options.background[PICK(3)] = value; break;
-                case 14: options.bf16 = PICK(2); break;
-                case 15: for (i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light); break;
-                case 16:
-                    for (k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
-                    break;
-                case 17: /* the model's own, in both contexts */
-                    for (k = 0; k < 2; k++) {
-                        const ssdgs_model_view v = ssdgs_model_get(models[k][which]);
-                        v.gaussians[(size_t)channel * v.stride + (size_t)gaussian] += 2 * value - 1;
-                        v.scattering[channel] += value - (ssdgs_real)0.5;
-                    }
-                    break;
-                default: /* the first context's alone */
-                    memset(&photo, 0, sizeof photo);
-                    photo.camera = cameras[view];
-                    photo.light = lights[light];
-                    photo.pixels = photograph;
-                    CHECK(!ssdgs_evaluate(models[0][PICK(MODELS)], &photo, options.background, NULL, &metrics));
-                    photo.camera.fx = 0;
-                    failures += ssdgs_render(models[0][which], &photo.camera, lights, light_count, NULL) != SSDGS_OK;
+            case 0: view = PICK(VIEWS); break;
+            case 1: which = PICK(MODELS); break;
+            case 2: light_count = PICK(LIGHTS + 1); break;
+            case 3: lights[light].position[PICK(3)] += value - (ssdgs_real)0.5; break;
+            case 4: lights[light].intensity[PICK(3)] = value; break;
+            case 5: other = lights[light], lights[light] = lights[0], lights[0] = other; break;
+            case 6: wanted = PICK(1 << (PLANE_COUNT - 1)); break;
+            case 7: options.max_error = PICK(2) ? 0 : value / 4; break;
+            case 8: options.terms = PICK(SSDGS_ALL_TERMS + 1); break;
+            case 9: options.light_detail = PICK(2) ? 1 : (ssdgs_real)0.3 + value; break;
+            case 10: options.alpha_threshold = (ssdgs_real)0.001 + value / 50; break;
+            case 11: options.stop = PICK(2) ? 0 : value / 50; break;
+            case 12: options.antialias = PICK(2); break;
+            case 13: options.background[PICK(3)] = value; break;
+            case 14: options.bf16 = PICK(2); break;
+            case 15:
+                for (i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light);
+                break;
+            case 16:
+                for (k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
+                break;
+            case 17: /* the model's own, in both contexts */
+                for (k = 0; k < 2; k++) {
+                    const ssdgs_model_view v = ssdgs_model_get(models[k][which]);
+                    v.gaussians[(size_t)channel * v.stride + (size_t)gaussian] += 2 * value - 1;
+                    v.scattering[channel] += value - (ssdgs_real)0.5;
+                }
+                break;
+            default: /* the first context's alone */
+                memset(&photo, 0, sizeof photo);
+                photo.camera = cameras[view];
+                photo.light = lights[light];
+                photo.pixels = photograph;
+                CHECK(!ssdgs_evaluate(models[0][PICK(MODELS)], &photo, options.background, NULL, &metrics));
+                photo.camera.fx = 0;
+                failures +=
+                    ssdgs_render(models[0][which], &photo.camera, lights, light_count, NULL) != SSDGS_OK;
             }
         }
         memset(planes, 0, sizeof planes);
         for (k = 0; k < 2; k++) {
             ssdgs_image out;
-            ssdgs_real **const plane[PLANE_COUNT] = {&out.color, &out.alpha, &out.depth, &out.normal,
-                                                &out.diffuse, &out.specular, &out.scattering, &out.shadow};
+            ssdgs_real **const plane[PLANE_COUNT] = {&out.color,      &out.alpha,   &out.depth,
+                                                     &out.normal,     &out.diffuse, &out.specular,
+                                                     &out.scattering, &out.shadow};
             static const int first[PLANE_COUNT] = {0, 3, 4, 5, 8, 11, 14, 14};
             memset(&out, 0, sizeof out);
             for (i = 0; i < PLANE_COUNT; i++)
-                if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering))) *plane[i] = planes[k] + PIXELS * first[i];
+                if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering)))
+                    *plane[i] = planes[k] + PIXELS * first[i];
             if (k && context[k]->frame) memset(&context[k]->frame->kept, 0, sizeof context[k]->frame->kept);
-            CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out, stats + k));
+            CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out,
+                                   stats + k));
         }
         cameras_kept += stats[0].camera_kept;
         lights_kept += stats[0].lights_kept;
@@ -274,7 +296,8 @@ static void test_walk(void) {
     pool_empty();
 }
 
-/* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was left. */
+/* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was
+   left. */
 static void test_max_error(void) {
     static const double bounds[3] = {1.0 / 64, 1.0 / 16, 1.0 / 4};
     ssdgs_context *context = NULL;
@@ -303,7 +326,8 @@ static void test_max_error(void) {
             }
             frame.layer_count = 0; /* the weights alone */
             CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
-            for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
+            for (i = 0; i < PIXELS; i++)
+                most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
             CHECK(most > 0 && most <= bounds[b] * (1 + 1e-5));
             CHECK(glimpsed > 0 && frame.shaded_count < last);
             last = frame.shaded_count;
@@ -325,12 +349,15 @@ static void test_spent_budget(void) {
     double most = 0;
     int i, c, glimpsed = 0;
     options.max_error = (ssdgs_real)0.5;
-    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_model_create(context, NULL, LAYERS, &model))) exit(1);
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) ||
+        !CHECK(!ssdgs_model_create(context, NULL, LAYERS, &model)))
+        exit(1);
     v = ssdgs_model_get(model);
     for (i = 0; i < LAYERS; i++) {
         v.gaussians[SSDGS_POSITION * v.stride + (size_t)i] = (ssdgs_real)(0.001 * i);
         v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.6;
-        for (c = 0; c < 3; c++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
+        for (c = 0; c < 3; c++)
+            v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
     }
     CHECK(!ssdgs__frame_begin(&frame, model, &camera, NULL, 0, &options, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
@@ -366,7 +393,9 @@ static void test_presets(void) {
         double squares = 0;
         render(model, &camera, &light, 1, options + o, image[o > 0], stats + o);
         for (i = 0; o && i < PIXELS * 3; i++) squares += pow((double)(image[1][i] - image[0][i]), 2);
-        if (o) printf("%s against exact: %.1f dB\n", o == 1 ? "default" : "fast", ssdgs__psnr(squares / (PIXELS * 3)));
+        if (o)
+            printf("%s against exact: %.1f dB\n", o == 1 ? "default" : "fast",
+                   ssdgs__psnr(squares / (PIXELS * 3)));
         if (o) CHECK(ssdgs__psnr(squares / (PIXELS * 3)) > (o == 1 ? 50 : 35));
         CHECK(stats[o].gaussians == COUNT && stats[o].light_views == 1 && stats[o].rejected == 0);
         CHECK(stats[o].network_work > 0.3 && stats[o].network_work <= 1);
@@ -389,12 +418,20 @@ static int all_rows(const ssdgs_real *rows, int count, uint16_t *list) {
     return count;
 }
 
-/* A network half of whose neurons are dead in the block gives the bits of one in which nothing is left out, both ways. */
+/* A network half of whose neurons are dead in the block gives the bits of one in which nothing is left out,
+   both ways. */
 static void test_dead_neurons(void) {
-    enum { INS = 20, WIDE = 37, OUTS = 3, WEIGHTS = (INS + 1) * WIDE + (WIDE + 1) * WIDE + (WIDE + 1) * OUTS };
+    enum {
+        INS = 20,
+        WIDE = 37,
+        OUTS = 3,
+        WEIGHTS = (INS + 1) * WIDE + (WIDE + 1) * WIDE + (WIDE + 1) * OUTS
+    };
     static const int sizes[4] = {INS, WIDE, WIDE, OUTS};
-    static ssdgs_real weights[WEIGHTS], inputs[INS * SSDGS__BLOCK], outputs[2][(2 * WIDE + OUTS) * SSDGS__BLOCK];
-    static ssdgs_real gradient[2][(32 + 16) * WIDE + (48 + 16) * (WIDE + OUTS)], d[2][64 * SSDGS__BLOCK], spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
+    static ssdgs_real weights[WEIGHTS], inputs[INS * SSDGS__BLOCK],
+        outputs[2][(2 * WIDE + OUTS) * SSDGS__BLOCK];
+    static ssdgs_real gradient[2][(32 + 16) * WIDE + (48 + 16) * (WIDE + OUTS)], d[2][64 * SSDGS__BLOCK],
+        spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
     static ssdgs_real sums[WEIGHTS];
     int isa, i, part;
     for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
@@ -405,7 +442,8 @@ static void test_dead_neurons(void) {
         if (!table) continue;
         for (i = 0; i < WEIGHTS; i++) weights[i] = (ssdgs_real)(draw((uint64_t)i) - 0.5);
         for (i = 0; i < INS * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
-        for (i = 0; i < WIDE; i += 2) weights[INS * WIDE + i] = weights[(INS + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
+        for (i = 0; i < WIDE; i += 2)
+            weights[INS * WIDE + i] = weights[(INS + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
         for (part = 0; part < 2; part++) {
             k = *table;
             if (part) k.live_rows = all_rows;
@@ -413,9 +451,10 @@ static void test_dead_neurons(void) {
             memset(gradient[part], 0, sizeof gradient[part]);
             ssdgs__network_forward(&k, sizes, 3, weights, NULL, NULL, &lists, inputs, outputs[part]);
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
-            for (i = 0; i < OUTS * SSDGS__BLOCK; i++) d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
-            dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part], spare, transposed, &lists,
-                                                    INS, gradient[part]);
+            for (i = 0; i < OUTS * SSDGS__BLOCK; i++)
+                d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
+            dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part],
+                                                    spare, transposed, &lists, INS, gradient[part]);
             if (dinputs[part] == spare) memcpy(d[part], spare, sizeof spare);
         }
         CHECK(!memcmp(outputs[0], outputs[1], sizeof outputs[0]));
@@ -436,7 +475,8 @@ static void test_far_out(void) {
         double most = 0;
         if (!table) continue;
         table->encode(out, in, NULL, 1, 1, 4);
-        for (i = SSDGS__BLOCK; i < 9 * SSDGS__BLOCK; i++) most = fabs((double)out[i]) <= most ? most : fabs((double)out[i]);
+        for (i = SSDGS__BLOCK; i < 9 * SSDGS__BLOCK; i++)
+            most = fabs((double)out[i]) <= most ? most : fabs((double)out[i]);
         CHECK(most > 0.9 && most < 1.01);
     }
 }
@@ -464,11 +504,13 @@ static void test_frozen(void) {
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
         for (g = 0; g < 2; g++) {
             double sum = 0;
-            for (i = first[g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET]; i < first[(g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET) + 1]; i++)
+            for (i = first[g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
+                 i < first[(g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET) + 1]; i++)
                 sum += fabs((double)frame.global_gradient[i]);
             CHECK(frame.frozen[g] ? sum == 0 : sum > 0);
         }
-        if (!part) planes = (ssdgs_real *)memcpy(malloc(n * sizeof *planes), frame.gradient, n * sizeof *planes);
+        if (!part)
+            planes = (ssdgs_real *)memcpy(malloc(n * sizeof *planes), frame.gradient, n * sizeof *planes);
         else CHECK(!memcmp(planes, frame.gradient, n * sizeof *planes));
     }
     free(planes);
@@ -476,7 +518,8 @@ static void test_frozen(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Where all that is glimpsed may go unshaded, it has the first such Gaussian's look, not that of one that is not drawn. */
+/* Where all that is glimpsed may go unshaded, it has the first such Gaussian's look, not that of one that is
+   not drawn. */
 static void test_all_glimpsed(void) {
     static ssdgs_real planes[PIXELS * 5];
     ssdgs_context *context = NULL;
@@ -492,16 +535,21 @@ static void test_all_glimpsed(void) {
     out.color = planes;
     out.alpha = planes + 3 * PIXELS;
     out.depth = planes + 4 * PIXELS;
-    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_model_create(context, NULL, 3, &model))) exit(1);
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) ||
+        !CHECK(!ssdgs_model_create(context, NULL, 3, &model)))
+        exit(1);
     for (pass = 0; pass < 2; pass++) {
         options.max_error = (ssdgs_real)(pass ? 0.5 : 0);
         v = ssdgs_model_get(model);
         for (i = 0; i < 3; i++) {
             v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.5;
-            for (c = 0; c < 3; c++) v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
+            for (c = 0; c < 3; c++)
+                v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
         }
         v.gaussians[0] = (ssdgs_real)NAN;
-        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + 1] = -3 * camera.view[8 + c]; /* behind the camera */
+        for (c = 0; c < 3; c++)
+            v.gaussians[(SSDGS_POSITION + c) * v.stride + 1] =
+                -3 * camera.view[8 + c]; /* behind the camera */
         CHECK(!ssdgs_render_ex(model, &camera, NULL, 0, &options, &out, NULL));
         for (depth[pass] = 0, i = 0; i < PIXELS; i++)
             if ((double)out.alpha[i] > 0.005) depth[pass] = (double)(out.depth[i] / out.alpha[i]);

@@ -1,6 +1,7 @@
-/* Faults: allocations that fail, disks that fill, files that are damaged, hostile, no files at all or change under the
-   reader, processes killed at any moment. Nothing leaks, hangs, is left half done or changes what was there before.
-   cc -o build/t_faults tests/t_faults.c -lm -lpthread && build/t_faults [full]       (writes under build/) */
+/* Faults: allocations that fail, disks that fill, files that are damaged, hostile, no files at all or change
+   under the reader, processes killed at any moment. Nothing leaks, hangs, is left half done or changes what
+   was there before. cc -o build/t_faults tests/t_faults.c -lm -lpthread && build/t_faults [full] (writes
+   under build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* processes, limits, folders, links */
 #endif
@@ -27,11 +28,11 @@
 /* ---- a disk that fails on demand: the system calls of both headers come through here ---- */
 
 typedef struct trouble {
-    size_t room;     /* bytes until it is full; 0 = endless, n = n - 1 */
-    size_t part;     /* bytes written at a time; 0 = all */
-    int interrupts;  /* every other write */
-    long pause;      /* nanoseconds before a write */
-    int taken;       /* so many names exist already */
+    size_t room;          /* bytes until it is full; 0 = endless, n = n - 1 */
+    size_t part;          /* bytes written at a time; 0 = all */
+    int interrupts;       /* every other write */
+    long pause;           /* nanoseconds before a write */
+    int taken;            /* so many names exist already */
     int sync, shut, name; /* errno of fsync, close, rename */
 } trouble;
 
@@ -63,7 +64,9 @@ static int faulty_open(const char *path, int flags, ...) {
 
 static int faulty_close(int file) { return close(file) || !disk.shut ? 0 : (errno = disk.shut, -1); }
 static int faulty_fsync(int file); /* its body comes later: -std=c99 makes the library declare fsync */
-static int faulty_rename(const char *from, const char *to) { return disk.name ? errno = disk.name, -1 : rename(from, to); }
+static int faulty_rename(const char *from, const char *to) {
+    return disk.name ? errno = disk.name, -1 : rename(from, to);
+}
 
 #define write faulty_write
 #define open faulty_open
@@ -76,16 +79,19 @@ static int faulty_rename(const char *from, const char *to) { return disk.name ? 
 #include "../ssdgs.h"
 
 #ifndef _WIN32
-static int faulty_fsync(int file) { (void)file; return disk.sync ? errno = disk.sync, -1 : 0; }
+static int faulty_fsync(int file) {
+    (void)file;
+    return disk.sync ? errno = disk.sync, -1 : 0;
+}
 #endif
 
 /* ---- memory that counts, and fails on demand ---- */
 
 typedef struct meter {
-    long live, calls, fail_at;  /* blocks; calls so far; the one that fails, 0 = none */
-    int for_ever;               /* 1: so do all after it */
-    size_t bytes, peak, limit;  /* in use; most so far; 0 = any */
-    void (*meanwhile)(void);    /* happens once, at the next call */
+    long live, calls, fail_at; /* blocks; calls so far; the one that fails, 0 = none */
+    int for_ever;              /* 1: so do all after it */
+    size_t bytes, peak, limit; /* in use; most so far; 0 = any */
+    void (*meanwhile)(void);   /* happens once, at the next call */
 } meter;
 
 static meter memory;
@@ -99,7 +105,9 @@ static void *meter_resize(void *old, size_t size) {
         memory.meanwhile = NULL;
         now();
     }
-    if (memory.fail_at && (memory.calls == memory.fail_at || (memory.for_ever && memory.calls > memory.fail_at))) return NULL;
+    if (memory.fail_at &&
+        (memory.calls == memory.fail_at || (memory.for_ever && memory.calls > memory.fail_at)))
+        return NULL;
     if (memory.limit && size > memory.limit) return NULL;
     block = (size_t *)realloc(old ? (size_t *)old - 2 : NULL, size + 2 * sizeof *block);
     if (!block) return NULL;
@@ -122,8 +130,14 @@ static void *meter_clear(size_t count, size_t size) {
     return block ? memset(block, 0, count * size) : NULL;
 }
 
-static void *meter_allocate(void *user, size_t bytes) { (void)user; return meter_resize(NULL, bytes); }
-static void meter_release(void *user, void *block) { (void)user; meter_free(block); }
+static void *meter_allocate(void *user, size_t bytes) {
+    (void)user;
+    return meter_resize(NULL, bytes);
+}
+static void meter_release(void *user, void *block) {
+    (void)user;
+    meter_free(block);
+}
 
 #ifndef _WIN32
 #define malloc(size) meter_resize(NULL, size)
@@ -139,7 +153,13 @@ static void meter_release(void *user, void *block) { (void)user; meter_free(bloc
 
 /* ---- a small world: photographs, a context, a model, a trainer ---- */
 
-enum { PHOTOS = 3, SIDE = 24, POINTS = 60, DENSE = 3, RESETS = 13 }; /* the first density control comes with step DENSE */
+enum {
+    PHOTOS = 3,
+    SIDE = 24,
+    POINTS = 60,
+    DENSE = 3,
+    RESETS = 13
+}; /* the first density control comes with step DENSE */
 #define FOLDER "build/t_faults_files"
 
 static const char file_path[] = FOLDER "/file", start_path[] = FOLDER "/start", run_path[] = FOLDER "/run";
@@ -179,10 +199,12 @@ static void make_photos(void) {
         for (c = 0; c < 3; c++) photos[i].light.intensity[c] = 7;
         for (y = 0; y < SIDE; y++)
             for (x = 0; x < SIDE; x++) {
-                const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3), dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3);
+                const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3),
+                             dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3);
                 const double r2 = dx * dx + dy * dy;
                 unsigned char *p = pixels[i] + 4 * (y * SIDE + x);
-                for (c = 0; c < 3; c++) p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c ? 0.7 : 1) + 30 * dx) : 0;
+                for (c = 0; c < 3; c++)
+                    p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c ? 0.7 : 1) + 30 * dx) : 0;
                 p[3] = r2 < 1 ? 255 : 0;
             }
         photos[i].pixels = pixels[i];
@@ -219,12 +241,18 @@ static ssdgs_model *random_model(int count, int width) {
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1;
             v.gaussians[(size_t)c * v.stride + (size_t)i] =
-                (ssdgs_real)(c < SSDGS_ROTATION ? 0.5 * u : c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY ? u - 2.5 : u);
+                (ssdgs_real)(c < SSDGS_ROTATION                          ? 0.5 * u
+                             : c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY ? u - 2.5
+                                                                         : u);
         }
     return m;
 }
 
-static void note(void *user, ssdgs_result code, const char *message) { (void)user; (void)message; last_note = (int)code; }
+static void note(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    (void)message;
+    last_note = (int)code;
+}
 
 static void with_context(void) {
     ssdgs_context_desc desc;
@@ -250,7 +278,8 @@ static ssdgs_result frame(int large) { /* the large one asks for more of everyth
     image.color = planes[0];
     image.alpha = planes[1];
     if (large) {
-        image.depth = planes[2], image.normal = planes[3], image.diffuse = planes[4], image.specular = planes[5];
+        image.depth = planes[2], image.normal = planes[3], image.diffuse = planes[4],
+        image.specular = planes[5];
         image.scattering = planes[6], image.shadow = planes[7];
     }
     return ssdgs_render_ex(model, &camera, lights, large ? 3 : 1, &o, &image, NULL);
@@ -272,7 +301,9 @@ static void with_empty_model(void) {
     if (!CHECK(!ssdgs_model_create(context, &settings, 0, &model))) exit(1);
 }
 
-static ssdgs_result make_trainer(void) { return ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer); }
+static ssdgs_result make_trainer(void) {
+    return ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
+}
 static ssdgs_result step(void) { return ssdgs_trainer_step(trainer, NULL); }
 
 static void with_trainer(void) {
@@ -286,7 +317,8 @@ static void with_steps(int count) {
 }
 
 static void before_control(void) {
-    options.opacity_reset_every = DENSE; /* in the same step, whether or not there is memory for more Gaussians */
+    options.opacity_reset_every =
+        DENSE; /* in the same step, whether or not there is memory for more Gaussians */
     with_steps(DENSE - 1);
 }
 static void after_control(void) { with_steps(DENSE + 1); }
@@ -310,7 +342,8 @@ static uint64_t hash_model(uint64_t hash, const ssdgs_model *m) {
     int c;
     hash = ssdgs__fold(ssdgs__fold(hash, &m->settings, sizeof m->settings), &m->count, sizeof m->count);
     for (c = 0; c < SSDGS_CHANNELS; c++)
-        hash = ssdgs__fold(hash, m->gaussians + (size_t)c * m->capacity, (size_t)m->count * sizeof(ssdgs_real));
+        hash =
+            ssdgs__fold(hash, m->gaussians + (size_t)c * m->capacity, (size_t)m->count * sizeof(ssdgs_real));
     return ssdgs__fold(hash, m->globals, m->global_count * sizeof(ssdgs_real));
 }
 
@@ -334,10 +367,12 @@ static uint64_t held(void) {
     hash = ssdgs__fold(hash, t->steps, sizeof t->steps);
     for (i = 0; i < SSDGS_CHANNELS; i++) {
         hash = ssdgs__fold(hash, t->mean + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
-        hash = ssdgs__fold(hash, t->square + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
+        hash =
+            ssdgs__fold(hash, t->square + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
     }
     for (i = 0; i < SSDGS__STATISTICS; i++)
-        hash = ssdgs__fold(hash, t->screen_gradient + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
+        hash = ssdgs__fold(hash, t->screen_gradient + (size_t)i * t->stride,
+                           (size_t)model->count * sizeof(ssdgs_real));
     hash = ssdgs__fold(hash, t->global_mean, model->global_count * sizeof(ssdgs_real));
     hash = ssdgs__fold(hash, t->global_square, model->global_count * sizeof(ssdgs_real));
     return ssdgs__fold(hash, t->corrections, (size_t)t->photo_count * sizeof *t->corrections);
@@ -362,8 +397,12 @@ static ssdgs_result do_load(void) { return ssdgs_model_load(context, start_path,
 static ssdgs_result do_save(void) { return ssdgs_model_save(model, file_path); }
 static ssdgs_result do_sort(void) { return ssdgs_model_sort(model); }
 static ssdgs_result do_frame(void) { return frame(1); }
-static ssdgs_result do_compare(void) { return ssdgs_compare(context, pair[0], pair[1], SIDE, SIDE, &metrics); }
-static ssdgs_result do_evaluate(void) { return ssdgs_evaluate(model, photos, options.background, planes[0], &metrics); }
+static ssdgs_result do_compare(void) {
+    return ssdgs_compare(context, pair[0], pair[1], SIDE, SIDE, &metrics);
+}
+static ssdgs_result do_evaluate(void) {
+    return ssdgs_evaluate(model, photos, options.background, planes[0], &metrics);
+}
 static ssdgs_result do_refine(void) { return ssdgs_refine_photo(model, &refined, options.background, 2); }
 static ssdgs_result do_keep(void) { return ssdgs_trainer_save(trainer, file_path); }
 static ssdgs_result do_resume(void) { return ssdgs_trainer_load(trainer, run_path); }
@@ -379,7 +418,8 @@ static ssdgs_result do_load_memory(void) {
 #ifndef _WIN32
 static ssdgs_result do_png(void) {
     return !olat_write_png(file_path, SIDE, SIDE, 4, pixels[0], error) ? SSDGS_OK
-         : strstr(error, "out of memory") ? SSDGS_ERR_MEMORY : SSDGS_ERR_IO;
+           : strstr(error, "out of memory")                            ? SSDGS_ERR_MEMORY
+                                                                       : SSDGS_ERR_IO;
 }
 
 static ssdgs_result do_dataset(void) {
@@ -403,17 +443,25 @@ typedef struct operation {
     int frames; /* 1: leaves buffers in the context */
 } operation;
 
-static const operation operations[] = {
-    {"model_create", with_context, do_create, 0}, {"model_load", with_context, do_load, 0},
-    {"model_load_memory", with_context, do_load_memory, 0}, {"model_save", with_model, do_save, 0},
-    {"model_sort", with_model, do_sort, 0},
-    {"render", with_model, do_frame, 1}, {"render more", with_frame, do_frame, 1}, {"compare", with_frame, do_compare, 0},
-    {"evaluate", with_frame, do_evaluate, 1}, {"refine_photo", with_frame, do_refine, 1},
-    {"trainer_create", with_empty_model, make_trainer, 0}, {"trainer_create, a model there", with_model, make_trainer, 0},
-    {"step", with_trainer, step, 1}, {"step with density control", before_control, step, 1},
-    {"trainer_save", after_control, do_keep, 0}, {"trainer_load", with_trainer, do_resume, 0},
+static const operation operations[] = {{"model_create", with_context, do_create, 0},
+                                       {"model_load", with_context, do_load, 0},
+                                       {"model_load_memory", with_context, do_load_memory, 0},
+                                       {"model_save", with_model, do_save, 0},
+                                       {"model_sort", with_model, do_sort, 0},
+                                       {"render", with_model, do_frame, 1},
+                                       {"render more", with_frame, do_frame, 1},
+                                       {"compare", with_frame, do_compare, 0},
+                                       {"evaluate", with_frame, do_evaluate, 1},
+                                       {"refine_photo", with_frame, do_refine, 1},
+                                       {"trainer_create", with_empty_model, make_trainer, 0},
+                                       {"trainer_create, a model there", with_model, make_trainer, 0},
+                                       {"step", with_trainer, step, 1},
+                                       {"step with density control", before_control, step, 1},
+                                       {"trainer_save", after_control, do_keep, 0},
+                                       {"trainer_load", with_trainer, do_resume, 0},
 #ifndef _WIN32
-    {"olat_load", with_context, do_dataset, 0}, {"olat_write_png", with_context, do_png, 0}
+                                       {"olat_load", with_context, do_dataset, 0},
+                                       {"olat_write_png", with_context, do_png, 0}
 #endif
 };
 
@@ -434,7 +482,8 @@ static int all_finite(const ssdgs_real *values, size_t n) {
 
 static int finite_model(const ssdgs_model *m) {
     int c, good = all_finite(m->globals, m->global_count);
-    for (c = 0; c < SSDGS_CHANNELS; c++) good &= all_finite(m->gaussians + (size_t)c * m->capacity, (size_t)m->count);
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        good &= all_finite(m->gaussians + (size_t)c * m->capacity, (size_t)m->count);
     return good;
 }
 
@@ -482,13 +531,15 @@ static void test_memory(void) {
                 uncontrolled++;
             } else {
                 wrong += held() != before;
-                if (base && n % 2) wrong += frame(0) || ssdgs__fold(SEED, planes, sizeof planes) != base; /* still */
+                if (base && n % 2)
+                    wrong += frame(0) || ssdgs__fold(SEED, planes, sizeof planes) != base; /* still */
                 memset(planes, 0, sizeof planes);
                 wrong += op->run() != SSDGS_OK || given() != want;
             }
             end_world();
             wrong += memory.live != 0;
-            if (wrong && !shown++) printf("%s: wrong when allocation %ld of %ld fails\n", op->name, 1 + n % calls, calls);
+            if (wrong && !shown++)
+                printf("%s: wrong when allocation %ld of %ld fails\n", op->name, 1 + n % calls, calls);
         }
         oom_points += 2 * calls;
         if (!test_check(!wrong, __FILE__, __LINE__, op->name)) printf("    %d things wrong\n", wrong);
@@ -503,7 +554,8 @@ static void test_memory(void) {
         memory.calls = 0;
         memory.fail_at = 1 + i / 2;
         memory.for_ever = i % 2;
-        CHECK(ssdgs_context_create(&desc, &context) == (i < 6 ? SSDGS_ERR_MEMORY : SSDGS_OK) && !context == (i < 6));
+        CHECK(ssdgs_context_create(&desc, &context) == (i < 6 ? SSDGS_ERR_MEMORY : SSDGS_OK) &&
+              !context == (i < 6));
         memory.fail_at = 0;
         ssdgs_context_destroy(context);
         context = NULL;
@@ -514,7 +566,10 @@ static void test_memory(void) {
 
 /* ---- files ---- */
 
-typedef struct bytes { unsigned char *data; size_t size; } bytes;
+typedef struct bytes {
+    unsigned char *data;
+    size_t size;
+} bytes;
 
 static bytes slurp(const char *path) {
     bytes all = {NULL, 0};
@@ -577,7 +632,10 @@ static int apart(int (*function)(void)) {
 
 /* ---- writing: whatever fails, the old file stays, no other does, and the message has the path ---- */
 
-typedef struct writer { const char *name; ssdgs_result (*save)(const char *path); } writer;
+typedef struct writer {
+    const char *name;
+    ssdgs_result (*save)(const char *path);
+} writer;
 
 static ssdgs_result save_model(const char *path) { return ssdgs_model_save(model, path); }
 static ssdgs_result save_run(const char *path) { return ssdgs_trainer_save(trainer, path); }
@@ -596,10 +654,11 @@ static int fails_cleanly(const writer *w, const char *path, const bytes *old) {
     result = w->save(path);
     memset(&disk, 0, sizeof disk);
     io_points++;
-    good = result == SSDGS_ERR_IO && strstr(error[0] ? error : ssdgs_error_message(context), path) && memory.live == live &&
-           held() == before && !files_with(".tmp.", 1) && (!old || holds(path, old));
-    if (!good) printf("%s, %s: %s, \"%s\"\n", w->name, path, ssdgs_result_string(result),
-                      error[0] ? error : ssdgs_error_message(context));
+    good = result == SSDGS_ERR_IO && strstr(error[0] ? error : ssdgs_error_message(context), path) &&
+           memory.live == live && held() == before && !files_with(".tmp.", 1) && (!old || holds(path, old));
+    if (!good)
+        printf("%s, %s: %s, \"%s\"\n", w->name, path, ssdgs_result_string(result),
+               error[0] ? error : ssdgs_error_message(context));
     return good;
 }
 
@@ -607,7 +666,8 @@ static int save_where_not_allowed(void) {
     const bytes old = slurp(FOLDER "/locked/file");
     if (getuid() == 0 && setuid(65534)) return 0; /* root may write anywhere */
     if (access(FOLDER "/locked/file", R_OK)) return 0;
-    return !fails_cleanly(&writers[0], FOLDER "/locked/file", &old) || !fails_cleanly(&writers[1], FOLDER "/locked/file", &old) ||
+    return !fails_cleanly(&writers[0], FOLDER "/locked/file", &old) ||
+           !fails_cleanly(&writers[1], FOLDER "/locked/file", &old) ||
            !fails_cleanly(&writers[2], FOLDER "/locked/file", &old);
 }
 
@@ -628,7 +688,8 @@ static void test_disk(void) {
         CHECK(!by->save(file_path));
         whole = slurp(file_path);
         spill(file_path, text, sizeof text);
-        for (k = 0; k < whole.size; k += full || k < 8 || k + 9 > whole.size ? 1 : 1 + draw_below(whole.size / 64)) {
+        for (k = 0; k < whole.size;
+             k += full || k < 8 || k + 9 > whole.size ? 1 : 1 + draw_below(whole.size / 64)) {
             disk.room = 1 + k; /* full after k bytes */
             disk.part = k % 3 ? 0 : 1 + draw_below(5000);
             wrong += !fails_cleanly(by, file_path, &old);
@@ -653,7 +714,8 @@ static void test_disk(void) {
         }
         wrong += !fails_cleanly(by, FOLDER "/none/file", NULL);
         MAKE_FOLDER(FOLDER "/folder");
-        wrong += !fails_cleanly(by, FOLDER "/folder", NULL) || rmdir(FOLDER "/folder"); /* in a file's place */
+        wrong +=
+            !fails_cleanly(by, FOLDER "/folder", NULL) || rmdir(FOLDER "/folder"); /* in a file's place */
         if (!CHECK(!wrong)) printf("    %d things wrong with the %s's writer\n", wrong, by->name);
         for (i = 0; i < 3; i++) { /* a slow disk is no fault */
             disk.interrupts = i > 0;
@@ -673,13 +735,16 @@ static void test_disk(void) {
     remove(FOLDER "/locked/file");
     rmdir(FOLDER "/locked");
     io_points += 3; /* of that process */
-    for (w = 0; w < 3; w++) { /* saving must not put a file where a device or a pipe was: root could lose /dev/null */
+    for (w = 0; w < 3;
+         w++) { /* saving must not put a file where a device or a pipe was: root could lose /dev/null */
         struct stat info;
         mkfifo(FOLDER "/pipe", 0666);
-        CHECK(fails_cleanly(&writers[w], FOLDER "/pipe", NULL) && !stat(FOLDER "/pipe", &info) && S_ISFIFO(info.st_mode));
+        CHECK(fails_cleanly(&writers[w], FOLDER "/pipe", NULL) && !stat(FOLDER "/pipe", &info) &&
+              S_ISFIFO(info.st_mode));
         remove(FOLDER "/pipe");
         CHECK(!symlink("/dev/full", FOLDER "/full"));
-        CHECK(fails_cleanly(&writers[w], FOLDER "/full", NULL) && !lstat(FOLDER "/full", &info) && S_ISLNK(info.st_mode));
+        CHECK(fails_cleanly(&writers[w], FOLDER "/full", NULL) && !lstat(FOLDER "/full", &info) &&
+              S_ISLNK(info.st_mode));
         remove(FOLDER "/full");
     }
     end_world();
@@ -707,8 +772,11 @@ static int refuses_odd_file(void) {
     memory.limit = (size_t)1 << 26; /* an endless file must not fill the memory either */
     for (r = 0; r < 3; r++) {
         error[0] = 0;
-        wrong += readers[r]() != SSDGS_ERR_IO || !strstr(error[0] ? error : ssdgs_error_message(context), odd_path);
-        if (wrong) return printf("%s: \"%s\"\n", odd_path, error[0] ? error : ssdgs_error_message(context)), fflush(stdout), 1;
+        wrong += readers[r]() != SSDGS_ERR_IO ||
+                 !strstr(error[0] ? error : ssdgs_error_message(context), odd_path);
+        if (wrong)
+            return printf("%s: \"%s\"\n", odd_path, error[0] ? error : ssdgs_error_message(context)),
+                   fflush(stdout), 1;
     }
     return held() != before;
 }
@@ -718,7 +786,8 @@ static size_t changed_size;
 
 static void change_size(void) { CHECK(!truncate(changing_path, (off_t)changed_size)); }
 
-/* Cut or lengthened between the moment when its size is asked for and the reading: that is when memory is allocated. */
+/* Cut or lengthened between the moment when its size is asked for and the reading: that is when memory is
+   allocated. */
 static void test_odd_files(void) {
     static const char *const odd[3] = {FOLDER, FOLDER "/pipe", "/dev/zero"};
     static const char *const sources[3] = {FOLDER "/start", FOLDER "/run", FOLDER "/a.png"};
@@ -745,7 +814,8 @@ static void test_odd_files(void) {
             memory.meanwhile = change_size;
             result = readers[r]();
             /* a model's and a PNG's end is told by what stands before it */
-            wrong += k < 30 || r == 1 ? result == SSDGS_OK || memory.live != live || held() != before : result != SSDGS_OK;
+            wrong += k < 30 || r == 1 ? result == SSDGS_OK || memory.live != live || held() != before
+                                      : result != SSDGS_OK;
             ssdgs_model_destroy(made);
             made = NULL;
             bad_inputs++;
@@ -764,7 +834,8 @@ static int run_refused(const void *data, size_t size, uint64_t before) {
     spill(file_path, data, size);
     bad_inputs++;
     result = ssdgs_trainer_load(trainer, file_path);
-    if (result == SSDGS_ERR_FORMAT && strstr(ssdgs_error_message(context), file_path) && held() == before) return 1;
+    if (result == SSDGS_ERR_FORMAT && strstr(ssdgs_error_message(context), file_path) && held() == before)
+        return 1;
     printf("checkpoint: %s, \"%s\"%s\n", ssdgs_result_string(result), ssdgs_error_message(context),
            held() == before ? "" : ", the trainer has changed");
     return 0;
@@ -801,7 +872,8 @@ static void test_checkpoints(void) {
     order = statistics + n * SSDGS__STATISTICS;
     corrections = order + PHOTOS * sizeof(uint32_t);
     CHECK(whole.size == corrections + PHOTOS * sizeof(ssdgs__correction) + 8);
-    for (k = 0; k < whole.size && wrong < 9; k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
+    for (k = 0; k < whole.size && wrong < 9;
+         k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
         const unsigned char was = whole.data[k];
         whole.data[k] = (unsigned char)(was ^ 1 << draw_below(8));
         wrong += !run_refused(whole.data, whole.size, before);
@@ -810,35 +882,53 @@ static void test_checkpoints(void) {
     }
     CHECK(!wrong);
     {
-        const struct { const char *what; size_t at; int type; double value; } lies[] = { /* with the right checksum */
-            {"magic", 0, WORD, 7}, {"byte order", offsetof(head, byte_order), WORD, 0x04030201},
-            {"version", offsetof(head, version), WORD, SSDGS_VERSION + 1}, {"precision", offsetof(head, real_size), WORD, 2},
-            {"inputs", offsetof(head, inputs), WORD, 1}, {"globals", offsetof(head, global_count), WORD, 1},
-            {"photographs", offsetof(head, photo_count), WORD, PHOTOS + 1},
-            {"photographs", offsetof(head, photo_count), WORD, -1},
-            {"count", offsetof(head, count), WORD, 0}, {"count", offsetof(head, count), WORD, -1},
-            {"count", offsetof(head, count), WORD, (double)h.count + 1}, {"count", offsetof(head, count), WORD, 0x7fffffff},
-            {"iteration", offsetof(head, iteration), WORD, -1}, {"iteration", offsetof(head, iteration), WORD, 0x7fffffff},
-            {"skipped", offsetof(head, skipped), WORD, -1}, {"skipped", offsetof(head, skipped), WORD, 0x7fffffff},
-            {"steps", offsetof(head, steps), WORD, -1}, {"steps", offsetof(head, steps), WORD, (double)h.iteration + 1},
-            {"settings", offsetof(head, settings), WORD, 0}, {"terms", offsetof(head, settings.terms), WORD, 16},
-            {"width", offsetof(head, settings.scattering_width), WORD, 1024}, {"eta", offsetof(head, settings.eta), REAL, 9},
-            {"eta", offsetof(head, settings.eta), REAL, nan_value}, {"unit", offsetof(head, settings.length_unit), REAL, 0},
-            {"light scale", offsetof(head, settings.light_scale), REAL, infinite},
-            {"centre", offsetof(head, settings.centre), REAL, nan_value},
-            {"network", moments - 4 * sizeof(ssdgs_real), REAL, nan_value},
-            {"moment", moments + 5 * sizeof(ssdgs_real), REAL, nan_value},
-            {"moment", squares - 5 * sizeof(ssdgs_real), REAL, infinite},
-            {"square", squares + 5 * sizeof(ssdgs_real), REAL, -1}, {"square", squares, REAL, nan_value},
-            {"square", statistics - sizeof(ssdgs_real), REAL, -1}, {"statistic", statistics, REAL, nan_value},
-            {"statistic", order - sizeof(ssdgs_real), REAL, infinite}, {"order", order, WORD, PHOTOS},
-            {"order", order + 4, WORD, -1},
-            {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
-            {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
-            {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
-            {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
-            {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}
-        };
+        const struct {
+            const char *what;
+            size_t at;
+            int type;
+            double value;
+        } lies[] = {/* with the right checksum */
+                    {"magic", 0, WORD, 7},
+                    {"byte order", offsetof(head, byte_order), WORD, 0x04030201},
+                    {"version", offsetof(head, version), WORD, SSDGS_VERSION + 1},
+                    {"precision", offsetof(head, real_size), WORD, 2},
+                    {"inputs", offsetof(head, inputs), WORD, 1},
+                    {"globals", offsetof(head, global_count), WORD, 1},
+                    {"photographs", offsetof(head, photo_count), WORD, PHOTOS + 1},
+                    {"photographs", offsetof(head, photo_count), WORD, -1},
+                    {"count", offsetof(head, count), WORD, 0},
+                    {"count", offsetof(head, count), WORD, -1},
+                    {"count", offsetof(head, count), WORD, (double)h.count + 1},
+                    {"count", offsetof(head, count), WORD, 0x7fffffff},
+                    {"iteration", offsetof(head, iteration), WORD, -1},
+                    {"iteration", offsetof(head, iteration), WORD, 0x7fffffff},
+                    {"skipped", offsetof(head, skipped), WORD, -1},
+                    {"skipped", offsetof(head, skipped), WORD, 0x7fffffff},
+                    {"steps", offsetof(head, steps), WORD, -1},
+                    {"steps", offsetof(head, steps), WORD, (double)h.iteration + 1},
+                    {"settings", offsetof(head, settings), WORD, 0},
+                    {"terms", offsetof(head, settings.terms), WORD, 16},
+                    {"width", offsetof(head, settings.scattering_width), WORD, 1024},
+                    {"eta", offsetof(head, settings.eta), REAL, 9},
+                    {"eta", offsetof(head, settings.eta), REAL, nan_value},
+                    {"unit", offsetof(head, settings.length_unit), REAL, 0},
+                    {"light scale", offsetof(head, settings.light_scale), REAL, infinite},
+                    {"centre", offsetof(head, settings.centre), REAL, nan_value},
+                    {"network", moments - 4 * sizeof(ssdgs_real), REAL, nan_value},
+                    {"moment", moments + 5 * sizeof(ssdgs_real), REAL, nan_value},
+                    {"moment", squares - 5 * sizeof(ssdgs_real), REAL, infinite},
+                    {"square", squares + 5 * sizeof(ssdgs_real), REAL, -1},
+                    {"square", squares, REAL, nan_value},
+                    {"square", statistics - sizeof(ssdgs_real), REAL, -1},
+                    {"statistic", statistics, REAL, nan_value},
+                    {"statistic", order - sizeof(ssdgs_real), REAL, infinite},
+                    {"order", order, WORD, PHOTOS},
+                    {"order", order + 4, WORD, -1},
+                    {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
+                    {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
+                    {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
+                    {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
+                    {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}};
         for (k = 0; k <= sizeof lies / sizeof *lies; k++) {
             const int last = k == sizeof lies / sizeof *lies; /* another rounding: taken, and told */
             unsigned char *lie = (unsigned char *)malloc(whole.size);
@@ -851,7 +941,8 @@ static void test_checkpoints(void) {
             else memcpy(lie + lies[k].at, &lies[k].value, sizeof lies[k].value);
             sum = ssdgs__fold(SEED, lie, whole.size - 8);
             memcpy(lie + whole.size - 8, &sum, 8);
-            if (!last && !CHECK(run_refused(lie, whole.size, before))) { /* what has been taken in may not last */
+            if (!last &&
+                !CHECK(run_refused(lie, whole.size, before))) { /* what has been taken in may not last */
                 printf("    made up: %s\n", lies[k].what);
                 end_world();
                 with_trainer();
@@ -908,8 +999,9 @@ static int taken_or_refused(const void *data, size_t size, int draws) {
     bad_inputs++;
     result = ssdgs_model_load_memory(context, copy, size, &made, NULL);
     free(copy);
-    if (result) return (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !made && memory.live == live &&
-                       ssdgs_error_message(context)[0];
+    if (result)
+        return (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !made && memory.live == live &&
+               ssdgs_error_message(context)[0];
     good = finite_model(made);
     if (draws) {
         camera.width = camera.height = 8;
@@ -938,7 +1030,8 @@ static void test_damaged_models(void) {
         for (i = 1; i < 256; i += full ? 1 : 1 + (int)draw_below(200)) {
             whole.data[k] = (unsigned char)(was ^ i);
             if (!taken_or_refused(whole.data, whole.size, draw() < (full ? 0.05 : 0.3)))
-                wrong++, printf("byte %lu of %lu, %d instead of %d\n", (unsigned long)k, (unsigned long)whole.size, was ^ i, was);
+                wrong++, printf("byte %lu of %lu, %d instead of %d\n", (unsigned long)k,
+                                (unsigned long)whole.size, was ^ i, was);
         }
         whole.data[k] = was;
         wrong += !ssdgs_model_load_memory(context, whole.data, k, &made, NULL); /* cut */
@@ -972,32 +1065,41 @@ static bytes repeat(const char *start, const char *repeated, int times, const ch
 
 /* Headers that promise too much: what is allocated follows the file's size, not its word. */
 static void test_hostile_headers(void) {
-    static const struct { const char *start, *repeated; int times; const char *end; } attacks[] = {
+    static const struct {
+        const char *start, *repeated;
+        int times;
+        const char *end;
+    } attacks[] = {
         {PLY "element vertex 9223372036854775808\n" ROW "end_header\n", "", 0, ""},
         {PLY "element vertex 18446744073709551615\n" ROW "end_header\n", "x", 40, ""},
         {PLY "element vertex -1\n" ROW "end_header\n", "x", 40, ""},
         {PLY "element vertex 1e999\n" ROW "end_header\n", "x", 40, ""},
         {PLY "element vertex 1e3\n" ROW "end_header\n", "x", 12000, ""},
-        {PLY "element vertex 2305843009213693952\n" ROW "end_header\n", "x", 99, ""}, /* x 56 = 0 modulo 2^64 */
-        {PLY "element vertex 536870912\n" ROW "end_header\n", "x", 99, ""},           /* x 56 = 0 modulo 2^32 */
+        {PLY "element vertex 2305843009213693952\n" ROW "end_header\n", "x", 99,
+         ""},                                                               /* x 56 = 0 modulo 2^64 */
+        {PLY "element vertex 536870912\n" ROW "end_header\n", "x", 99, ""}, /* x 56 = 0 modulo 2^32 */
         {PLY "element vertex 268435455\n" ROW "end_header\n", "x", 5600, ""},
         {PLY "element vertex 101\n" ROW "end_header\n", "x", 5600, ""},
         {PLY "element vertex 0x7fffffff\n" ROW "end_header\n", "x", 24, ""},
-        {PLY "element vertex 268435457\nend_header\n", "x", 24, ""}, {PLY "element vertex 4294967296\nend_header\n", "x", 24, ""},
-        {PLY "element face 4294967295\nproperty list uchar int x\nelement vertex 1\n" ROW "end_header\n", "\0", 1000, ""},
+        {PLY "element vertex 268435457\nend_header\n", "x", 24, ""},
+        {PLY "element vertex 4294967296\nend_header\n", "x", 24, ""},
+        {PLY "element face 4294967295\nproperty list uchar int x\nelement vertex 1\n" ROW "end_header\n",
+         "\0", 1000, ""},
         {PLY "element face 1\nproperty list uint int x\nend_header\n\377\377\377\377", "x", 1000, ""},
         {PLY "element face 1\nproperty list int int x\nend_header\n\377\377\377\377", "x", 1000, ""},
         {"ply\nformat ascii 1.0\nelement vertex 999999999999\n" ROW "end_header\n", "1 ", 3000, "\n"},
-        {PLY "element vertex 1\n" ROW "comment ", "x", 1 << 20, "\nend_header\n"}, {"", "x", 1 << 20, ""},
+        {PLY "element vertex 1\n" ROW "comment ", "x", 1 << 20, "\nend_header\n"},
+        {"", "x", 1 << 20, ""},
         {PLY "element vertex 1\nproperty float ", "x", 1 << 20, "\nend_header\n"},
         {PLY "element ", "v", 1 << 20, " 1\nend_header\n"},
         {PLY "element vertex 1\n", "property float p\n", 100000, "end_header\n"},
         {PLY "element vertex 1\n", "property uchar p%05d\n", 100000, "end_header\n"},
         {PLY, "element e%05d 0\n", 100000, "end_header\n"},
-        {PLY "element vertex 1\n" ROW, "comment on and on\n", 100000, "end_header\n"}, {PLY, "\n", 100000, "end_header\n"},
-        {PLY "element vertex 1\n" ROW, "", 0, ""}, {PLY "element vertex 1\n" ROW "end_heade", "r", 1, ""},
-        {PLY "element vertex 1\n" ROW "\nend_header\n", "x", 12, ""}
-    };
+        {PLY "element vertex 1\n" ROW, "comment on and on\n", 100000, "end_header\n"},
+        {PLY, "\n", 100000, "end_header\n"},
+        {PLY "element vertex 1\n" ROW, "", 0, ""},
+        {PLY "element vertex 1\n" ROW "end_heade", "r", 1, ""},
+        {PLY "element vertex 1\n" ROW "\nend_header\n", "x", 12, ""}};
     size_t a;
     with_context();
     memory.limit = (size_t)1 << 26;
@@ -1006,7 +1108,8 @@ static void test_hostile_headers(void) {
         memory.peak = memory.bytes;
         if (!CHECK(ssdgs_model_load_memory(context, b.data, b.size, &made, NULL) != SSDGS_OK && !made))
             printf("    %.200s\n", (char *)b.data);
-        CHECK(ssdgs_error_message(context)[0] && memory.peak - memory.bytes < 4 * b.size + 65536); /* 44 KB know the header */
+        CHECK(ssdgs_error_message(context)[0] &&
+              memory.peak - memory.bytes < 4 * b.size + 65536); /* 44 KB know the header */
         bad_inputs++;
         free(b.data);
     }
@@ -1014,10 +1117,12 @@ static void test_hostile_headers(void) {
     end_world();
 }
 
-/* A file's Gaussians need memory in proportion to its size, by the narrowest types that a header can give them. */
+/* A file's Gaussians need memory in proportion to its size, by the narrowest types that a header can give
+   them. */
 static void test_proportion(void) {
-    static const char *const names[14] = {"x", "y", "z", "red", "green", "blue", "opacity", "scale_0", "scale_1", "scale_2",
-                                          "rot_0", "rot_1", "rot_2", "rot_3"};
+    static const char *const names[14] = {"x",     "y",       "z",       "red",     "green",
+                                          "blue",  "opacity", "scale_0", "scale_1", "scale_2",
+                                          "rot_0", "rot_1",   "rot_2",   "rot_3"};
     enum { ROWS = 20000 };
     double ratio[2];
     char *text = (char *)malloc(ROWS * 14 + 1000);
@@ -1042,8 +1147,10 @@ static void test_proportion(void) {
     ssdgs_model_destroy(made);
     made = NULL;
     ratio[1] = (double)(memory.peak - memory.bytes) / (double)size;
-    CHECK(ratio[0] < 4 && ratio[1] < 12 * sizeof(ssdgs_real) / 4); /* 38 floats from 14 bytes, and the networks */
-    printf("figure model_load_bytes_per_file_byte %.2f\nfigure worst_load_bytes_per_file_byte %.2f\n", ratio[0], ratio[1]);
+    CHECK(ratio[0] < 4 &&
+          ratio[1] < 12 * sizeof(ssdgs_real) / 4); /* 38 floats from 14 bytes, and the networks */
+    printf("figure model_load_bytes_per_file_byte %.2f\nfigure worst_load_bytes_per_file_byte %.2f\n",
+           ratio[0], ratio[1]);
     free(text);
     end_world();
 }
@@ -1055,14 +1162,19 @@ static void test_proportion(void) {
 #define POSE "\"pl_pos\":[1,2,3],\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,4]]}"
 
 static void test_datasets(void) {
-    static const struct { const char *start, *repeated; int times; const char *end, *message; } sets[] = {
-        {"", "[", 100000, "", "64 levels"}, {"", "{\"a\":", 100000, "", "64 levels"},
-        {HEAD, "{},", (1 << 20) + 1, "{}]}", "2^20 frames"}, {HEAD, "{\"a%d\":0},", 1000, "{}]}", "missing"},
-        {HEAD "{\"file_path\":\"", "a", 65536, "\"," POSE "]}", "too long"},
-        {HEAD "{\"file_path\":\"zero\",", "", 0, POSE "]}", "not a regular file"},
-        {HEAD "{\"file_path\":\"self\",", "", 0, POSE "]}", "self.png"},
-        {"\377\376{", "", 1, "}", "UTF-16"}, {HEAD "\r\n{\"file_path\"\r\n:\"a\",", "\r\n", 1000, POSE "]}\r\n", NULL}
-    };
+    static const struct {
+        const char *start, *repeated;
+        int times;
+        const char *end, *message;
+    } sets[] = {{"", "[", 100000, "", "64 levels"},
+                {"", "{\"a\":", 100000, "", "64 levels"},
+                {HEAD, "{},", (1 << 20) + 1, "{}]}", "2^20 frames"},
+                {HEAD, "{\"a%d\":0},", 1000, "{}]}", "missing"},
+                {HEAD "{\"file_path\":\"", "a", 65536, "\"," POSE "]}", "too long"},
+                {HEAD "{\"file_path\":\"zero\",", "", 0, POSE "]}", "not a regular file"},
+                {HEAD "{\"file_path\":\"self\",", "", 0, POSE "]}", "self.png"},
+                {"\377\376{", "", 1, "}", "UTF-16"},
+                {HEAD "\r\n{\"file_path\"\r\n:\"a\",", "\r\n", 1000, POSE "]}\r\n", NULL}};
     static const unsigned char empty[12] = {0, 0, 0, 0, 'I', 'D', 'A', 'T', 0x35, 0xAF, 0x06, 0x1E};
     enum { CHUNKS = 100000 };
     bytes png = slurp(FOLDER "/a.png");
@@ -1077,8 +1189,10 @@ static void test_datasets(void) {
         olat_dataset set;
         spill(FOLDER "/odd.json", b.data, b.size);
         error[0] = 0;
-        if (!CHECK(olat_load(FOLDER, "odd.json", 0, &set, error) ? sets[k].message && strstr(error, sets[k].message)
-                                                                 : !sets[k].message)) printf("    %s\n", error);
+        if (!CHECK(olat_load(FOLDER, "odd.json", 0, &set, error)
+                       ? sets[k].message && strstr(error, sets[k].message)
+                       : !sets[k].message))
+            printf("    %s\n", error);
         olat_free(&set);
         bad_inputs++;
         free(b.data);
@@ -1087,8 +1201,8 @@ static void test_datasets(void) {
     memcpy(longer, png.data, 33); /* an image in pieces, nearly all of them empty */
     for (k = 0; k < CHUNKS; k++) memcpy(longer + 33 + 12 * k, empty, 12);
     memcpy(longer + 33 + 12 * CHUNKS, png.data + 33, png.size - 33);
-    CHECK(!olat_decode_png(longer, png.size + CHUNKS * 12, &width, &height, &format, &got, error) && width == SIDE &&
-          !memcmp(got, pixels[1], SIDE * SIDE * 4));
+    CHECK(!olat_decode_png(longer, png.size + CHUNKS * 12, &width, &height, &format, &got, error) &&
+          width == SIDE && !memcmp(got, pixels[1], SIDE * SIDE * 4));
     meter_free(got);
     free(longer);
     free(png.data);
@@ -1182,7 +1296,8 @@ int main(int argc, char **argv) {
 #endif
     TEST_ROW("83", "allocations that fail", test_memory());
     TEST_ROW("85", "damaged, foreign, newer checkpoints", test_checkpoints());
-    TEST_ROW("80", "damaged models, hostile headers", (test_damaged_models(), test_hostile_headers(), test_proportion()));
+    TEST_ROW("80", "damaged models, hostile headers",
+             (test_damaged_models(), test_hostile_headers(), test_proportion()));
 #ifndef _WIN32
     test_datasets();
     TEST_ROW("84", "disks that fail at every byte", test_disk());

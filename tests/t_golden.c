@@ -1,4 +1,5 @@
-/* Every stage against the golden files, on every instruction set; built again in double (real64), where the bounds are 1e-9. */
+/* Every stage against the golden files, on every instruction set; built again in double (real64), where the
+   bounds are 1e-9. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -60,7 +61,8 @@ static void gold_planes(const char *name, ssdgs_real *planes) {
 }
 
 static ssdgs_camera gold_camera(void) {
-    const double *view = gold(&file, "view", NULL), *intrinsics = gold(&file, "intrinsics", NULL), *size = gold(&file, "size", NULL);
+    const double *view = gold(&file, "view", NULL), *intrinsics = gold(&file, "intrinsics", NULL),
+                 *size = gold(&file, "size", NULL);
     ssdgs_camera c;
     int i;
     memset(&c, 0, sizeof c);
@@ -80,14 +82,17 @@ static void through_background(ssdgs_frame *frame) {
     size_t i, c;
     for (i = 0; i < pixels; i++) {
         frame->pixel_gradient[3 * pixels + i] = 0;
-        for (c = 0; c < 3; c++) frame->pixel_gradient[3 * pixels + i] += frame->pixel_gradient[c * pixels + i] * frame->options.background[c];
+        for (c = 0; c < 3; c++)
+            frame->pixel_gradient[3 * pixels + i] +=
+                frame->pixel_gradient[c * pixels + i] * frame->options.background[c];
     }
 }
 
 static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
     ssdgs_model *model = NULL;
     ssdgs_model_view view;
-    if (!CHECK(!ssdgs_model_create(context, settings, (int)gold_find(&file, "mean")->dims[0], &model))) exit(1);
+    if (!CHECK(!ssdgs_model_create(context, settings, (int)gold_find(&file, "mean")->dims[0], &model)))
+        exit(1);
     view = ssdgs_model_get(model);
     to_planes("mean", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
     to_planes("quat", view.gaussians + SSDGS_ROTATION * view.stride, view.stride);
@@ -96,7 +101,8 @@ static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
     return model;
 }
 
-static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int light_count, const double *background) {
+static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
+                  const ssdgs_light *lights, int light_count, const double *background) {
     ssdgs_render_options options = ssdgs_render_options_default();
     int i;
     options.stop = 0;
@@ -140,9 +146,11 @@ static void test_raster(void) {
     image = reals(pixels * 3);
     for (c = 0; c < 3; c++)
         for (i = 0; i < pixels; i++)
-            image[pixels * (size_t)c + i] = frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
+            image[pixels * (size_t)c + i] =
+                frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
     check_image("image", image, value_bound());
-    CHECK_NEAR(frame.transmittance, gold(&file, "transmittance", NULL), pixels, value_bound(), 0, "raster: transmittance");
+    CHECK_NEAR(frame.transmittance, gold(&file, "transmittance", NULL), pixels, value_bound(), 0,
+               "raster: transmittance");
     gold_planes("grad_image", frame.pixel_gradient);
     through_background(&frame);
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD));
@@ -154,10 +162,14 @@ static void test_raster(void) {
     }
     CHECK_L2(out, gold(&file, "blend_weight", NULL), n, gradient_bound(), "raster: blend_weight");
     CHECK_L2(out + n, gold(&file, "grad_color", NULL), 3 * n, gradient_bound(), "raster: grad_color");
-    check_planes("grad_mean", frame.gradient + SSDGS_POSITION * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
-    check_planes("grad_quat", frame.gradient + SSDGS_ROTATION * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
-    check_planes("grad_log_scale", frame.gradient + SSDGS_LOG_SCALE * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
-    check_planes("grad_opacity_logit", frame.gradient + SSDGS_OPACITY * frame.gaussians.stride, frame.gaussians.stride, gradient_bound());
+    check_planes("grad_mean", frame.gradient + SSDGS_POSITION * frame.gaussians.stride,
+                 frame.gaussians.stride, gradient_bound());
+    check_planes("grad_quat", frame.gradient + SSDGS_ROTATION * frame.gaussians.stride,
+                 frame.gaussians.stride, gradient_bound());
+    check_planes("grad_log_scale", frame.gradient + SSDGS_LOG_SCALE * frame.gaussians.stride,
+                 frame.gaussians.stride, gradient_bound());
+    check_planes("grad_opacity_logit", frame.gradient + SSDGS_OPACITY * frame.gaussians.stride,
+                 frame.gaussians.stride, gradient_bound());
     memcpy(expected, gold(&file, "grad_view", NULL), sizeof expected);
     CHECK_L2(frame.view_gradient, expected, 12, gradient_bound(), "raster: grad_view");
     free(out);
@@ -205,15 +217,18 @@ static void test_light_pass(const char *name) {
     frame.flux = reals(n);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     CHECK_NEAR(v->depth, gold(&file, "distance", NULL), n, value_bound(), 0, "light pass: distance");
-    CHECK_NEAR(frame.visibility, gold(&file, "visibility", NULL), n, value_bound(), 0, "light pass: visibility");
+    CHECK_NEAR(frame.visibility, gold(&file, "visibility", NULL), n, value_bound(), 0,
+               "light pass: visibility");
     CHECK_NEAR(frame.depth_cue, gold(&file, "depth_cue", NULL), n, value_bound(), 0, "light pass: depth cue");
-    CHECK_NEAR(frame.flux, gold(&file, "flux", NULL), n, value_bound() * 1e-2, value_bound(), "light pass: flux");
+    CHECK_NEAR(frame.flux, gold(&file, "flux", NULL), n, value_bound() * 1e-2, value_bound(),
+               "light pass: flux");
     free(frame.flux);
     ssdgs_model_destroy(model);
     gold_close(&file);
 }
 
-/* Points through reflect and reflect_backward, in blocks. objective: given the rows of a block, fills their gradients. */
+/* Points through reflect and reflect_backward, in blocks. objective: given the rows of a block, fills their
+   gradients. */
 typedef struct asg_run {
     ssdgs_model *model;
     ssdgs__lighting k;
@@ -224,7 +239,8 @@ typedef struct asg_run {
 
 static void asg_forward(asg_run *run) {
     size_t at;
-    for (at = 0; at < run->stride; at += BLOCK) context->k->reflect(&run->k, run->gauss + at * SSDGS_CHANNELS, run->rows + at * SSDGS__ROWS);
+    for (at = 0; at < run->stride; at += BLOCK)
+        context->k->reflect(&run->k, run->gauss + at * SSDGS_CHANNELS, run->rows + at * SSDGS__ROWS);
 }
 
 /* Adds to dgauss and sums. */
@@ -232,7 +248,8 @@ static void asg_backward(asg_run *run) {
     ssdgs_real *lanes = reals(SSDGS__LANE_SUMS * 16);
     size_t at;
     for (at = 0; at < run->stride; at += BLOCK)
-        context->k->reflect_backward(&run->k, run->gauss + at * SSDGS_CHANNELS, run->drows + at * SSDGS__ROWS, run->dgauss + at * SSDGS_CHANNELS, lanes);
+        context->k->reflect_backward(&run->k, run->gauss + at * SSDGS_CHANNELS, run->drows + at * SSDGS__ROWS,
+                                     run->dgauss + at * SSDGS_CHANNELS, lanes);
     for (at = 0; at < SSDGS__LANE_SUMS * 16; at++) run->sums[at / 16] += lanes[at];
     free(lanes);
 }
@@ -244,7 +261,9 @@ static ssdgs_real *row_of(ssdgs_real *blocks, int rows, int row, size_t point) {
 static void check_points(asg_run *run, const char *name, int channel, int width, double bound) {
     double *d = (double *)malloc(run->n * (size_t)width * sizeof *d);
     size_t i;
-    for (i = 0; i < run->n * (size_t)width; i++) d[i] = (double)*row_of(run->dgauss, SSDGS_CHANNELS, channel + (int)(i % (size_t)width), i / (size_t)width);
+    for (i = 0; i < run->n * (size_t)width; i++)
+        d[i] = (double)*row_of(run->dgauss, SSDGS_CHANNELS, channel + (int)(i % (size_t)width),
+                               i / (size_t)width);
     CHECK_L2(d, gold(&file, name, NULL), run->n * (size_t)width, bound, name);
     free(d);
 }
@@ -270,7 +289,9 @@ static void test_asg(const char *name, int angular) {
     to_planes("frame_quat", view.gaussians + SSDGS_FRAME * view.stride, view.stride);
     to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * view.stride, view.stride);
     for (i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
-    for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, angular ? "asg_lambda_mu_raw" : "asg_log_lambda_mu", NULL)[i];
+    for (i = 0; i < 16; i++)
+        view.asg_sharpness[i] =
+            (ssdgs_real)gold(&file, angular ? "asg_lambda_mu_raw" : "asg_log_lambda_mu", NULL)[i];
     for (i = 0; i < 8 && angular; i++) view.asg_sigma[i] = (ssdgs_real)gold(&file, "asg_sigma_raw", NULL)[i];
     memset(&lamp, 0, sizeof lamp);
     memset(&camera, 0, sizeof camera);
@@ -291,9 +312,11 @@ static void test_asg(const char *name, int angular) {
     value = (double *)malloc(3 * run.n * sizeof *value);
     for (i = 0; i < run.stride; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++)
-            *row_of(run.gauss, SSDGS_CHANNELS, c, i) = view.gaussians[(size_t)c * view.stride + (i < run.n ? i : run.n - 1)];
+            *row_of(run.gauss, SSDGS_CHANNELS, c, i) =
+                view.gaussians[(size_t)c * view.stride + (i < run.n ? i : run.n - 1)];
     if (angular) {
-        /* The file has D without Fresnel: D = f_s / F, dD = (df_s - D dF) / F. A constant lobe gives F and its gradient. */
+        /* The file has D without Fresnel: D = f_s / F, dD = (df_s - D dF) / F. A constant lobe gives F and
+           its gradient. */
         asg_run constant = run;
         double bound = gradient_bound();
         memset(constant.k.basis, 0, sizeof constant.k.basis);
@@ -305,11 +328,14 @@ static void test_asg(const char *name, int angular) {
         asg_forward(&constant);
         for (i = 0; i < run.n; i++) {
             double weights = 0, fresnel, d;
-            for (c = 0; c < 8; c++) weights += log1p(exp((double)*row_of(run.gauss, SSDGS_CHANNELS, SSDGS_ASG_WEIGHT + c, i)));
+            for (c = 0; c < 8; c++)
+                weights += log1p(exp((double)*row_of(run.gauss, SSDGS_CHANNELS, SSDGS_ASG_WEIGHT + c, i)));
             fresnel = (double)*row_of(constant.rows, SSDGS__ROWS, SSDGS__GLOSS, i) / weights;
             d = value[i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__GLOSS, i) / fresnel;
-            *row_of(run.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(gold(&file, "grad_D", NULL)[i] / fresnel);
-            *row_of(constant.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(-gold(&file, "grad_D", NULL)[i] * d / (fresnel * weights));
+            *row_of(run.drows, SSDGS__ROWS, SSDGS__GLOSS, i) =
+                (ssdgs_real)(gold(&file, "grad_D", NULL)[i] / fresnel);
+            *row_of(constant.drows, SSDGS__ROWS, SSDGS__GLOSS, i) =
+                (ssdgs_real)(-gold(&file, "grad_D", NULL)[i] * d / (fresnel * weights));
         }
         CHECK_NEAR(value, gold(&file, "D", NULL), run.n, value_bound(), real64 ? 0 : 2e-5, "asg_angular: D");
         asg_backward(&run);
@@ -322,18 +348,23 @@ static void test_asg(const char *name, int angular) {
         free(constant.drows);
     } else {
         asg_forward(&run);
-        for (i = 0; i < run.n; i++) { /* the file's objective is (f_s, f_d) / d^2 against the given gradients */
+        for (i = 0; i < run.n;
+             i++) { /* the file's objective is (f_s, f_d) / d^2 against the given gradients */
             const double fs = value[i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__GLOSS, i);
             const double fd = value[run.n + i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__COSINE, i);
-            const double e = value[2 * run.n + i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__IRRADIANCE, i);
-            const double dfs = gold(&file, "grad_f_specular", NULL)[i], dfd = gold(&file, "grad_f_diffuse", NULL)[i];
+            const double e = value[2 * run.n + i] =
+                (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__IRRADIANCE, i);
+            const double dfs = gold(&file, "grad_f_specular", NULL)[i],
+                         dfd = gold(&file, "grad_f_diffuse", NULL)[i];
             *row_of(run.drows, SSDGS__ROWS, SSDGS__GLOSS, i) = (ssdgs_real)(dfs * e);
             *row_of(run.drows, SSDGS__ROWS, SSDGS__COSINE, i) = (ssdgs_real)(dfd * e);
             *row_of(run.drows, SSDGS__ROWS, SSDGS__IRRADIANCE, i) = (ssdgs_real)(dfs * fs + dfd * fd);
         }
         CHECK_NEAR(value, gold(&file, "f_specular", NULL), run.n, value_bound(), 0, "shading: f_specular");
-        CHECK_NEAR(value + run.n, gold(&file, "f_diffuse", NULL), run.n, value_bound(), 0, "shading: f_diffuse");
-        CHECK_NEAR(value + 2 * run.n, gold(&file, "inv_dist2", NULL), run.n, value_bound(), 0, "shading: 1 / d^2");
+        CHECK_NEAR(value + run.n, gold(&file, "f_diffuse", NULL), run.n, value_bound(), 0,
+                   "shading: f_diffuse");
+        CHECK_NEAR(value + 2 * run.n, gold(&file, "inv_dist2", NULL), run.n, value_bound(), 0,
+                   "shading: 1 / d^2");
         asg_backward(&run);
         check_points(&run, "grad_asg_weight_raw", SSDGS_ASG_WEIGHT, 8, gradient_bound());
         CHECK_L2(run.sums, gold(&file, "grad_light", NULL), 3, gradient_bound(), "shading: grad_light");
@@ -343,10 +374,14 @@ static void test_asg(const char *name, int angular) {
     check_points(&run, "grad_frame_quat", SSDGS_FRAME, 4, gradient_bound());
     ssdgs__asg_backward(&frame, run.sums + 6);
     ssdgs__global_groups(&settings, first);
-    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(), "grad_asg_quat");
-    CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SHARPNESS], gold(&file, angular ? "grad_asg_lambda_mu_raw" : "grad_asg_log_lambda_mu", NULL), 16,
+    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(),
+             "grad_asg_quat");
+    CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SHARPNESS],
+             gold(&file, angular ? "grad_asg_lambda_mu_raw" : "grad_asg_log_lambda_mu", NULL), 16,
              gradient_bound(), "grad of the ASG sharpness");
-    if (angular) CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SIGMA], gold(&file, "grad_asg_sigma_raw", NULL), 8, gradient_bound(), "grad_asg_sigma_raw");
+    if (angular)
+        CHECK_L2(frame.global_gradient + first[SSDGS__ASG_SIGMA], gold(&file, "grad_asg_sigma_raw", NULL), 8,
+                 gradient_bound(), "grad_asg_sigma_raw");
     free(run.gauss);
     free(run.dgauss);
     free(run.rows);
@@ -380,14 +415,18 @@ static void test_dipole(void) {
                 in[1][j] = sa[i];
                 in[2][j] = r[i];
             }
-            context->k->dipole_profile(form, in[0], in[1], in[2], (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr)), out[0], derivative, 16);
+            context->k->dipole_profile(form, in[0], in[1], in[2],
+                                       (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr)), out[0], derivative,
+                                       16);
             f[i] = out[0][0];
             for (j = 0; j < 3; j++) d[(size_t)j * n + i] = derivative[16 * j];
         }
-        CHECK_NEAR(f, gold(&file, forms[form], NULL), n, real64 ? 1e-12 : 1e-9, real64 ? 1e-9 : 3e-5, forms[form]);
+        CHECK_NEAR(f, gold(&file, forms[form], NULL), n, real64 ? 1e-12 : 1e-9, real64 ? 1e-9 : 3e-5,
+                   forms[form]);
         for (j = 0; j < 3; j++) {
             snprintf(name, sizeof name, "%s_d_%s", forms[form], by[j]);
-            CHECK_NEAR(d + (size_t)j * n, gold(&file, name, NULL), n, real64 ? 1e-11 : 1e-8, real64 ? 1e-8 : 3e-4, name);
+            CHECK_NEAR(d + (size_t)j * n, gold(&file, name, NULL), n, real64 ? 1e-11 : 1e-8,
+                       real64 ? 1e-8 : 3e-4, name);
         }
     }
     free(ss);
@@ -405,7 +444,8 @@ static void test_network(const char *name, int shadow, int residual, int default
     ssdgs__row_lists lists;
     ssdgs__block_layout l;
     ssdgs__lighting k;
-    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *slot, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
+    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed,
+        *dweights, *slot, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
     const char *prefix = shadow && residual ? "res_" : "";
     char key[64];
     double *out;
@@ -443,7 +483,9 @@ static void test_network(const char *name, int shadow, int residual, int default
     for (s = 0; s < BLOCK; s++) { /* unit irradiance, c = 1 */
         part[SSDGS__IRRADIANCE * BLOCK + s] = 1;
         part[SSDGS__COSINE * BLOCK + s] = 1;
-        for (c = 0; c < 3; c++) gauss[(SSDGS_SCATTERING + c) * BLOCK + s] = gauss[(SSDGS_DIFFUSE + c) * BLOCK + s] = (ssdgs_real)0.54132485461291811;
+        for (c = 0; c < 3; c++)
+            gauss[(SSDGS_SCATTERING + c) * BLOCK + s] = gauss[(SSDGS_DIFFUSE + c) * BLOCK + s] =
+                (ssdgs_real)0.54132485461291811;
     }
     weights = gold_reals("weights");
     gold(&file, "weights", &count);
@@ -464,24 +506,29 @@ static void test_network(const char *name, int shadow, int residual, int default
     layers = shadow ? l.shadow_layers : l.scattering_layers;
     CHECK((size_t)sizes[0] == (size_t)gold(&file, "layer_sizes", NULL)[0]);
     {
-        ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at), *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
+        ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at),
+                   *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
         ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, inputs);
         ssdgs__network_forward(context->k, sizes, layers, weights, NULL, NULL, &lists, inputs, outputs);
-        context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, outs);
+        context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head,
+                           outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         memset(one, 0, sizeof one);
         if (shadow) {
             for (s = 0; s < BLOCK; s++) out[s] = (double)outs[9 * BLOCK + s];
             snprintf(key, sizeof key, "%sS", prefix);
             CHECK_NEAR(out, gold(&file, key, NULL), BLOCK, value_bound(), 0, key);
-            for (s = 0; s < BLOCK; s++) one[s] = (ssdgs_real)(gold(&file, "grad_S", NULL)[s] * 3.14159265358979323846);
+            for (s = 0; s < BLOCK; s++)
+                one[s] = (ssdgs_real)(gold(&file, "grad_S", NULL)[s] * 3.14159265358979323846);
         } else {
             const int per = defaults ? 3 : 1;
             for (s = 0; s < BLOCK; s++)
                 for (c = 0; c < per; c++) out[s * per + c] = (double)outs[(6 + c) * BLOCK + s];
-            CHECK_NEAR(out, gold(&file, "f_sss", NULL), BLOCK * per, real64 ? 1e-12 : 2e-9, real64 ? 1e-9 : 2e-5, name);
+            CHECK_NEAR(out, gold(&file, "f_sss", NULL), BLOCK * per, real64 ? 1e-12 : 2e-9,
+                       real64 ? 1e-9 : 2e-5, name);
             for (s = 0; s < BLOCK; s++)
-                for (c = 0; c < per; c++) one[c * BLOCK + s] = (ssdgs_real)gold(&file, "grad_f", NULL)[s * per + c];
+                for (c = 0; c < per; c++)
+                    one[c * BLOCK + s] = (ssdgs_real)gold(&file, "grad_f", NULL)[s * per + c];
         }
         dgauss = reals(SSDGS_CHANNELS * BLOCK);
         drows = reals(SSDGS__ROWS * BLOCK);
@@ -492,10 +539,12 @@ static void test_network(const char *name, int shadow, int residual, int default
         dother = reals((size_t)(l.widest + 1) * BLOCK);
         dweights = reals(count);
         slot = reals(ssdgs__slot_gradient_size(sizes, layers));
-        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, one, one, one, dgauss, drows, shadow ? dnet : dother,
-                                    shadow ? dother : dnet, dvisibility);
+        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL,
+                                    shadow ? NULL : head, one, one, one, dgauss, drows,
+                                    shadow ? dnet : dother, shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare, transposed, &lists, sizes[0], slot);
+        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare,
+                                          transposed, &lists, sizes[0], slot);
         ssdgs__sum_slots(sizes, layers, slot, 0, 1, 0, 1, dweights);
         ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
     }
@@ -545,7 +594,8 @@ static void test_loss(void) {
     gradient = reals(3 * pixels);
     gold_planes("image", image);
     gold_planes("target", target);
-    CHECK(!ssdgs__loss(context, &memory, image, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient, &values));
+    CHECK(!ssdgs__loss(context, &memory, image, target, (int)a->dims[1], (int)a->dims[0],
+                       (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient, &values));
     got[0] = values.l1;
     got[1] = values.ssim;
     got[2] = values.loss;
@@ -558,8 +608,10 @@ static void test_loss(void) {
     rows = (double *)malloc(3 * pixels * sizeof *rows);
     for (i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
     CHECK_L2(rows, gold(&file, "grad_image", NULL), 3 * pixels, gradient_bound(), "loss: grad_image");
-    CHECK(!ssdgs__loss(context, &memory, target, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)0.2, gradient, &values));
-    for (i = 0; i < 3 * pixels; i++) rows[i] = 0; /* equal images pull at nothing, where one grey level makes 1e-4 */
+    CHECK(!ssdgs__loss(context, &memory, target, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)0.2,
+                       gradient, &values));
+    for (i = 0; i < 3 * pixels; i++)
+        rows[i] = 0; /* equal images pull at nothing, where one grey level makes 1e-4 */
     CHECK_NEAR(gradient, rows, 3 * pixels, real64 ? 1e-15 : 1e-8, 0, "loss: gradient of equal images");
     free(rows);
     free(image);
@@ -569,8 +621,8 @@ static void test_loss(void) {
     gold_close(&file);
 }
 
-/* Sum of weight . conic (px^-2) + weight[3] ln opacity of a Gaussian under an orthographic view of 1 px a unit, from its quaternion (4)
-   and log scales (3). */
+/* Sum of weight . conic (px^-2) + weight[3] ln opacity of a Gaussian under an orthographic view of 1 px a
+   unit, from its quaternion (4) and log scales (3). */
 static double weighted_conic(const double raw[7], const double weight[4], double variance, int compensated) {
     double q[4], r[6], m[2][3], cov[3] = {0, 0, 0}, det, blurred, length = 0;
     int i, j;
@@ -592,16 +644,18 @@ static double weighted_conic(const double raw[7], const double weight[4], double
     det = pow(m[0][0] * m[1][1] - m[0][1] * m[1][0], 2) + pow(m[0][1] * m[1][2] - m[0][2] * m[1][1], 2) +
           pow(m[0][2] * m[1][0] - m[0][0] * m[1][2], 2);
     blurred = det + variance * (cov[0] + cov[2] + variance);
-    return (weight[0] * (cov[2] + variance) - weight[1] * cov[1] + weight[2] * (cov[0] + variance)) / blurred +
+    return (weight[0] * (cov[2] + variance) - weight[1] * cov[1] + weight[2] * (cov[0] + variance)) /
+               blurred +
            (compensated ? 0.5 * weight[3] * (log(det) - log(blurred)) : 0);
 }
 
-/* Rotations' and log scales' gradients of thin Gaussians, 3 to 300 px long and 0.1 to 1 px thin, against central differences in double:
-   what products of conics would lose. */
+/* Rotations' and log scales' gradients of thin Gaussians, 3 to 300 px long and 0.1 to 1 px thin, against
+   central differences in double: what products of conics would lose. */
 static void test_needles(void) {
     enum { MANY = 16, VALUES = SSDGS_CHANNELS * MANY };
     static const double long_side[4] = {3, 30, 100, 300}, thin_side[2] = {0.1, 1};
-    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT), slot[12];
+    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT),
+               slot[12];
     ssdgs__projection view;
     int compensated, i, j;
     for (compensated = 0; compensated < 2; compensated++) {
@@ -615,19 +669,25 @@ static void test_needles(void) {
         memset(gradient, 0, VALUES * sizeof *gradient);
         for (i = 0; i < MANY; i++) {
             for (j = 0; j < 4; j++) {
-                gaussians[(SSDGS_ROTATION + j) * MANY + i] = (ssdgs_real)(2 * ssdgs__uniform(1, (uint64_t)(4 * i + j)) - 1);
-                splat[i * SSDGS__SPLAT + 2 + j] = (ssdgs_real)(2 * ssdgs__uniform(2, (uint64_t)(4 * i + j)) - 1);
+                gaussians[(SSDGS_ROTATION + j) * MANY + i] =
+                    (ssdgs_real)(2 * ssdgs__uniform(1, (uint64_t)(4 * i + j)) - 1);
+                splat[i * SSDGS__SPLAT + 2 + j] =
+                    (ssdgs_real)(2 * ssdgs__uniform(2, (uint64_t)(4 * i + j)) - 1);
             }
             for (j = 0; j < 3; j++)
-                gaussians[(SSDGS_LOG_SCALE + j) * MANY + i] = (ssdgs_real)log(j == i % 3 ? long_side[i % 4] : thin_side[i / 4 % 2]);
+                gaussians[(SSDGS_LOG_SCALE + j) * MANY + i] =
+                    (ssdgs_real)log(j == i % 3 ? long_side[i % 4] : thin_side[i / 4 % 2]);
         }
         context->k->project_backward(&view, gaussians, MANY, 0, MANY, splat, gradient, MANY, slot);
         for (i = 0; i < MANY; i++) {
             double raw[7], weight[4], error[2] = {0, 0}, norm[2] = {0, 0};
-            for (j = 0; j < 7; j++) raw[j] = (double)gaussians[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
+            for (j = 0; j < 7; j++)
+                raw[j] = (double)gaussians[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
             for (j = 0; j < 4; j++) weight[j] = (double)splat[i * SSDGS__SPLAT + 2 + j];
             for (j = 0; j < 7; j++) {
-                const double start = raw[j], step = 1e-5, got = (double)gradient[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
+                const double start = raw[j], step = 1e-5,
+                             got = (double)
+                                 gradient[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
                 double want = 0;
                 raw[j] = start + step;
                 want += weighted_conic(raw, weight, 0.1, compensated);
@@ -640,7 +700,8 @@ static void test_needles(void) {
             for (j = 0; j < 2; j++) worst[j] = fmax(worst[j], sqrt(error[j] / norm[j]));
         }
         if (!CHECK(worst[0] < (real64 ? 1e-6 : 1e-2) && worst[1] < (real64 ? 1e-6 : 1e-3)))
-            printf("    needles%s: rotations off by %.3g, scales by %.3g\n", compensated ? ", compensated" : "", worst[0], worst[1]);
+            printf("    needles%s: rotations off by %.3g, scales by %.3g\n",
+                   compensated ? ", compensated" : "", worst[0], worst[1]);
     }
     free(gaussians);
     free(gradient);
@@ -660,9 +721,10 @@ static void test_adam(void) {
     v = reals(n);
     rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
     for (t = 0; t < steps; t++) {
-        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1), ssdgs__bias_correction(0.999, (int)t + 1),
-                         (ssdgs_real)1e-15);
-        CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6, "adam: trajectory");
+        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1),
+                         ssdgs__bias_correction(0.999, (int)t + 1), (ssdgs_real)1e-15);
+        CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6,
+                   "adam: trajectory");
     }
     free(p);
     free(g);
@@ -705,8 +767,10 @@ static void test_full(const char *name, int defaults) {
     for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
     CHECK(gold_find(&file, "sss_weights")->count == view.scattering_count);
     CHECK(gold_find(&file, "shadow_weights")->count == view.shadow_count);
-    for (i = 0; i < view.scattering_count; i++) view.scattering[i] = (ssdgs_real)gold(&file, "sss_weights", NULL)[i];
-    for (i = 0; i < view.shadow_count; i++) view.shadow[i] = (ssdgs_real)gold(&file, "shadow_weights", NULL)[i];
+    for (i = 0; i < view.scattering_count; i++)
+        view.scattering[i] = (ssdgs_real)gold(&file, "sss_weights", NULL)[i];
+    for (i = 0; i < view.shadow_count; i++)
+        view.shadow[i] = (ssdgs_real)gold(&file, "shadow_weights", NULL)[i];
     camera = gold_camera();
     n = (size_t)model->count;
     pixels = (size_t)camera.width * (size_t)camera.height;
@@ -724,10 +788,10 @@ static void test_full(const char *name, int defaults) {
     }
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
     rows = (double *)malloc((3 * pixels + 3 * n) * sizeof *rows);
-#define COMPONENT(array, golden, width)                                                                                          \
-    do {                                                                                                                         \
-        for (i = 0; i < n * (width); i++) rows[i] = (double)frame.array[4 * (i / (width)) + i % (width)];                        \
-        CHECK_NEAR(rows, gold(&file, golden, NULL), n * (width), value_bound(), 0, golden);                                      \
+#define COMPONENT(array, golden, width) \
+    do { \
+        for (i = 0; i < n * (width); i++) rows[i] = (double)frame.array[4 * (i / (width)) + i % (width)]; \
+        CHECK_NEAR(rows, gold(&file, golden, NULL), n *(width), value_bound(), 0, golden); \
     } while (0)
     COMPONENT(color, "color", 3);
     COMPONENT(shadow, "shadow", 1);
@@ -737,7 +801,8 @@ static void test_full(const char *name, int defaults) {
         from[0] = frame.diffuse;
         from[1] = frame.specular;
         from[2] = frame.scattering;
-        for (i = 0; i < 3 * n; i++) rows[i] = (double)from[c][4 * (i / 3) + i % 3] / (c < 2 ? gold(&file, "shadow", NULL)[i / 3] : 1);
+        for (i = 0; i < 3 * n; i++)
+            rows[i] = (double)from[c][4 * (i / 3) + i % 3] / (c < 2 ? gold(&file, "shadow", NULL)[i / 3] : 1);
         CHECK_NEAR(rows, gold(&file, names[c], NULL), 3 * n, value_bound(), 0, names[c]);
     }
     image = reals(3 * pixels);
@@ -745,17 +810,20 @@ static void test_full(const char *name, int defaults) {
     target = reals(3 * pixels);
     for (c = 0; c < 3; c++)
         for (i = 0; i < pixels; i++)
-            image[pixels * (size_t)c + i] = frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
+            image[pixels * (size_t)c + i] =
+                frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
     check_image("image", image, value_bound());
     if (defaults) context->k->srgb_encode(image, slope, image, 3 * pixels);
     gold_planes("target", target);
-    CHECK(!ssdgs__loss(context, &memory, image, target, camera.width, camera.height, 0, frame.pixel_gradient, &values));
+    CHECK(!ssdgs__loss(context, &memory, image, target, camera.width, camera.height, 0, frame.pixel_gradient,
+                       &values));
     loss[0] = values.loss;
     CHECK_NEAR(loss, gold(&file, "loss", NULL), 1, value_bound(), 0, "full: loss");
     for (i = 0; i < 3 * pixels && defaults; i++) frame.pixel_gradient[i] *= slope[i];
     through_background(&frame);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
-#define GRADIENT(golden, plane) check_planes(golden, frame.gradient + (size_t)(plane) * stride, stride, gradient_bound())
+#define GRADIENT(golden, plane) \
+    check_planes(golden, frame.gradient + (size_t)(plane)*stride, stride, gradient_bound())
     GRADIENT("grad_mean", SSDGS_POSITION);
     GRADIENT("grad_quat", SSDGS_ROTATION);
     GRADIENT("grad_log_scale", SSDGS_LOG_SCALE);
@@ -767,10 +835,14 @@ static void test_full(const char *name, int defaults) {
     GRADIENT("grad_asg_weight_raw", SSDGS_ASG_WEIGHT);
     GRADIENT("grad_material", SSDGS_MATERIAL);
     ssdgs__global_groups(&settings, first);
-    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(), "full: grad_asg_quat");
-    CHECK_L2(frame.global_gradient + first[1], gold(&file, "grad_asg_log_lambda_mu", NULL), 16, gradient_bound(), "full: grad_asg_log_lambda_mu");
-    CHECK_L2(frame.global_gradient + first[3], gold(&file, "grad_sss_weights", NULL), view.scattering_count, gradient_bound(), "full: grad_sss_weights");
-    CHECK_L2(frame.global_gradient + first[4], gold(&file, "grad_shadow_weights", NULL), view.shadow_count, gradient_bound(), "full: grad_shadow_weights");
+    CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(),
+             "full: grad_asg_quat");
+    CHECK_L2(frame.global_gradient + first[1], gold(&file, "grad_asg_log_lambda_mu", NULL), 16,
+             gradient_bound(), "full: grad_asg_log_lambda_mu");
+    CHECK_L2(frame.global_gradient + first[3], gold(&file, "grad_sss_weights", NULL), view.scattering_count,
+             gradient_bound(), "full: grad_sss_weights");
+    CHECK_L2(frame.global_gradient + first[4], gold(&file, "grad_shadow_weights", NULL), view.shadow_count,
+             gradient_bound(), "full: grad_shadow_weights");
     CHECK_L2(frame.light_gradient, gold(&file, "grad_light", NULL), 3, gradient_bound(), "full: grad_light");
     memset(&photo, 0, sizeof photo);
     memset(zero, 0, sizeof zero);
@@ -818,7 +890,7 @@ int main(void) {
         ssdgs_context_destroy(context);
     }
     CHECK(found);
-    printf("figure golden_max_abs_image%s %.3g\nfigure golden_max_rel_grad_f%d %.3g\n", real64 ? "_f64" : "", image_error, real64 ? 64 : 32,
-           test_worst_l2);
+    printf("figure golden_max_abs_image%s %.3g\nfigure golden_max_rel_grad_f%d %.3g\n", real64 ? "_f64" : "",
+           image_error, real64 ? 64 : 32, test_worst_l2);
     TEST_END();
 }

@@ -1,5 +1,5 @@
-/* The whole backward pass against central differences of the whole forward pass, in double, for the options the golden files
-   do not reach; and identities that need no oracle. */
+/* The whole backward pass against central differences of the whole forward pass, in double, for the options
+   the golden files do not reach; and identities that need no oracle. */
 #ifndef SSDGS_REAL64
 #define SSDGS_REAL64
 #endif
@@ -48,8 +48,11 @@ static void build_wall(ssdgs_model *model) {
     model->gaussians[SSDGS_OPACITY * model->capacity] = 12;
 }
 
-/* A smooth objective of the image, deferred also of the blended normals and their alpha: the product with fixed weights. */
-static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, const ssdgs_frame *fixed, ssdgs_frame *frame, int backward) {
+/* A smooth objective of the image, deferred also of the blended normals and their alpha: the product with
+   fixed weights. */
+static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *camera,
+                        const ssdgs_light *lights, const ssdgs_frame *fixed, ssdgs_frame *frame,
+                        int backward) {
     const size_t pixels = SIDE * SIDE, n = COUNT * (size_t)s->light_count;
     static ssdgs_real normal_gradient[4 * SIDE * SIDE];
     double sum = 0;
@@ -61,37 +64,47 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
         memcpy(frame->visibility, fixed->visibility, n * sizeof(ssdgs_real));
         memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
         frame->visibility_given = frame->layer_count > 0;
-        if (frame->visibility_given) memcpy(frame->pixel_visibility, fixed->pixel_visibility, pixels * (size_t)s->light_count * sizeof(ssdgs_real));
+        if (frame->visibility_given)
+            memcpy(frame->pixel_visibility, fixed->pixel_visibility,
+                   pixels * (size_t)s->light_count * sizeof(ssdgs_real));
     }
     for (i = 0; i < COUNT; i++) frame->seen[i] = 1;
     if (ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE)) exit(1);
     for (c = 0; c < 3; c++)
         for (i = 0; i < pixels; i++) {
             const double weight = sin(0.37 * (double)i + 1.3 * (double)c);
-            sum += weight * (frame->pixels[pixels * c + i] + frame->transmittance[i] * s->options.background[c]);
+            sum +=
+                weight * (frame->pixels[pixels * c + i] + frame->transmittance[i] * s->options.background[c]);
             frame->pixel_gradient[pixels * c + i] = weight;
-            frame->pixel_gradient[pixels * 3 + i] = (c ? frame->pixel_gradient[pixels * 3 + i] : 0) + weight * s->options.background[c];
+            frame->pixel_gradient[pixels * 3 + i] =
+                (c ? frame->pixel_gradient[pixels * 3 + i] : 0) + weight * s->options.background[c];
         }
     frame->normal_gradient = frame->layer_count ? normal_gradient : NULL;
     for (c = 0; frame->layer_count && c < 4; c++) {
-        const ssdgs_real *plane = c < 3 ? ssdgs__layer_plane(frame, 4, (int)c) : ssdgs__layer_plane(frame, 3, 2);
+        const ssdgs_real *plane =
+            c < 3 ? ssdgs__layer_plane(frame, 4, (int)c) : ssdgs__layer_plane(frame, 3, 2);
         for (i = 0; i < pixels; i++) {
             normal_gradient[pixels * c + i] = 0.3 * sin(0.29 * (double)i + 0.9 * (double)c + 2);
             sum += normal_gradient[pixels * c + i] * plane[i];
         }
     }
-    if (backward && ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
+    if (backward && ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD))
+        exit(1);
     return sum;
 }
 
-/* Central differences at two steps: where they disagree a fold (alpha's threshold, ReLU, the sort) lies between, and the entry is
-   skipped; few may be. */
-typedef struct tally { double norm, error; int tried, skipped; } tally;
+/* Central differences at two steps: where they disagree a fold (alpha's threshold, ReLU, the sort) lies
+   between, and the entry is skipped; few may be. */
+typedef struct tally {
+    double norm, error;
+    int tried, skipped;
+} tally;
 
 static const double steps[4] = {2e-6, -2e-6, 1e-6, -1e-6};
 
 static void tell(const double side[4], double analytic, tally *t) {
-    const double coarse = (side[0] - side[1]) / (steps[0] - steps[1]), fine = (side[2] - side[3]) / (steps[2] - steps[3]);
+    const double coarse = (side[0] - side[1]) / (steps[0] - steps[1]),
+                 fine = (side[2] - side[3]) / (steps[2] - steps[3]);
     t->tried++;
     if (fabs(coarse - fine) > 1e-5 * (fabs(fine) + 1e-3)) {
         t->skipped++;
@@ -101,7 +114,8 @@ static void tell(const double side[4], double analytic, tally *t) {
     t->norm += fine * fine;
 }
 
-static void compare(const scene *s, ssdgs_model *model, ssdgs_camera *camera, ssdgs_light *lights, const ssdgs_frame *fixed, ssdgs_real *value, double analytic, tally *t) {
+static void compare(const scene *s, ssdgs_model *model, ssdgs_camera *camera, ssdgs_light *lights,
+                    const ssdgs_frame *fixed, ssdgs_real *value, double analytic, tally *t) {
     const double start = *value;
     double side[4];
     ssdgs_frame frame;
@@ -116,7 +130,9 @@ static void compare(const scene *s, ssdgs_model *model, ssdgs_camera *camera, ss
 
 static void finish(const scene *s, const char *group, const tally *t) {
     const int ok = t->error <= 1e-10 * t->norm + 1e-16 * t->tried && t->skipped <= t->tried / 10 + 1;
-    if (!CHECK(ok)) printf("    %s, %s: relative error %.3g, norm %.3g, %d of %d skipped\n", s->name, group, sqrt(t->error / (t->norm + 1e-300)), sqrt(t->norm), t->skipped, t->tried);
+    if (!CHECK(ok))
+        printf("    %s, %s: relative error %.3g, norm %.3g, %d of %d skipped\n", s->name, group,
+               sqrt(t->error / (t->norm + 1e-300)), sqrt(t->norm), t->skipped, t->tried);
 }
 
 static void run(const scene *s) {
@@ -146,7 +162,9 @@ static void run(const scene *s) {
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
     memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
-    if (frame.layer_count) memcpy(pixel_visibility, frame.pixel_visibility, SIDE * SIDE * (size_t)s->light_count * sizeof *pixel_visibility);
+    if (frame.layer_count)
+        memcpy(pixel_visibility, frame.pixel_visibility,
+               SIDE * SIDE * (size_t)s->light_count * sizeof *pixel_visibility);
     if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
     fixed = frame;
     fixed.flux = flux;
@@ -161,8 +179,10 @@ static void run(const scene *s) {
     for (i = 0; i < COUNT; i++) { /* gradient . q = 0 for both rotations */
         double dot = 0, dot2 = 0;
         for (c = 0; c < 4; c++) {
-            dot += gradient[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i] * model->gaussians[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i];
-            dot2 += gradient[(size_t)(SSDGS_FRAME + c) * stride + (size_t)i] * model->gaussians[(size_t)(SSDGS_FRAME + c) * stride + (size_t)i];
+            dot += gradient[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i] *
+                   model->gaussians[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i];
+            dot2 += gradient[(size_t)(SSDGS_FRAME + c) * stride + (size_t)i] *
+                    model->gaussians[(size_t)(SSDGS_FRAME + c) * stride + (size_t)i];
         }
         CHECK(fabs(dot) < 1e-12 && fabs(dot2) < 1e-12);
     }
@@ -171,7 +191,8 @@ static void run(const scene *s) {
         if (s->settings.transport && group == SSDGS__G_POSITION) continue;
         for (i = 0; i < COUNT; i += 2)
             for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++)
-                compare(s, model, &camera, lights, &fixed, model->gaussians + (size_t)c * stride + (size_t)i, gradient[(size_t)c * stride + (size_t)i], &t);
+                compare(s, model, &camera, lights, &fixed, model->gaussians + (size_t)c * stride + (size_t)i,
+                        gradient[(size_t)c * stride + (size_t)i], &t);
         finish(s, ssdgs__group_names[group], &t);
     }
     ssdgs__global_groups(&s->settings, first);
@@ -185,7 +206,8 @@ static void run(const scene *s) {
     }
     {
         tally t = {0, 0, 0, 0};
-        for (c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++) compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
+        for (c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++)
+            compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
         if (t.tried) finish(s, "light", &t);
     }
     { /* the pose, at a correction that is not zero */
@@ -241,7 +263,8 @@ static void test_rotation(void) {
     }
 }
 
-/* Shared gradients over many blocks: the whole is the sum of the even Gaussians' and the odd ones', which fill other blocks. */
+/* Shared gradients over many blocks: the whole is the sum of the even Gaussians' and the odd ones', which
+   fill other blocks. */
 static void test_shared_sums(void) {
     enum { MANY = 64 * 40 + 5 };
     static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
@@ -260,14 +283,17 @@ static void test_shared_sums(void) {
     if (!CHECK(!ssdgs_model_create(context, &settings, MANY, &model))) exit(1);
     sum = (double *)calloc(model->global_count, sizeof *sum);
     for (i = 0; i < MANY; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) model->gaussians[(size_t)c * model->capacity + i] = (c < 3 ? 0.4 : 1) * (2 * draw(i * 40 + (size_t)c) - 1);
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            model->gaussians[(size_t)c * model->capacity + i] =
+                (c < 3 ? 0.4 : 1) * (2 * draw(i * 40 + (size_t)c) - 1);
     for (part = 0; part < 3; part++) {
         if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1)) exit(1);
         if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
         for (i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
         for (i = 0; i < 4 * MANY; i++) frame.color_gradient[i] = draw(i) - 0.5;
-        for (i = 0; i < 4 * MANY * (size_t)frame.layer_count; i++) frame.layer_gradient[i] = draw(4 * MANY + i) - 0.5;
+        for (i = 0; i < 4 * MANY * (size_t)frame.layer_count; i++)
+            frame.layer_gradient[i] = draw(4 * MANY + i) - 0.5;
         memset(frame.global_gradient, 0, model->global_count * sizeof *frame.global_gradient);
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
         for (i = 0; i < model->global_count; i++) sum[i] += (part == 2 ? -1 : 1) * frame.global_gradient[i];
@@ -293,8 +319,10 @@ static void test_moved_camera(void) {
     if (!CHECK(!ssdgs_model_create(context, NULL, MANY, &model))) exit(1);
     for (i = 0; i < MANY; i++)
         for (c = 0; c < 3; c++) {
-            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + i] = 0.8 * draw(3 * i + (size_t)c) - 0.4;
-            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + i] = -3 - draw(10000 + 3 * i + (size_t)c);
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + i] =
+                0.8 * draw(3 * i + (size_t)c) - 0.4;
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + i] =
+                -3 - draw(10000 + 3 * i + (size_t)c);
         }
     if (ssdgs__frame_begin(&frame, model, &camera, NULL, 0, NULL, 0, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE)) exit(1);
@@ -304,14 +332,16 @@ static void test_moved_camera(void) {
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
     for (c = 0; c < 3; c++) {
         double moved = 0, camera_moved = 0;
-        for (i = 0; i < MANY; i++) moved += frame.gradient[(size_t)(SSDGS_POSITION + c) * frame.gaussians.stride + i];
+        for (i = 0; i < MANY; i++)
+            moved += frame.gradient[(size_t)(SSDGS_POSITION + c) * frame.gaussians.stride + i];
         for (j = 0; j < 3; j++) camera_moved += camera.view[4 * j + c] * frame.view_gradient[4 * j + 3];
         CHECK(fabs(moved) > 0.1 && fabs(moved - camera_moved) < 1e-10 * fabs(moved));
     }
     ssdgs_model_destroy(model);
 }
 
-/* Where formulas have no value: an empty footprint's visibility, the half vector of opposite directions, the logits of 0 and 1. */
+/* Where formulas have no value: an empty footprint's visibility, the half vector of opposite directions, the
+   logits of 0 and 1. */
 static void test_edges(void) {
     static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
@@ -327,7 +357,8 @@ static void test_edges(void) {
     for (c = 0; c < 3; c++) light.intensity[c] = 1;
     if (!CHECK(!ssdgs_model_create(context, &settings, 2, &model))) exit(1);
     v = ssdgs_model_get(model);
-    v.gaussians[SSDGS_OPACITY * v.stride] = -8; /* too faint for the light's map: nothing is known to be in its way */
+    v.gaussians[SSDGS_OPACITY * v.stride] =
+        -8; /* too faint for the light's map: nothing is known to be in its way */
     memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);
     if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 1, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
@@ -343,14 +374,16 @@ static void test_edges(void) {
     for (i = 0; i < 2; i++) {
         CHECK(fabs(frame.shadow[4 * i] - (i ? 0.99 : 0.01)) < 1e-12);
         for (c = 0; c < 3; c++) CHECK(frame.specular[4 * i + c] == 0);
-        for (j = 0; j < 8; j++) CHECK(frame.gradient[(size_t)(SSDGS_ASG_WEIGHT + j) * frame.gaussians.stride + (size_t)i] == 0);
+        for (j = 0; j < 8; j++)
+            CHECK(frame.gradient[(size_t)(SSDGS_ASG_WEIGHT + j) * frame.gaussians.stride + (size_t)i] == 0);
     }
     ssdgs_model_destroy(model);
 }
 
 /* Deferred lobes get neither sharper nor broader than the bound, so what lies beyond it has no gradient. */
 static void test_sharpest(void) {
-    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK], dgauss[SSDGS_CHANNELS * SSDGS__BLOCK];
+    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK],
+        dgauss[SSDGS_CHANNELS * SSDGS__BLOCK];
     static const double raw[4] = {-SSDGS__SHARPEST - 1, -1, 1, SSDGS__SHARPEST + 1};
     int s, i;
     for (s = 0; s < SSDGS__BLOCK; s++) {
@@ -361,12 +394,14 @@ static void test_sharpest(void) {
     context->k->lobe_backward(gauss, drows, dgauss);
     for (s = 0; s < SSDGS__BLOCK; s++)
         for (i = 0; i < 2; i++) {
-            const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s], want = s % 4 == 0 || s % 4 == 3 ? 0 : exp(raw[s % 4]);
+            const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s],
+                         want = s % 4 == 0 || s % 4 == 3 ? 0 : exp(raw[s % 4]);
             CHECK(fabs(d - want) < 1e-14);
         }
 }
 
-/* Blended layers of tiles without a Gaussian are 0 whatever the frame before left there: normals beside them read their depth. */
+/* Blended layers of tiles without a Gaussian are 0 whatever the frame before left there: normals beside them
+   read their depth. */
 static void test_empty_tiles(void) {
     enum { WIDE = 64 };
     static const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
@@ -391,10 +426,11 @@ static void test_empty_tiles(void) {
     ssdgs_model_destroy(model);
 }
 
-/* A photograph with transparency on a background: the gradient goes through the blending of stored values, and stops where a bright
-   rendering meets a photograph's 1. */
+/* A photograph with transparency on a background: the gradient goes through the blending of stored values,
+   and stops where a bright rendering meets a photograph's 1. */
 static void test_photo(int transfer, double intensity) {
-    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, background[3] = {0.7, 0.2, 0.5};
+    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1},
+                            background[3] = {0.7, 0.2, 0.5};
     static const int frozen[2] = {1, 1};
     static unsigned char pixels[SIDE * SIDE * 4];
     ssdgs_settings settings = ssdgs_settings_default();
@@ -412,18 +448,23 @@ static void test_photo(int transfer, double intensity) {
     photo.light.position[0] = photo.light.position[1] = -2;
     photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = intensity;
     photo.pixels = pixels;
-    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)(intensity > 9 && i / 4 % 3 ? 255 : 255.9 * draw(7000 + i));
+    for (i = 0; i < sizeof pixels; i++)
+        pixels[i] = (unsigned char)(intensity > 9 && i / 4 % 3 ? 255 : 255.9 * draw(7000 + i));
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
     fill(model);
     stride = model->capacity;
-    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values)) exit(1);
+    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
+                              SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
+        exit(1);
     for (i = 0; i < SSDGS_CHANNELS * COUNT; i++) gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
     for (i = 0; i < COUNT * SSDGS_SPECULAR; i += 5) { /* geometry, opacity, diffuse colour */
         ssdgs_real *value = model->gaussians + i / COUNT * stride + i % COUNT, start = *value;
         double loss[2], slope;
         for (side = 0; side < 2; side++) {
             *value = start + (side ? 1e-6 : -1e-6);
-            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values)) exit(1);
+            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
+                                      SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
+                exit(1);
             loss[side] = values.loss;
         }
         *value = start;
@@ -432,26 +473,33 @@ static void test_photo(int transfer, double intensity) {
         t.norm += slope * slope;
         t.error += (slope - gradient[i]) * (slope - gradient[i]);
     }
-    if (!CHECK(t.error < 1e-6 * t.norm && t.norm > 0)) printf("    transfer %d, intensity %g: relative error %.3g\n", transfer, intensity, sqrt(t.error / t.norm));
+    if (!CHECK(t.error < 1e-6 * t.norm && t.norm > 0))
+        printf("    transfer %d, intensity %g: relative error %.3g\n", transfer, intensity,
+               sqrt(t.error / t.norm));
     ssdgs_model_destroy(model);
 }
 
-/* What a rendering looks like on a background is what a photograph of the same colour and alpha looks like. */
+/* What a rendering looks like on a background is what a photograph of the same colour and alpha looks
+   like. */
 static void test_compose(void) {
     static const ssdgs_real background[3] = {0.7, 0.2, 0.5}, stored[3] = {0.9, 0.4, 0.02};
     ssdgs_real color[6], alpha[2] = {0.25, 0}, out[6];
     int transfer, c;
     for (transfer = 0; transfer < 2; transfer++) {
         for (c = 0; c < 3; c++) {
-            color[c] = alpha[0] * (transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(stored[c]) : stored[c]);
+            color[c] =
+                alpha[0] * (transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(stored[c]) : stored[c]);
             color[3 + c] = 0;
         }
         ssdgs_compose(color, alpha, 2, transfer, background, out);
-        for (c = 0; c < 3; c++) CHECK(fabs(out[c] - (0.25 * stored[c] + 0.75 * background[c])) < 1e-9 && fabs(out[3 + c] - background[c]) < 1e-15);
+        for (c = 0; c < 3; c++)
+            CHECK(fabs(out[c] - (0.25 * stored[c] + 0.75 * background[c])) < 1e-9 &&
+                  fabs(out[3 + c] - background[c]) < 1e-15);
     }
 }
 
-/* The scattering network's inputs, in their order: x in four octaves, wo in view_octaves, wi in light_octaves, n. */
+/* The scattering network's inputs, in their order: x in four octaves, wo in view_octaves, wi in
+   light_octaves, n. */
 static void test_octaves(void) {
     ssdgs_frame frame;
     ssdgs__block_layout l;
@@ -468,12 +516,15 @@ static void test_octaves(void) {
     frame.light_count = 1;
     l = ssdgs__layout(&frame);
     CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + 9 + SSDGS__LENGTHS);
-    gauss = (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
+    gauss =
+        (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
     part = gauss + l.lights;
     rows = part + l.light_size;
     for (i = 0; i < 4; i++) {
-        static const int octaves[4] = {4, 2, 1, 0}, from[4] = {SSDGS_POSITION, SSDGS__WO, SSDGS__WI, SSDGS__NORMAL};
-        for (c = 0; c < 3; c++) (i ? part : gauss)[(from[i] + c) * SSDGS__BLOCK] = want[n++] = 0.2 + 0.3 * i - 0.5 * c;
+        static const int octaves[4] = {4, 2, 1, 0},
+                         from[4] = {SSDGS_POSITION, SSDGS__WO, SSDGS__WI, SSDGS__NORMAL};
+        for (c = 0; c < 3; c++)
+            (i ? part : gauss)[(from[i] + c) * SSDGS__BLOCK] = want[n++] = 0.2 + 0.3 * i - 0.5 * c;
         for (k = 0; k < 6 * octaves[i]; k++, n++) {
             const double angle = (0.2 + 0.3 * i - 0.5 * (k % 3)) * (1 << k / 3 % octaves[i]);
             want[n] = k < 3 * octaves[i] ? sin(angle) : cos(angle);
@@ -524,27 +575,37 @@ int main(void) {
     run(&s);
     s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
     run(&s);
-    s = base, s.name = "geometric ASG, shadow on scattering", s.settings.asg = SSDGS_ASG_GEOMETRIC, s.settings.shadow_on_scattering = 1;
+    s = base, s.name = "geometric ASG, shadow on scattering", s.settings.asg = SSDGS_ASG_GEOMETRIC,
+    s.settings.shadow_on_scattering = 1;
     run(&s);
-    s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR, s.settings.dipole = SSDGS_DIPOLE_BURLEY;
+    s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR,
+    s.settings.dipole = SSDGS_DIPOLE_BURLEY;
     s.options.stop = 0.4;
     run(&s);
-    s = base, s.name = "printed dipole, scalar optics, plain shadow network", s.settings.dipole = SSDGS_DIPOLE_PRINTED;
-    s.settings.per_channel_optics = s.settings.residual_shadow = s.settings.depth_cue = 0, s.settings.shadow_on_scattering = 1;
+    s = base, s.name = "printed dipole, scalar optics, plain shadow network",
+    s.settings.dipole = SSDGS_DIPOLE_PRINTED;
+    s.settings.per_channel_optics = s.settings.residual_shadow = s.settings.depth_cue = 0,
+    s.settings.shadow_on_scattering = 1;
     run(&s);
-    s = base, s.name = "released dipole, shadow on scattering, no shadow network, a wall", s.settings.dipole = SSDGS_DIPOLE_RELEASED, s.wall = 1;
+    s = base, s.name = "released dipole, shadow on scattering, no shadow network, a wall",
+    s.settings.dipole = SSDGS_DIPOLE_RELEASED, s.wall = 1;
     s.settings.shadow_on_scattering = 1, s.settings.shadow_layers = 0;
     run(&s);
     s = base, s.name = "shadow network of one layer", s.settings.shadow_layers = 1;
     run(&s);
-    s = base, s.name = "lights at the back", s.lights[0].position[1] = 1.3; /* where Fresnel's term is steep */
-    s.light_count = 2, s.lights[1].position[0] = -0.2, s.lights[1].position[1] = 1.5, s.lights[1].position[2] = -0.2; /* wo.h < 0.25 */
+    s = base, s.name = "lights at the back",
+    s.lights[0].position[1] = 1.3; /* where Fresnel's term is steep */
+    s.light_count = 2, s.lights[1].position[0] = -0.2, s.lights[1].position[1] = 1.5,
+    s.lights[1].position[2] = -0.2; /* wo.h < 0.25 */
     run(&s);
-    s = base, s.name = "directional and point light", s.light_count = 2, s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
+    s = base, s.name = "directional and point light", s.light_count = 2,
+    s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
     run(&s);
     for (i = 0; i < 4; i++) {
-        static const char *const names[4] = {"diffuse only", "specular only", "shadow and diffuse", "scattering only"};
-        static const int terms[4] = {SSDGS_DIFFUSE_TERM, SSDGS_SPECULAR_TERM, SSDGS_SHADOW_TERM | SSDGS_DIFFUSE_TERM, SSDGS_SCATTERING_TERM};
+        static const char *const names[4] = {"diffuse only", "specular only", "shadow and diffuse",
+                                             "scattering only"};
+        static const int terms[4] = {SSDGS_DIFFUSE_TERM, SSDGS_SPECULAR_TERM,
+                                     SSDGS_SHADOW_TERM | SSDGS_DIFFUSE_TERM, SSDGS_SCATTERING_TERM};
         s = base, s.name = names[i], s.options.terms = terms[i];
         run(&s);
     }

@@ -1,5 +1,5 @@
-/* examples/olat.h: PNG of every kind, hostile PNG, the writer, JSON, numbers, datasets good and bad, failing memory.
-   cc -o build/t_olat tests/t_olat.c -lm && build/t_olat       (writes under build/) */
+/* examples/olat.h: PNG of every kind, hostile PNG, the writer, JSON, numbers, datasets good and bad, failing
+   memory. cc -o build/t_olat tests/t_olat.c -lm && build/t_olat       (writes under build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* mkfifo */
 #endif
@@ -58,7 +58,9 @@ typedef struct picture {
 static unsigned char file[1 << 16];
 static size_t file_size;
 
-static int picture_channels(const picture *p) { return p->color == 2 ? 3 : p->color == 4 ? 2 : p->color == 6 ? 4 : 1; }
+static int picture_channels(const picture *p) {
+    return p->color == 2 ? 3 : p->color == 4 ? 2 : p->color == 6 ? 4 : 1;
+}
 static int palette_size(const picture *p) { return p->depth == 8 ? 200 : 1 << p->depth; }
 
 /* Few values where they are wide, so that the transparent colour occurs. */
@@ -96,7 +98,8 @@ static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigne
     unsigned char row[600], above[600];
     size_t done = 0;
     int channels = picture_channels(p), x, y, c, filter = 0;
-    int bytes = ((p->width - x0 + dx - 1) / dx * channels * p->depth + 7) / 8, back = (channels * p->depth + 7) / 8, i;
+    int bytes = ((p->width - x0 + dx - 1) / dx * channels * p->depth + 7) / 8,
+        back = (channels * p->depth + 7) / 8, i;
     if (x0 >= p->width) return 0;
     memset(above, 0, sizeof above);
     for (y = y0; y < p->height; y += dy, filter = (filter + 1) % 5) {
@@ -105,13 +108,15 @@ static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigne
         for (x = x0; x < p->width; x += dx) {
             for (c = 0; c < channels; c++, bit += p->depth) {
                 unsigned s = sample(p, x, y, c);
-                if (p->depth == 16) row[bit / 8] = (unsigned char)(s >> 8), row[bit / 8 + 1] = (unsigned char)(s & 255);
+                if (p->depth == 16)
+                    row[bit / 8] = (unsigned char)(s >> 8), row[bit / 8 + 1] = (unsigned char)(s & 255);
                 else row[bit / 8] = (unsigned char)(row[bit / 8] | s << (8 - p->depth - bit % 8));
             }
         }
         raw[done++] = (unsigned char)filter;
         for (i = 0; i < bytes; i++) {
-            int a = i < back ? 0 : row[i - back], b = above[i], d = i < back ? 0 : above[i - back], e = a + b - d, guess = 0;
+            int a = i < back ? 0 : row[i - back], b = above[i], d = i < back ? 0 : above[i - back],
+                e = a + b - d, guess = 0;
             if (filter == 1) guess = a;
             if (filter == 2) guess = b;
             if (filter == 3) guess = (a + b) / 2;
@@ -128,21 +133,23 @@ static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigne
 }
 
 static void encode(const picture *p) {
-    static const int passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4}, {0, 2, 2, 4}, {1, 0, 2, 2},
-        {0, 1, 1, 2}, {0, 0, 1, 1}};
+    static const int passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                                     {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}, {0, 0, 1, 1}};
     static unsigned char raw[1 << 14], packed[1 << 15];
     unsigned char palette[768], key[6];
     size_t size = 0, used = 2, at = 0;
     int i;
     put_header(p->width, p->height, p->depth, p->color, p->interlaced);
     put_chunk("teXt", raw, 5); /* ancillary: to be skipped */
-    for (i = 0; i < 3 * palette_size(p) && p->color == 3; i++) palette[i] = (unsigned char)palette_value(i / 3, i % 3);
+    for (i = 0; i < 3 * palette_size(p) && p->color == 3; i++)
+        palette[i] = (unsigned char)palette_value(i / 3, i % 3);
     if (p->color == 3) put_chunk("PLTE", palette, (size_t)(3 * palette_size(p)));
     for (i = 0; i < 3; i++) { /* the colour of pixel (1, 1), with bits beyond the depth that must be masked */
         unsigned s = sample(p, 1, 1, i) | (p->depth < 16 ? 0xA0u << p->depth : 0);
         key[2 * i] = (unsigned char)(s >> 8 & 255), key[2 * i + 1] = (unsigned char)(s & 255);
     }
-    for (i = 0; i < palette_size(p) / 2 && p->color == 3; i++) palette[i] = (unsigned char)palette_value(i, 3);
+    for (i = 0; i < palette_size(p) / 2 && p->color == 3; i++)
+        palette[i] = (unsigned char)palette_value(i, 3);
     if (p->transparent && p->color == 3) put_chunk("tRNS", palette, (size_t)palette_size(p) / 2);
     else if (p->transparent) put_chunk("tRNS", key, p->color == 2 ? 6 : 2);
     for (i = p->interlaced ? 0 : 7; i < (p->interlaced ? 7 : 8); i++) {
@@ -206,14 +213,15 @@ static int decodes_right(const picture *p) {
         }
     }
     meter_free(pixels);
-    if (wrong) printf("%d x %d, colour %d, depth %d, interlaced %d, tRNS %d\n", p->width, p->height, p->color, p->depth,
-                      p->interlaced, p->transparent);
+    if (wrong)
+        printf("%d x %d, colour %d, depth %d, interlaced %d, tRNS %d\n", p->width, p->height, p->color,
+               p->depth, p->interlaced, p->transparent);
     return !wrong;
 }
 
 static void test_kinds(void) {
-    static const int kinds[15][2] = {{0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {2, 8}, {2, 16}, {3, 1}, {3, 2}, {3, 4}, {3, 8},
-        {4, 8}, {4, 16}, {6, 8}, {6, 16}};
+    static const int kinds[15][2] = {{0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {2, 8}, {2, 16}, {3, 1},
+                                     {3, 2}, {3, 4}, {3, 8}, {4, 8}, {4, 16}, {6, 8}, {6, 16}};
     static const int sides[8] = {1, 2, 3, 4, 5, 8, 9, 33};
     int kind, i, k, interlaced, transparent;
     for (kind = 0; kind < 15; kind++) {
@@ -222,7 +230,8 @@ static void test_kinds(void) {
                 for (interlaced = 0; interlaced < 2; interlaced++) {
                     for (transparent = 0; transparent < (kinds[kind][0] & 4 ? 1 : 2); transparent++) {
                         picture p;
-                        p.width = sides[i], p.height = sides[k], p.color = kinds[kind][0], p.depth = kinds[kind][1];
+                        p.width = sides[i], p.height = sides[k], p.color = kinds[kind][0],
+                        p.depth = kinds[kind][1];
                         p.interlaced = interlaced, p.transparent = transparent;
                         CHECK(decodes_right(&p));
                     }
@@ -235,7 +244,8 @@ static void test_kinds(void) {
 
 /* ---- hostile PNG ---- */
 
-/* Decodes an exact copy, so that a sanitizer sees a byte read too many; 1: refused with a message, 2: decoded, 0: wrong. */
+/* Decodes an exact copy, so that a sanitizer sees a byte read too many; 1: refused with a message, 2:
+   decoded, 0: wrong. */
 static int refused(const unsigned char *bytes, size_t size) {
     unsigned char *copy = (unsigned char *)malloc(size + !size);
     int width, height, failed;
@@ -259,28 +269,34 @@ static int refused_with(const char *message) {
 
 /* Colours (x x + 3 y) & 63, 7 y & 63, 5 x y & 31, packed by zlib with dynamic codes. */
 static const unsigned char dynamic_png[] = {
-    137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 20, 0, 0, 0, 12, 8, 2, 0, 0, 0, 237, 110, 10, 172, 0,
-    0, 2, 5, 73, 68, 65, 84, 120, 218, 29, 202, 237, 118, 162, 48, 20, 133, 225, 195, 135, 57, 128, 36, 164, 192, 65, 192, 8,
-    163, 209, 177, 77, 107, 107, 106, 107, 177, 117, 38, 247, 127, 87, 195, 100, 255, 218, 235, 93, 15, 0, 64, 0, 16, 3, 164, 0,
-    18, 160, 3, 216, 3, 88, 248, 191, 7, 255, 111, 190, 63, 121, 179, 245, 125, 235, 255, 92, 32, 66, 136, 113, 129, 152, 229,
-    88, 84, 88, 43, 236, 142, 56, 124, 96, 20, 97, 82, 35, 63, 98, 121, 199, 85, 133, 234, 5, 3, 68, 182, 199, 101, 132, 114,
-    143, 132, 216, 191, 224, 8, 76, 0, 138, 44, 19, 117, 33, 134, 70, 36, 163, 40, 141, 80, 95, 130, 49, 33, 87, 162, 55, 34,
-    118, 66, 52, 162, 125, 19, 97, 38, 242, 163, 104, 102, 127, 244, 254, 77, 12, 144, 18, 100, 84, 112, 26, 74, 226, 29, 169,
-    29, 45, 79, 212, 127, 83, 154, 82, 219, 19, 158, 168, 9, 105, 209, 81, 253, 78, 17, 167, 210, 80, 144, 146, 52, 52, 114, 18,
-    239, 180, 129, 92, 1, 87, 181, 84, 9, 169, 121, 242, 160, 226, 179, 106, 255, 168, 124, 238, 27, 85, 159, 85, 178, 240, 253,
-    83, 197, 82, 181, 39, 223, 79, 222, 127, 42, 5, 133, 6, 169, 187, 74, 151, 173, 94, 142, 58, 126, 212, 155, 139, 110, 64,
-    23, 133, 78, 126, 233, 224, 162, 251, 68, 87, 163, 206, 39, 189, 168, 244, 112, 214, 171, 66, 203, 179, 78, 43, 29, 78, 122,
-    13, 165, 129, 202, 12, 141, 81, 107, 211, 239, 76, 251, 108, 154, 171, 169, 35, 83, 150, 70, 106, 35, 174, 38, 95, 154, 108,
-    103, 146, 31, 195, 26, 19, 95, 76, 56, 251, 139, 247, 63, 166, 7, 178, 208, 216, 168, 179, 108, 176, 233, 193, 230, 175,
-    182, 184, 217, 146, 89, 34, 219, 254, 182, 235, 155, 29, 132, 13, 14, 54, 254, 107, 177, 179, 217, 213, 114, 178, 242, 106,
-    171, 206, 54, 127, 109, 7, 237, 4, 221, 148, 168, 73, 110, 167, 246, 113, 2, 59, 37, 247, 73, 166, 83, 59, 247, 39, 255, 31,
-    124, 15, 188, 185, 249, 126, 243, 63, 152, 90, 88, 59, 80, 142, 143, 174, 223, 59, 124, 118, 245, 135, 11, 156, 19, 185, 91,
-    175, 93, 242, 226, 200, 185, 176, 118, 197, 179, 83, 177, 75, 71, 215, 220, 93, 180, 118, 242, 238, 54, 163, 203, 98, 183,
-    130, 129, 193, 200, 202, 29, 139, 143, 172, 121, 101, 201, 23, 235, 67, 150, 23, 108, 24, 152, 124, 99, 97, 200, 234, 21,
-    99, 175, 172, 69, 150, 237, 152, 114, 76, 204, 222, 121, 143, 172, 129, 45, 135, 29, 95, 29, 184, 48, 124, 97, 185, 250,
-    230, 213, 130, 103, 37, 15, 182, 188, 125, 231, 197, 130, 179, 158, 111, 44, 175, 51, 190, 60, 240, 48, 228, 221, 150, 203,
-    144, 227, 129, 15, 25, 167, 127, 145, 32, 66, 133, 78, 150, 100, 227, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130
-};
+    137, 80,  78,  71,  13,  10,  26,  10,  0,   0,   0,   13,  73,  72,  68,  82,  0,   0,   0,   20,  0,
+    0,   0,   12,  8,   2,   0,   0,   0,   237, 110, 10,  172, 0,   0,   2,   5,   73,  68,  65,  84,  120,
+    218, 29,  202, 237, 118, 162, 48,  20,  133, 225, 195, 135, 57,  128, 36,  164, 192, 65,  192, 8,   163,
+    209, 177, 77,  107, 107, 106, 107, 177, 117, 38,  247, 127, 87,  195, 100, 255, 218, 235, 93,  15,  0,
+    64,  0,   16,  3,   164, 0,   18,  160, 3,   216, 3,   88,  248, 191, 7,   255, 111, 190, 63,  121, 179,
+    245, 125, 235, 255, 92,  32,  66,  136, 113, 129, 152, 229, 88,  84,  88,  43,  236, 142, 56,  124, 96,
+    20,  97,  82,  35,  63,  98,  121, 199, 85,  133, 234, 5,   3,   68,  182, 199, 101, 132, 114, 143, 132,
+    216, 191, 224, 8,   76,  0,   138, 44,  19,  117, 33,  134, 70,  36,  163, 40,  141, 80,  95,  130, 49,
+    33,  87,  162, 55,  34,  118, 66,  52,  162, 125, 19,  97,  38,  242, 163, 104, 102, 127, 244, 254, 77,
+    12,  144, 18,  100, 84,  112, 26,  74,  226, 29,  169, 29,  45,  79,  212, 127, 83,  154, 82,  219, 19,
+    158, 168, 9,   105, 209, 81,  253, 78,  17,  167, 210, 80,  144, 146, 52,  52,  114, 18,  239, 180, 129,
+    92,  1,   87,  181, 84,  9,   169, 121, 242, 160, 226, 179, 106, 255, 168, 124, 238, 27,  85,  159, 85,
+    178, 240, 253, 83,  197, 82,  181, 39,  223, 79,  222, 127, 42,  5,   133, 6,   169, 187, 74,  151, 173,
+    94,  142, 58,  126, 212, 155, 139, 110, 64,  23,  133, 78,  126, 233, 224, 162, 251, 68,  87,  163, 206,
+    39,  189, 168, 244, 112, 214, 171, 66,  203, 179, 78,  43,  29,  78,  122, 13,  165, 129, 202, 12,  141,
+    81,  107, 211, 239, 76,  251, 108, 154, 171, 169, 35,  83,  150, 70,  106, 35,  174, 38,  95,  154, 108,
+    103, 146, 31,  195, 26,  19,  95,  76,  56,  251, 139, 247, 63,  166, 7,   178, 208, 216, 168, 179, 108,
+    176, 233, 193, 230, 175, 182, 184, 217, 146, 89,  34,  219, 254, 182, 235, 155, 29,  132, 13,  14,  54,
+    254, 107, 177, 179, 217, 213, 114, 178, 242, 106, 171, 206, 54,  127, 109, 7,   237, 4,   221, 148, 168,
+    73,  110, 167, 246, 113, 2,   59,  37,  247, 73,  166, 83,  59,  247, 39,  255, 31,  124, 15,  188, 185,
+    249, 126, 243, 63,  152, 90,  88,  59,  80,  142, 143, 174, 223, 59,  124, 118, 245, 135, 11,  156, 19,
+    185, 91,  175, 93,  242, 226, 200, 185, 176, 118, 197, 179, 83,  177, 75,  71,  215, 220, 93,  180, 118,
+    242, 238, 54,  163, 203, 98,  183, 130, 129, 193, 200, 202, 29,  139, 143, 172, 121, 101, 201, 23,  235,
+    67,  150, 23,  108, 24,  152, 124, 99,  97,  200, 234, 21,  99,  175, 172, 69,  150, 237, 152, 114, 76,
+    204, 222, 121, 143, 172, 129, 45,  135, 29,  95,  29,  184, 48,  124, 97,  185, 250, 230, 213, 130, 103,
+    37,  15,  182, 188, 125, 231, 197, 130, 179, 158, 111, 44,  175, 51,  190, 60,  240, 48,  228, 221, 150,
+    203, 144, 227, 129, 15,  25,  167, 127, 145, 32,  66,  133, 78,  150, 100, 227, 0,   0,   0,   0,   73,
+    69,  78,  68,  174, 66,  96,  130};
 
 static void check_dynamic(const unsigned char *bytes, size_t size) {
     int width, height, x, y, wrong = 0;
@@ -290,7 +306,8 @@ static void check_dynamic(const unsigned char *bytes, size_t size) {
     for (y = 0; y < height; y++) {
         for (x = 0; x < width; x++) {
             const unsigned char *p = (const unsigned char *)pixels + 4 * (y * width + x);
-            wrong |= p[0] != ((x * x + 3 * y) & 63) || p[1] != ((7 * y) & 63) || p[2] != ((5 * x * y) & 31) || p[3] != 255;
+            wrong |= p[0] != ((x * x + 3 * y) & 63) || p[1] != ((7 * y) & 63) || p[2] != ((5 * x * y) & 31) ||
+                     p[3] != 255;
         }
     }
     meter_free(pixels);
@@ -299,7 +316,8 @@ static void check_dynamic(const unsigned char *bytes, size_t size) {
 
 static void test_dynamic(void) { check_dynamic(dynamic_png, sizeof dynamic_png); }
 
-/* A chunk for every byte of the data and empty ones between, a text that would unpack to gigabytes, bytes after the end. */
+/* A chunk for every byte of the data and empty ones between, a text that would unpack to gigabytes, bytes
+   after the end. */
 static void test_splits(void) {
     static const unsigned char bomb[11] = {'a', 0, 0, 0x78, 0xDA, 0xEC, 0xC1, 1, 1, 0, 0};
     const size_t idat = 33, length = olat__be32(dynamic_png + idat);
@@ -423,7 +441,8 @@ static void test_chunks(void) {
     CHECK(refused_with("tRNS"));
     put_header(5, 5, 8, 6, 0), put_chunk("tRNS", data, 8);
     CHECK(refused_with("alpha"));
-    put_header(5, 5, 8, 0, 0), put_chunk("IDAT", data, 9), put_chunk("teXt", data, 1), put_chunk("IDAT", data, 9);
+    put_header(5, 5, 8, 0, 0), put_chunk("IDAT", data, 9), put_chunk("teXt", data, 1),
+        put_chunk("IDAT", data, 9);
     CHECK(refused_with("consecutive"));
     put_header(5, 5, 8, 0, 0), put_chunk("ABCD", data, 1);
     CHECK(refused_with("unknown critical"));
@@ -469,10 +488,11 @@ static int round_trip(int width, int height, int channels, int pattern) {
     }
     wrong = olat_write_png(FOLDER "/written.png", width, height, channels, pixels, error) ||
             olat_read_png(FOLDER "/written.png", &got_width, &got_height, &format, &got, error) ||
-                got_width != width || got_height != height;
+            got_width != width || got_height != height;
     for (i = 0; i < count && !wrong; i++) {
         const unsigned char *p = (const unsigned char *)got + 4 * i, *q = pixels + (size_t)channels * i;
-        for (c = 0; c < 4; c++) wrong |= p[c] != (c == 3 ? (channels == 4 ? q[3] : 255) : q[channels == 1 ? 0 : c]);
+        for (c = 0; c < 4; c++)
+            wrong |= p[c] != (c == 3 ? (channels == 4 ? q[3] : 255) : q[channels == 1 ? 0 : c]);
     }
     meter_free(got);
     free(pixels);
@@ -480,22 +500,29 @@ static int round_trip(int width, int height, int channels, int pattern) {
 }
 
 static void test_writer(void) {
-    static const int channels[3] = {1, 3, 4}, sizes[6][2] = {{1, 1}, {3, 2}, {17, 9}, {1, 300}, {256, 3}, {301, 199}};
+    static const int channels[3] = {1, 3, 4},
+                     sizes[6][2] = {{1, 1}, {3, 2}, {17, 9}, {1, 300}, {256, 3}, {301, 199}};
     static unsigned char flat[256 * 256 * 3];
     char name[128];
     int c, s, pattern;
     for (c = 0; c < 3; c++) {
         for (s = 0; s < 6; s++) {
-            for (pattern = 0; pattern < 4; pattern++) CHECK(round_trip(sizes[s][0], sizes[s][1], channels[c], pattern));
+            for (pattern = 0; pattern < 4; pattern++)
+                CHECK(round_trip(sizes[s][0], sizes[s][1], channels[c], pattern));
         }
     }
-    CHECK(!olat_write_png(FOLDER "/written.png", 256, 256, 3, flat, error) && file_bytes(FOLDER "/written.png") < 1500);
-    CHECK(olat_write_png(FOLDER "/none/written.png", 1, 1, 3, flat, error) && strstr(error, "none/written.png"));
-    CHECK(olat_write_png(FOLDER "/dir.png", 1, 1, 3, flat, error) && strstr(error, "dir.png")); /* a folder: rename fails */
+    CHECK(!olat_write_png(FOLDER "/written.png", 256, 256, 3, flat, error) &&
+          file_bytes(FOLDER "/written.png") < 1500);
+    CHECK(olat_write_png(FOLDER "/none/written.png", 1, 1, 3, flat, error) &&
+          strstr(error, "none/written.png"));
+    CHECK(olat_write_png(FOLDER "/dir.png", 1, 1, 3, flat, error) &&
+          strstr(error, "dir.png")); /* a folder: rename fails */
     snprintf(name, sizeof name, FOLDER "/dir.png.tmp.%ld.0", (long)getpid());
     CHECK(file_bytes(name) < 0);
-    CHECK(olat_write_png(FOLDER "/x.png", 0, 1, 3, flat, error) && olat_write_png(FOLDER "/x.png", 1, 40000, 3, flat, error));
-    CHECK(olat_write_png(FOLDER "/x.png", 1, 1, 2, flat, error) && olat_write_png(FOLDER "/x.png", 32768, 32768, 4, flat, error));
+    CHECK(olat_write_png(FOLDER "/x.png", 0, 1, 3, flat, error) &&
+          olat_write_png(FOLDER "/x.png", 1, 40000, 3, flat, error));
+    CHECK(olat_write_png(FOLDER "/x.png", 1, 1, 2, flat, error) &&
+          olat_write_png(FOLDER "/x.png", 32768, 32768, 4, flat, error));
     CHECK(file_bytes(FOLDER "/x.png") < 0 && live == 0);
 }
 
@@ -535,26 +562,83 @@ static int refuses(const char *text, const char *message) {
 }
 
 static void test_json(void) {
-    static const char *const good[] = {
-        "{}", " [ ] ", "0", "-0", "null", "true", "false", "\"\"", "[1,2,[3,{\"a\":[]}]]", "-1.5e+10", "1E-2", "1e-400",
-        "123456789012345678901234567890", "[1]\r\n\t ", "{\"a\":1,\"b\":{\"a\":2},\"\":3}", "{\"a\":1,\"b\":2,\"a\":3}",
-        "\"\\u00e9\\ud83d\\ude00\\n\\/\"", "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"",
-        "\"\\u0000\"", "\xEF\xBB\xBF{}", "\"\x7f\""};
-    static const char *const bad[][2] = {
-        {"", "ends early"}, {"[", "ends early"}, {"[1", "ends early"}, {"[1,", "ends early"}, {"{", "key was expected"},
-        {"[1,]", "value was expected"}, {"[,1]", "value was expected"}, {"{\"a\":1,}", "key was expected"},
-        {"{\"a\" 1}", "':'"}, {"{\"a\":}", "value was"}, {"{a:1}", "key was"}, {"[1 2]", "comma"}, {"[1}", "comma"},
-        {"{\"a\":1]", "comma"}, {"]", "value was"}, {"1 2", "text after"}, {"[]]", "text after"}, {"01", "value was"},
-        {"-", "value was"}, {"+1", "value was"}, {".5", "value was"}, {"1.", "value was"}, {"1.e3", "value was"},
-        {"1e", "value was"}, {"1e+", "value was"}, {"1.2.3", "value was"}, {"0x10", "text after"}, {"tru", "value was"},
-        {"nul", "value was"}, {"truee", "text after"}, {"'a'", "value was"}, {"NaN", "not finite"},
-        {"[1, -Infinity]", "not finite"}, {"Infinity", "not finite"}, {"nan", "not finite"}, {"1e309", "too large"},
-        {"-1e999999999999999", "too large"}, {"\"", "inside a string"}, {"\"a\n\"", "control"}, {"\"\\x\"", "escape"},
-        {"\"\\u12g4\"", "escape"}, {"\"\\ud800\"", "escape"}, {"\"\\ud800\\u0041\"", "escape"}, {"\"\\udc00\"", "escape"},
-        {"\"\\", "escape"}, {"\"\\u12", "escape"}, {"\"\xff\"", "UTF-8"}, {"\"\xc0\x80\"", "UTF-8"},
-        {"\"\xed\xa0\x80\"", "UTF-8"}, {"\"\xf4\x90\x80\x80\"", "UTF-8"}, {"\"\xe2\x82\"", "UTF-8"},
-        {"\"\xe0\x80\x80\"", "UTF-8"}, {"\xff\xfe{", "the file is UTF-16: save it as UTF-8"}, {"\xfe\xff", "UTF-16"},
-        {"{\"x\":[0,\n{\"y\":NaN}]}", "line 2: x[1].y: NaN"}, {"[1,\n2\n,}", "line 3"}};
+    static const char *const good[] = {"{}",
+                                       " [ ] ",
+                                       "0",
+                                       "-0",
+                                       "null",
+                                       "true",
+                                       "false",
+                                       "\"\"",
+                                       "[1,2,[3,{\"a\":[]}]]",
+                                       "-1.5e+10",
+                                       "1E-2",
+                                       "1e-400",
+                                       "123456789012345678901234567890",
+                                       "[1]\r\n\t ",
+                                       "{\"a\":1,\"b\":{\"a\":2},\"\":3}",
+                                       "{\"a\":1,\"b\":2,\"a\":3}",
+                                       "\"\\u00e9\\ud83d\\ude00\\n\\/\"",
+                                       "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"",
+                                       "\"\\u0000\"",
+                                       "\xEF\xBB\xBF{}",
+                                       "\"\x7f\""};
+    static const char *const bad[][2] = {{"", "ends early"},
+                                         {"[", "ends early"},
+                                         {"[1", "ends early"},
+                                         {"[1,", "ends early"},
+                                         {"{", "key was expected"},
+                                         {"[1,]", "value was expected"},
+                                         {"[,1]", "value was expected"},
+                                         {"{\"a\":1,}", "key was expected"},
+                                         {"{\"a\" 1}", "':'"},
+                                         {"{\"a\":}", "value was"},
+                                         {"{a:1}", "key was"},
+                                         {"[1 2]", "comma"},
+                                         {"[1}", "comma"},
+                                         {"{\"a\":1]", "comma"},
+                                         {"]", "value was"},
+                                         {"1 2", "text after"},
+                                         {"[]]", "text after"},
+                                         {"01", "value was"},
+                                         {"-", "value was"},
+                                         {"+1", "value was"},
+                                         {".5", "value was"},
+                                         {"1.", "value was"},
+                                         {"1.e3", "value was"},
+                                         {"1e", "value was"},
+                                         {"1e+", "value was"},
+                                         {"1.2.3", "value was"},
+                                         {"0x10", "text after"},
+                                         {"tru", "value was"},
+                                         {"nul", "value was"},
+                                         {"truee", "text after"},
+                                         {"'a'", "value was"},
+                                         {"NaN", "not finite"},
+                                         {"[1, -Infinity]", "not finite"},
+                                         {"Infinity", "not finite"},
+                                         {"nan", "not finite"},
+                                         {"1e309", "too large"},
+                                         {"-1e999999999999999", "too large"},
+                                         {"\"", "inside a string"},
+                                         {"\"a\n\"", "control"},
+                                         {"\"\\x\"", "escape"},
+                                         {"\"\\u12g4\"", "escape"},
+                                         {"\"\\ud800\"", "escape"},
+                                         {"\"\\ud800\\u0041\"", "escape"},
+                                         {"\"\\udc00\"", "escape"},
+                                         {"\"\\", "escape"},
+                                         {"\"\\u12", "escape"},
+                                         {"\"\xff\"", "UTF-8"},
+                                         {"\"\xc0\x80\"", "UTF-8"},
+                                         {"\"\xed\xa0\x80\"", "UTF-8"},
+                                         {"\"\xf4\x90\x80\x80\"", "UTF-8"},
+                                         {"\"\xe2\x82\"", "UTF-8"},
+                                         {"\"\xe0\x80\x80\"", "UTF-8"},
+                                         {"\xff\xfe{", "the file is UTF-16: save it as UTF-8"},
+                                         {"\xfe\xff", "UTF-16"},
+                                         {"{\"x\":[0,\n{\"y\":NaN}]}", "line 2: x[1].y: NaN"},
+                                         {"[1,\n2\n,}", "line 3"}};
     static const char text[] = "{\"frames\": [ {\"name\": \"\\u00e9\\\"x\", \"m\": [[1, -2.5e-3],"
                                " [true, null]]},\n {} ], \"w\": 12}";
     static char deep[200], buffer[sizeof text];
@@ -624,8 +708,9 @@ static int has_value(const char *text, const char *want) {
 /* UTF-8 by its definition: how many bytes, and what leads them. */
 static size_t put_utf8(char *out, unsigned long code) {
     if (code < 0x80) return out[0] = (char)code, 1;
-    out[0] = (char)(unsigned char)(code < 0x800 ? 192 + code / 64 : code < 0x10000 ? 224 + code / 4096 :
-        240 + code / 262144);
+    out[0] = (char)(unsigned char)(code < 0x800     ? 192 + code / 64
+                                   : code < 0x10000 ? 224 + code / 4096
+                                                    : 240 + code / 262144);
     if (code < 0x800) return out[1] = (char)(unsigned char)(128 + code % 64), 2;
     out[1] = (char)(unsigned char)(128 + code / (code < 0x10000 ? 64 : 4096) % 64);
     out[2] = (char)(unsigned char)(128 + code / (code < 0x10000 ? 1 : 64) % 64);
@@ -636,14 +721,24 @@ static size_t put_utf8(char *out, unsigned long code) {
 /* Every code point as escapes, 4096 a string; every half of a pair by itself. */
 static void test_strings(void) {
     static const char *const values[][2] = {
-        {"\"\\u00e9\"", "<c3><a9>"}, {"\"\\uD83D\\uDE00\"", "<f0><9f><98><80>"}, {"\"\\u20AC\"", "<e2><82><ac>"},
-        {"\"\\u0000\"", "<00>"}, {"\"\\\"\\\\\\/\\b\\f\\n\\r\\t\"", "\"\\/<08><0c><0a><0d><09>"},
-        {"\"\\u0022\\u005C\"", "\"\\"}, {"\"\x7f\xc3\xa9\"", "<7f><c3><a9>"}, {"\"a\\u0062c\"", "abc"},
-        {"\"\\\\u00e9\"", "\\u00e9"}, {"\"\\uffff\\uDBFF\\udfff\"", "<ef><bf><bf><f4><8f><bf><bf>"},
-        {"\"\"", ""}, {"[ ]", "[]"}, {"{ }", "{}"}, {"[null, true,false]", "[null,true,false]"},
+        {"\"\\u00e9\"", "<c3><a9>"},
+        {"\"\\uD83D\\uDE00\"", "<f0><9f><98><80>"},
+        {"\"\\u20AC\"", "<e2><82><ac>"},
+        {"\"\\u0000\"", "<00>"},
+        {"\"\\\"\\\\\\/\\b\\f\\n\\r\\t\"", "\"\\/<08><0c><0a><0d><09>"},
+        {"\"\\u0022\\u005C\"", "\"\\"},
+        {"\"\x7f\xc3\xa9\"", "<7f><c3><a9>"},
+        {"\"a\\u0062c\"", "abc"},
+        {"\"\\\\u00e9\"", "\\u00e9"},
+        {"\"\\uffff\\uDBFF\\udfff\"", "<ef><bf><bf><f4><8f><bf><bf>"},
+        {"\"\"", ""},
+        {"[ ]", "[]"},
+        {"{ }", "{}"},
+        {"[null, true,false]", "[null,true,false]"},
         {"[-0, 1, 0.5, -2.5e-3, 1E2, 123456789]", "[-0,1,0.5,-0.0025000000000000001,100,123456789]"},
         {"{\"a\": [1, {\"b\": [[], \"x\"]}], \"\": {\"c\": 2}}", "{a=[1,{b=[[],x]}],={c=2}}"},
-        {"{\"\\u00e9\":\"\\u00e9\"}", "{\xc3\xa9=<c3><a9>}"}, {"\xEF\xBB\xBF[1]", "[1]"}};
+        {"{\"\\u00e9\":\"\\u00e9\"}", "{\xc3\xa9=<c3><a9>}"},
+        {"\xEF\xBB\xBF[1]", "[1]"}};
     static char text[4096 * 12 + 3], want[4096 * 4 + 1];
     unsigned long code, first;
     size_t i, used, size;
@@ -653,14 +748,16 @@ static void test_strings(void) {
         for (first = 0; first < 0x110000; first += 4096) {
             for (code = first, used = 1, size = 0, text[0] = '"'; code < first + 4096; code++) {
                 if (code >= 0xD800 && code < 0xE000) continue;
-                if (code < 0x10000) used += (size_t)sprintf(text + used, letters ? "\\u%04lX" : "\\u%04lx", code);
-                else used += (size_t)sprintf(text + used, letters ? "\\u%04lX\\u%04lX" : "\\u%04lx\\u%04lx",
-                                             0xD7C0 + code / 1024, 0xDC00 + code % 1024);
+                if (code < 0x10000)
+                    used += (size_t)sprintf(text + used, letters ? "\\u%04lX" : "\\u%04lx", code);
+                else
+                    used += (size_t)sprintf(text + used, letters ? "\\u%04lX\\u%04lX" : "\\u%04lx\\u%04lx",
+                                            0xD7C0 + code / 1024, 0xDC00 + code % 1024);
                 size += put_utf8(want + size, code);
             }
             text[used++] = '"';
             wrong += !parse_open(text, used) || json.nodes->text_length != size ||
-                memcmp(json.nodes->text, want, size) != 0;
+                     memcmp(json.nodes->text, want, size) != 0;
             parse_close();
         }
         for (code = 0xD800; code < 0xE000; code++) {
@@ -687,7 +784,8 @@ static void test_write_string(void) {
     for (i = 1; i < 128; i++) text[i - 1] = (char)i;
     strcpy(text + 127, "\xc3\xa9\xf0\x9f\x98\x80");
     olat__write_string(&w, text);
-    CHECK(parse_open(w.text, w.size) && json.nodes->text_length == strlen(text) && !strcmp(json.nodes->text, text));
+    CHECK(parse_open(w.text, w.size) && json.nodes->text_length == strlen(text) &&
+          !strcmp(json.nodes->text, text));
     parse_close();
     w.size = 0;
     olat__write_string(&w, "a\"\\\n\x1f/");
@@ -715,11 +813,14 @@ static void test_numbers(void) {
     static char text[3000];
     int i, k, n;
     CHECK(same_number("0", 0.0) && same_number("0.000", 0.0) && same_number("0e999999999999999999", 0.0));
-    CHECK(same_number("9007199254740993", 9007199254740992.0) && same_number("9007199254740995", 9007199254740996.0));
-    CHECK(same_number("0.1", 0.1) && same_number("1e23", 1e23) && same_number("8.5e-3", 8.5e-3) && same_number("-12.5", -12.5));
+    CHECK(same_number("9007199254740993", 9007199254740992.0) &&
+          same_number("9007199254740995", 9007199254740996.0));
+    CHECK(same_number("0.1", 0.1) && same_number("1e23", 1e23) && same_number("8.5e-3", 8.5e-3) &&
+          same_number("-12.5", -12.5));
     CHECK(same_number("1.7976931348623158e308", 1.7976931348623157e308) &&
-        same_number("4.9406564584124654e-324", of_bits(1)));
-    CHECK(same_number("2.2250738585072011e-308", of_bits(UINT64_C(0xFFFFFFFFFFFFF))) && same_number("2.47e-324", 0.0));
+          same_number("4.9406564584124654e-324", of_bits(1)));
+    CHECK(same_number("2.2250738585072011e-308", of_bits(UINT64_C(0xFFFFFFFFFFFFF))) &&
+          same_number("2.47e-324", 0.0));
     memset(text, '0', sizeof text); /* 2^53 + 1 is a tie, and a digit far beyond decides it */
     memcpy(text, "9007199254740993.", 17);
     strcpy(text + 2900, "1");
@@ -734,7 +835,8 @@ static void test_numbers(void) {
         n = 0;
         if (random_bits() & 1) text[n++] = '-';
         text[n++] = (char)('1' + random_bits() % 9);
-        for (k = (int)(random_bits() % (i % 10 ? 20 : 900)); k > 0; k--) text[n++] = (char)('0' + random_bits() % 10);
+        for (k = (int)(random_bits() % (i % 10 ? 20 : 900)); k > 0; k--)
+            text[n++] = (char)('0' + random_bits() % 10);
         if (random_bits() & 3) {
             text[n++] = '.';
             for (k = 1 + (int)(random_bits() % 20); k > 0; k--) text[n++] = (char)('0' + random_bits() % 10);
@@ -775,7 +877,8 @@ static int load_fails(const char *text, int flags, const char *message) {
     int good;
     write_text(FOLDER "/set.json", text);
     memset(error, 0, sizeof error);
-    good = olat_load(FOLDER, "set.json", flags, &set, error) && !set.frames && !set.count && live == 0 && strstr(error, message);
+    good = olat_load(FOLDER, "set.json", flags, &set, error) && !set.frames && !set.count && live == 0 &&
+           strstr(error, message);
     if (!good) printf("%s\n    wanted \"%s\", got \"%s\"\n", text, message, error);
     if (live) olat_free(&set);
     return good;
@@ -788,21 +891,38 @@ static int near_all(const ssdgs_real *got, const double *want, int count) {
 }
 
 static void test_datasets(void) {
-    static const double view[12] = {1, 0, 0, -0.5, 0, -1, 0, 0, 0, 0, -1, 4}, light[3] = {1, 2, 3}, rgb[3] = {2, 3, 4},
-        one[3] = {7, 7, 7};
+    static const double view[12] = {1, 0, 0, -0.5, 0, -1, 0, 0, 0, 0, -1, 4}, light[3] = {1, 2, 3},
+                        rgb[3] = {2, 3, 4}, one[3] = {7, 7, 7};
     static const double turned[12] = {0, -1, 0, 2, 0, 0, -1, 3, 1, 0, 0, -1}, dir[3] = {0, 0.6, 0.8};
-    static const char *const bad_paths[][2] = {
-        {"../a", "'..'"}, {"b/../../a", "'..'"}, {"..\\\\a", "'..'"}, {"/etc/a", "not relative"},
-        {"\\\\\\\\host\\\\a", "not relative"}, {"C:/a", "not relative"}, {"", "empty"}, {"b//a", "empty name"},
-        {"b/", "empty name"}, {"a\\u0000", "control"}, {"a\\u001b[2J", "control"}, {"NUL", "device"}, {"b/com1.png", "device"},
-        {"a.", "dot or a space"}, {"b /a", "dot or a space"}, {"missing", "missing.png: cannot be opened"},
-        {"dir", "not a regular file"}, {"fifo", "not a regular file"}, {"broken", "broken.png: byte 0"}};
+    static const char *const bad_paths[][2] = {{"../a", "'..'"},
+                                               {"b/../../a", "'..'"},
+                                               {"..\\\\a", "'..'"},
+                                               {"/etc/a", "not relative"},
+                                               {"\\\\\\\\host\\\\a", "not relative"},
+                                               {"C:/a", "not relative"},
+                                               {"", "empty"},
+                                               {"b//a", "empty name"},
+                                               {"b/", "empty name"},
+                                               {"a\\u0000", "control"},
+                                               {"a\\u001b[2J", "control"},
+                                               {"NUL", "device"},
+                                               {"b/com1.png", "device"},
+                                               {"a.", "dot or a space"},
+                                               {"b /a", "dot or a space"},
+                                               {"missing", "missing.png: cannot be opened"},
+                                               {"dir", "not a regular file"},
+                                               {"fifo", "not a regular file"},
+                                               {"broken", "broken.png: byte 0"}};
     static const char *const bad[][2] = {
-        {"[]", "frames is missing"}, {"{}", "frames is missing"}, {"{\"frames\":{}}", "frames: an array"},
-        {"{\"frames\":[]}", "frames"}, {TOP "1]}", "line 2: frames[0]: an object"},
+        {"[]", "frames is missing"},
+        {"{}", "frames is missing"},
+        {"{\"frames\":{}}", "frames: an array"},
+        {"{\"frames\":[]}", "frames"},
+        {TOP "1]}", "line 2: frames[0]: an object"},
         {"{\"frames\":[" FRAME "]}", "camera_angle_x, camera_intrinsics or fl_x is missing"},
         {TOP FRAME ",\n{" LIGHT POSE "}]}", "line 3: frames[1]: file_path or img_path is missing"},
-        {"{\"camera_angle_x\":1,\"w\":60,\"h\":60,\"frames\":[" FRAME "]}", "the image has 6 x 4 pixels, not w x h"},
+        {"{\"camera_angle_x\":1,\"w\":60,\"h\":60,\"frames\":[" FRAME "]}",
+         "the image has 6 x 4 pixels, not w x h"},
         {TOP "{" FILE_A POSE "}]}", "pl_pos or pl_dir is missing"},
         {TOP "{" FILE_A LIGHT "\"a\":0}]}", "transform_matrix or R_opt is missing"},
         {TOP "{" FILE_A LIGHT "\"pl_dir\":[0,0,1]," POSE "}]}", "both"},
@@ -817,7 +937,8 @@ static void test_datasets(void) {
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[1,2,3]}]}", "3 x 4"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[]}]}", "3 x 4"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":7}]}", "3 x 4"},
-        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0],[0,0,1,0]]}]}", "transform_matrix[1]: 4 numbers"},
+        {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0],[0,0,1,0]]}]}",
+         "transform_matrix[1]: 4 numbers"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,2]]}]}", "0 0 0 1"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0,0,0],[0,-1,0,0],[0,0,1,4]]}]}", "mirrors"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[[1,0.01,0,0],[0,1,0,0],[0,0,1,4]]}]}", "not a rotation"},
@@ -837,7 +958,8 @@ static void test_datasets(void) {
         {"{\"camera_angle_y\":3.15,\"frames\":[" FRAME "]}", "camera_angle_y is not between"},
         {"{\"camera_angle_x\":null,\"frames\":[" FRAME "]}", "camera_angle_x: a number"},
         {"{\"fl_x\":3,\"cx\":1,\"frames\":[" FRAME "]}", "cx and cy"},
-        {"{\"fl_x\":3,\"w\":7,\"frames\":[" FRAME "]}", "6 x 4 pixels"}, {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
+        {"{\"fl_x\":3,\"w\":7,\"frames\":[" FRAME "]}", "6 x 4 pixels"},
+        {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
         {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
     unsigned char pixels[6 * 4 * 3];
     char text[1200];
@@ -845,55 +967,64 @@ static void test_datasets(void) {
     ssdgs_photo *photos;
     for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
     mkdir(FOLDER "/b", 0777);
-    CHECK(!olat_write_png(FOLDER "/a.png", 6, 4, 3, pixels, error) && !olat_write_png(FOLDER "/b/c.png", 3, 2, 1, pixels, error));
+    CHECK(!olat_write_png(FOLDER "/a.png", 6, 4, 3, pixels, error) &&
+          !olat_write_png(FOLDER "/b/c.png", 3, 2, 1, pixels, error));
     write_text(FOLDER "/broken.png", "this is no image");
     remove(FOLDER "/fifo.png");
     CHECK(mkfifo(FOLDER "/fifo.png", 0666) == 0);
 
-    if (CHECK(loads("{\"camera_angle_x\":1.0,\"w\":99,\"frames\":[{" FILE_A LIGHT POSE ",\"pl_intensity\":[2,3,4]},"
-              "{\"img_path\":\"b\\\\c.png\",\"pl_dir\":[0,0.6,0.8],"
-              "\"pl_intensity\":7,\"R_opt\":[[0,0,1],[-1,0,0],[0,-1,0]],\"T_opt\":[2,3,-1]}]}", 0))) {
+    if (CHECK(loads("{\"camera_angle_x\":1.0,\"w\":99,\"frames\":[{" FILE_A LIGHT POSE
+                    ",\"pl_intensity\":[2,3,4]},"
+                    "{\"img_path\":\"b\\\\c.png\",\"pl_dir\":[0,0.6,0.8],"
+                    "\"pl_intensity\":7,\"R_opt\":[[0,0,1],[-1,0,0],[0,-1,0]],\"T_opt\":[2,3,-1]}]}",
+                    0))) {
         const olat_frame *a = set.frames, *b = set.frames + 1;
-        CHECK(set.count == 2 && a->has_image && a->camera.width == 6 && a->camera.height == 4 && a->format == SSDGS_PIXELS_RGBA8);
-        CHECK(!strcmp(a->file, FOLDER "/./a.png") && !strcmp(b->file, FOLDER "/b/c.png") && ((unsigned char *)a->pixels)[5] == 4);
+        CHECK(set.count == 2 && a->has_image && a->camera.width == 6 && a->camera.height == 4 &&
+              a->format == SSDGS_PIXELS_RGBA8);
+        CHECK(!strcmp(a->file, FOLDER "/./a.png") && !strcmp(b->file, FOLDER "/b/c.png") &&
+              ((unsigned char *)a->pixels)[5] == 4);
         CHECK(fabs((double)a->camera.fx - 3 / tan(0.5)) < 1e-5 &&
-            fabs((double)a->camera.fy - 3 / tan(0.5)) < 1e-5 && near_all(&a->camera.cx, light + 2, 1));
+              fabs((double)a->camera.fy - 3 / tan(0.5)) < 1e-5 && near_all(&a->camera.cx, light + 2, 1));
         CHECK(near_all(a->camera.view, view, 12) && near_all(a->light.position, light, 3) &&
-            near_all(a->light.intensity, rgb, 3) && a->light.kind == SSDGS_LIGHT_POINT);
+              near_all(a->light.intensity, rgb, 3) && a->light.kind == SSDGS_LIGHT_POINT);
         CHECK(near_all(b->camera.view, turned, 12) && near_all(b->light.position, dir, 3) &&
-            near_all(b->light.intensity, one, 3) && b->light.kind == SSDGS_LIGHT_DIRECTIONAL);
+              near_all(b->light.intensity, one, 3) && b->light.kind == SSDGS_LIGHT_DIRECTIONAL);
         photos = olat_photos(&set);
         CHECK(photos && photos[1].pixels == b->pixels && photos[1].camera.width == 3 &&
-            photos[0].light.intensity[0] == a->light.intensity[0]);
+              photos[0].light.intensity[0] == a->light.intensity[0]);
         meter_free(photos);
     }
     olat_free(&set);
-    if (CHECK(loads("{\"camera_angle_x\":1,\"w\":599,\"h\":400,\"frames\":[" FRAME "]}", 0))) CHECK(set.frames->camera.width == 6);
+    if (CHECK(loads("{\"camera_angle_x\":1,\"w\":599,\"h\":400,\"frames\":[" FRAME "]}", 0)))
+        CHECK(set.frames->camera.width == 6);
     olat_free(&set);
-    if (CHECK(loads("{\"fl_x\":10,\"fl_y\":11,\"cx\":2,\"cy\":1,\"w\":6,\"h\":4,\"k1\":0,\"frames\":["
-              "{\"file_path\":\"a.PNG\",\"camera_intrinsics\":[4,5,6,7]," LIGHT POSE "},{" LIGHT POSE "},"
-              "{\"camera_angle_x\":1,\"w\":8," LIGHT "\"transform_matrix\":[[2,0,0,0.5],[0,2,0,0],[0,0,2,4]]},"
-              "{" LIGHT "\"transform_matrix\":[[1,0,0],[0,1,0],[0,0,1]]}]}", OLAT_NO_IMAGES))) {
+    if (CHECK(loads(
+            "{\"fl_x\":10,\"fl_y\":11,\"cx\":2,\"cy\":1,\"w\":6,\"h\":4,\"k1\":0,\"frames\":["
+            "{\"file_path\":\"a.PNG\",\"camera_intrinsics\":[4,5,6,7]," LIGHT POSE "},{" LIGHT POSE "},"
+            "{\"camera_angle_x\":1,\"w\":8," LIGHT "\"transform_matrix\":[[2,0,0,0.5],[0,2,0,0],[0,0,2,4]]},"
+            "{" LIGHT "\"transform_matrix\":[[1,0,0],[0,1,0],[0,0,1]]}]}",
+            OLAT_NO_IMAGES))) {
         const olat_frame *f = set.frames;
         const double own[4] = {6, 7, 4, 5}, shared[4] = {10, 11, 2, 1}, focal = 4 / tan(0.5);
-        CHECK(set.count == 4 && !f[0].pixels && !f[0].has_image &&
-            !strcmp(f[0].file, FOLDER "/a.PNG") && !f[1].file && f[1].camera.width == 6 && f[1].camera.height == 4);
+        CHECK(set.count == 4 && !f[0].pixels && !f[0].has_image && !strcmp(f[0].file, FOLDER "/a.PNG") &&
+              !f[1].file && f[1].camera.width == 6 && f[1].camera.height == 4);
         CHECK(near_all(&f[0].camera.fx, own, 4) && near_all(&f[1].camera.fx, shared, 4) &&
-            near_all(&f[2].camera.fx, &focal, 1) && near_all(f[2].camera.view, view, 12));
+              near_all(&f[2].camera.fx, &focal, 1) && near_all(f[2].camera.view, view, 12));
         CHECK(near_all(f[3].camera.view, view, 3) && fabs((double)f[3].camera.view[11]) < 1e-6);
     }
     olat_free(&set);
-    CHECK(loads(TOP "{" LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
-        set.frames[0].camera.width == 256 && set.frames[0].camera.height == 256);
+    CHECK(loads(TOP "{" LIGHT POSE "}]}", OLAT_NO_IMAGES) && set.frames[0].camera.width == 256 &&
+          set.frames[0].camera.height == 256);
     olat_free(&set);
     CHECK(loads(TOP "{" LIGHT POSE ",\"camera_intrinsics\":[40,29.5,50,50]}]}", OLAT_NO_IMAGES) &&
-        set.frames[0].camera.width == 80 && set.frames[0].camera.height == 59); /* twice the middle */
+          set.frames[0].camera.width == 80 && set.frames[0].camera.height == 59); /* twice the middle */
     olat_free(&set);
-    CHECK(loads(TOP "{" LIGHT POSE ",\"w\":70,\"h\":50,\"camera_intrinsics\":[40,29.5,50,50]}]}", OLAT_NO_IMAGES) &&
-        set.frames[0].camera.width == 70 && set.frames[0].camera.height == 50);
+    CHECK(loads(TOP "{" LIGHT POSE ",\"w\":70,\"h\":50,\"camera_intrinsics\":[40,29.5,50,50]}]}",
+                OLAT_NO_IMAGES) &&
+          set.frames[0].camera.width == 70 && set.frames[0].camera.height == 50);
     olat_free(&set);
     CHECK(loads(TOP "{\"pl_pos\":[4,5,6]," FILE_A LIGHT POSE "}]}", 0) &&
-        near_all(set.frames->light.position, light, 3));
+          near_all(set.frames->light.position, light, 3));
     olat_free(&set); /* of two such keys the last one */
     CHECK(loads(TOP "{\"file_path\":\"../t_olat_files/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
     olat_free(&set);
@@ -916,8 +1047,9 @@ static int lens_is(const char *top, const char *frame, double fx, double fy) {
     int good;
     snprintf(text, sizeof text, "{%s\"w\":60,\"h\":40,\"frames\":[{%s" LIGHT POSE "}]}", top, frame);
     good = loads(text, OLAT_NO_IMAGES) && near_all(&set.frames->camera.fx, want, 2);
-    if (!good) printf("%s %s: %g %g\n", top, frame, set.count ? (double)set.frames->camera.fx : 0,
-                      set.count ? (double)set.frames->camera.fy : 0);
+    if (!good)
+        printf("%s %s: %g %g\n", top, frame, set.count ? (double)set.frames->camera.fx : 0,
+               set.count ? (double)set.frames->camera.fy : 0);
     olat_free(&set);
     return good;
 }
@@ -942,46 +1074,80 @@ static int lens_loads(const char *key, const char *value) {
 }
 
 static void test_lenses(void) {
-    static const char *const models[][2] = { /* 1: a pinhole's, when no coefficient says otherwise */
-        {"\"PINHOLE\"", "1"}, {"\"pinhole\"", "1"}, {"\"Simple_Pinhole\"", "1"}, {"\"perspective\"", "1"},
-        {"\"OPENCV\"", "1"},
-        {"\"FULL_OPENCV\"", "1"}, {"\"SIMPLE_RADIAL\"", "1"}, {"\"RADIAL\"", "1"}, {"null", "1"}, {"\"\"", "1"},
-        {"\"OPENCV_FISHEYE\"", "OPENCV_FISHEYE: distorted"}, {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: distorted"},
-        {"\"equirectangular\"", "equirectangular: distorted"},
-        {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
-        {"\"SPHERICAL\"", "SPHERICAL: distorted"}, {"\"pinhol\"", "pinhol: distorted"},
-        {"\"pinholes\"", "pinholes: distorted"},
-        {"7", "distorted"}, {"true", "true: distorted"}, {"{\"type\":\"a\"}", "distorted"}};
-    static const char *const values[][2] = {
-        {"0", "1"}, {"-0.0", "1"}, {"null", "1"}, {"false", "1"}, {"[]", "1"}, {"[0,0.0,[false,null]]", "1"},
-        {"{\"a\":0}", "1"},
-        {"1e-9", "distorted"}, {"-0.1", "distorted"}, {"true", "true: distorted"}, {"[0,0,0,1e-300]", "distorted"},
-        {"{\"a\":[0,-1]}", "distorted"}, {"\"0.1\"", "0.1: distorted"},
-        {"\"opencv\"", "opencv: distorted"}};
-    static const char *const others[] = {"is_fisheye", "b1", "b2", "skew", "ftheta_p0", "ftheta_p1", "ftheta_p2",
-        "ftheta_p3",
-        "ftheta_p4", "distortion", "distortion_params", "distortion_coefficients", "rolling_shutter"};
+    static const char *const models[][2] = {/* 1: a pinhole's, when no coefficient says otherwise */
+                                            {"\"PINHOLE\"", "1"},
+                                            {"\"pinhole\"", "1"},
+                                            {"\"Simple_Pinhole\"", "1"},
+                                            {"\"perspective\"", "1"},
+                                            {"\"OPENCV\"", "1"},
+                                            {"\"FULL_OPENCV\"", "1"},
+                                            {"\"SIMPLE_RADIAL\"", "1"},
+                                            {"\"RADIAL\"", "1"},
+                                            {"null", "1"},
+                                            {"\"\"", "1"},
+                                            {"\"OPENCV_FISHEYE\"", "OPENCV_FISHEYE: distorted"},
+                                            {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: distorted"},
+                                            {"\"equirectangular\"", "equirectangular: distorted"},
+                                            {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
+                                            {"\"SPHERICAL\"", "SPHERICAL: distorted"},
+                                            {"\"pinhol\"", "pinhol: distorted"},
+                                            {"\"pinholes\"", "pinholes: distorted"},
+                                            {"7", "distorted"},
+                                            {"true", "true: distorted"},
+                                            {"{\"type\":\"a\"}", "distorted"}};
+    static const char *const values[][2] = {{"0", "1"},
+                                            {"-0.0", "1"},
+                                            {"null", "1"},
+                                            {"false", "1"},
+                                            {"[]", "1"},
+                                            {"[0,0.0,[false,null]]", "1"},
+                                            {"{\"a\":0}", "1"},
+                                            {"1e-9", "distorted"},
+                                            {"-0.1", "distorted"},
+                                            {"true", "true: distorted"},
+                                            {"[0,0,0,1e-300]", "distorted"},
+                                            {"{\"a\":[0,-1]}", "distorted"},
+                                            {"\"0.1\"", "0.1: distorted"},
+                                            {"\"opencv\"", "opencv: distorted"}};
+    static const char *const others[] = {"is_fisheye",
+                                         "b1",
+                                         "b2",
+                                         "skew",
+                                         "ftheta_p0",
+                                         "ftheta_p1",
+                                         "ftheta_p2",
+                                         "ftheta_p3",
+                                         "ftheta_p4",
+                                         "distortion",
+                                         "distortion_params",
+                                         "distortion_coefficients",
+                                         "rolling_shutter"};
     const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
     char key[8];
     size_t i, k;
-    CHECK(lens_is("\"camera_angle_x\":1,", "", of_x, of_x) && lens_is("\"camera_angle_y\":0.8,", "", of_y, of_y));
+    CHECK(lens_is("\"camera_angle_x\":1,", "", of_x, of_x) &&
+          lens_is("\"camera_angle_y\":0.8,", "", of_y, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "", of_x, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"fl_y\":50,", "", of_x, 50));
     CHECK(lens_is("\"fl_y\":51,\"camera_angle_y\":0.8,\"fl_x\":50,", "", 50, 51) &&
-        lens_is("\"fl_x\":50,", "", 50, 50));
+          lens_is("\"fl_x\":50,", "", 50, 50));
     CHECK(lens_is("\"fl_y\":51,", "", 51, 51) && lens_is("\"camera_angle_x\":1,\"fl_y\":51,", "", of_x, 51));
     CHECK(lens_is("\"fl_x\":50,\"fl_y\":51,", "\"camera_angle_x\":1,", of_x, of_x));
     CHECK(lens_is("\"fl_x\":50,", "\"camera_angle_y\":0.8,", of_y, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"fl_x\":50,\"fl_y\":51,", 50, 51));
-    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"camera_intrinsics\":[1,2,50,51],", 50, 51));
-    CHECK(lens_is("\"camera_intrinsics\":[1,2,50,51],", "\"camera_angle_x\":1,\"camera_angle_y\":0.8,", of_x, of_y));
-    CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"frames\":[" FRAME "]}", 0) && set.count == 1 &&
-          fabs((double)set.frames->camera.fx - 3 / tan(0.5)) < 1e-5 &&
+    CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "\"camera_intrinsics\":[1,2,50,51],", 50,
+                  51));
+    CHECK(lens_is("\"camera_intrinsics\":[1,2,50,51],", "\"camera_angle_x\":1,\"camera_angle_y\":0.8,", of_x,
+                  of_y));
+    CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.8,\"frames\":[" FRAME "]}", 0) &&
+          set.count == 1 && fabs((double)set.frames->camera.fx - 3 / tan(0.5)) < 1e-5 &&
           fabs((double)set.frames->camera.fy - 2 / tan(0.4)) < 1e-5);
-    CHECK(!strcmp(set.notes, "pixels of 1 of the 1 frames are not square, by camera_angle_x and camera_angle_y"));
+    CHECK(!strcmp(set.notes,
+                  "pixels of 1 of the 1 frames are not square, by camera_angle_x and camera_angle_y"));
     olat_free(&set);
-    CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.7,\"fl_x\":5,\"frames\":[" FRAME "]}", 0) && !set.notes[0]);
+    CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.7,\"fl_x\":5,\"frames\":[" FRAME "]}", 0) &&
+          !set.notes[0]);
     olat_free(&set);
     for (i = 0; i < sizeof models / sizeof *models; i++)
         CHECK(*models[i][1] == '1' ? lens_loads("camera_model", models[i][0])
@@ -989,10 +1155,12 @@ static void test_lenses(void) {
     for (k = 0; k < 27 + sizeof others / sizeof *others; k++) {
         snprintf(key, sizeof key, "%c%d", "kps"[k / 9 % 3], (int)(k % 9) + 1);
         for (i = 0; i < sizeof values / sizeof *values; i++)
-            CHECK(*values[i][1] == '1' ? lens_loads(k < 27 ? key : others[k - 27], values[i][0])
-                                       : lens_fails(k < 27 ? key : others[k - 27], values[i][0], values[i][1]));
+            CHECK(*values[i][1] == '1'
+                      ? lens_loads(k < 27 ? key : others[k - 27], values[i][0])
+                      : lens_fails(k < 27 ? key : others[k - 27], values[i][0], values[i][1]));
     }
-    CHECK(lens_fails("k1", "1", "distorted lenses are not supported: undistort the images first, with COLMAP's"
+    CHECK(lens_fails("k1", "1",
+                     "distorted lenses are not supported: undistort the images first, with COLMAP's"
                      " image_undistorter or Metashape's Export > Undistort, say"));
     CHECK(lens_loads("k10", "1") && lens_loads("k0", "1")); /* not of any model's */
     CHECK(live == 0);
@@ -1009,33 +1177,37 @@ static void test_rounding(void) {
         for (i = 0; i < 4; i++) q[i] /= sqrt(length);
         for (i = 0; i < 9; i++) {
             const int r = i / 3, c = i % 3, o = 3 - r - c; /* o: the axis that is neither */
-            axes[i] = r == c ? 1 - 2 * (q[1 + (r + 1) % 3] * q[1 + (r + 1) % 3] + q[1 + (r + 2) % 3] * q[1 + (r + 2) % 3])
+            axes[i] = r == c ? 1 - 2 * (q[1 + (r + 1) % 3] * q[1 + (r + 1) % 3] +
+                                        q[1 + (r + 2) % 3] * q[1 + (r + 2) % 3])
                              : 2 * (q[1 + r] * q[1 + c] + ((c + 1) % 3 == r ? 1 : -1) * q[0] * q[1 + o]);
             axes[i] = floor(axes[i] * 1000 + 0.5) / 1000;
         }
-        snprintf(text, sizeof text, TOP "{\"pl_dir\":[0.267,-0.535,0.802],\"transform_matrix\":[[%.3f,%.3f,%.3f,0],"
-                 "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}", axes[0], axes[1], axes[2], axes[3], axes[4], axes[5],
-                 axes[6],
-                 axes[7], axes[8]);
+        snprintf(text, sizeof text,
+                 TOP "{\"pl_dir\":[0.267,-0.535,0.802],\"transform_matrix\":[[%.3f,%.3f,%.3f,0],"
+                     "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}",
+                 axes[0], axes[1], axes[2], axes[3], axes[4], axes[5], axes[6], axes[7], axes[8]);
         if (!CHECK(loads(text, OLAT_NO_IMAGES))) continue;
         for (i = 0; i < 3; i++)
             for (k = 0; k < 3; k++) {
                 const ssdgs_real *view = set.frames->camera.view;
-                for (m = 0, dot = i == k ? -1 : 0; m < 3; m++) dot += (double)(view[4 * i + m] * view[4 * k + m]);
+                for (m = 0, dot = i == k ? -1 : 0; m < 3; m++)
+                    dot += (double)(view[4 * i + m] * view[4 * k + m]);
                 if (fabs(dot) > worst) worst = fabs(dot);
                 if (fabs((double)view[4 * i + k] * (i ? -1 : 1) - axes[3 * k + i]) > 2e-3) worst = 1;
             }
         olat_free(&set);
     }
     CHECK(worst < 1e-6);
-    CHECK(loads(TOP "{" LIGHT "\"transform_matrix\":[[1,0.0045,0,0],[0,1.001,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES));
+    CHECK(loads(TOP "{" LIGHT "\"transform_matrix\":[[1,0.0045,0,0],[0,1.001,0,0],[0,0,1,4]]}]}",
+                OLAT_NO_IMAGES));
     olat_free(&set);
-    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}", OLAT_NO_IMAGES,
-        "not a rotation"));
-    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}", OLAT_NO_IMAGES,
-        "not a rotation"));
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0.006,0,0],[0,1,0,0],[0,0,1,4]]}]}",
+                     OLAT_NO_IMAGES, "not a rotation"));
+    CHECK(load_fails(TOP "{" LIGHT "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,0.99,4]]}]}",
+                     OLAT_NO_IMAGES, "not a rotation"));
     CHECK(loads(TOP "{\"pl_dir\":[0,0.6,0.792]," POSE "}]}", OLAT_NO_IMAGES));
-    CHECK(set.count == 1 && fabs((double)set.frames->light.position[2] - 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
+    CHECK(set.count == 1 &&
+          fabs((double)set.frames->light.position[2] - 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
     olat_free(&set);
     CHECK(load_fails(TOP "{\"pl_dir\":[0,0,1.011]," POSE "}]}", OLAT_NO_IMAGES, "unit vector") && live == 0);
 }
@@ -1044,7 +1216,8 @@ static void test_rounding(void) {
 
 static void write_bytes(const char *name) {
     FILE *stream = fopen(name, "wb");
-    if (!CHECK(stream && fwrite(file, 1, file_size, stream) == file_size && !fclose(stream))) printf("%s\n", name);
+    if (!CHECK(stream && fwrite(file, 1, file_size, stream) == file_size && !fclose(stream)))
+        printf("%s\n", name);
 }
 
 /* Puts a chunk before the byte at `at` of the file, its CRC changed by `damage`. */
@@ -1061,7 +1234,8 @@ static void insert_chunk(size_t at, const char *type, const unsigned char *data,
 
 #define PHOTO "{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "%s}]}"
 
-/* Is the file, as g.png, loaded with colours on the sRGB curve, from light to the power of gamma / 100000 (0: as it is)? */
+/* Is the file, as g.png, loaded with colours on the sRGB curve, from light to the power of gamma / 100000 (0:
+   as it is)? */
 static int photo_is(const picture *p, double gamma) {
     const olat_frame *frame;
     const double top = p->depth == 16 ? 65535 : 255;
@@ -1073,8 +1247,10 @@ static int photo_is(const picture *p, double gamma) {
     snprintf(text, sizeof text, PHOTO, "");
     if (!loads(text, 0)) return 0;
     frame = set.frames;
-    wrong |= (gamma > 0) != (strstr(set.notes, "1 of the 1 photographs is ") != NULL) || (gamma <= 0 && set.notes[0]);
-    wrong |= (gamma > 0 || p->depth == 16) != (frame->format == SSDGS_PIXELS_RGBA16) || frame->camera.width != p->width;
+    wrong |= (gamma > 0) != (strstr(set.notes, "1 of the 1 photographs is ") != NULL) ||
+             (gamma <= 0 && set.notes[0]);
+    wrong |= (gamma > 0 || p->depth == 16) != (frame->format == SSDGS_PIXELS_RGBA16) ||
+             frame->camera.width != p->width;
     wrong |= olat_read_png(FOLDER "/g.png", &width, &height, &format, &stored, error);
     wrong |= (format == SSDGS_PIXELS_RGBA16) != (p->depth == 16);
     for (y = 0; y < p->height && !wrong; y++)
@@ -1084,12 +1260,13 @@ static int photo_is(const picture *p, double gamma) {
             for (c = 0; c < 4; c++) {
                 const size_t i = 4 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c;
                 const double got = olat__sample(frame->pixels, frame->format, i),
-                    linear = pow(rgba[c] / top, 1e5 / gamma);
+                             linear = pow(rgba[c] / top, 1e5 / gamma);
                 wrong |= olat__sample(stored, format, i) != rgba[c];
                 if (gamma <= 0) wrong |= (unsigned)got != rgba[c];
                 else if (c == 3) wrong |= fabs(got * top - 65535.0 * rgba[c]) > 0;
-                else wrong |= fabs(got - 65535 * (linear > 0.0031308 ? 1.055 * pow(linear, 1 / 2.4) - 0.055 :
-                    12.92 * linear)) > 0.5001;
+                else
+                    wrong |= fabs(got - 65535 * (linear > 0.0031308 ? 1.055 * pow(linear, 1 / 2.4) - 0.055
+                                                                    : 12.92 * linear)) > 0.5001;
             }
         }
     meter_free(stored);
@@ -1100,8 +1277,7 @@ static int photo_is(const picture *p, double gamma) {
 
 static void test_curves(void) {
     static const int kinds[4][2] = {{6, 8}, {6, 16}, {3, 8}, {0, 2}},
-        gammas[8] = {100000, 55555, 220000, 16, 39999, 50001, 20000,
-        625000000};
+                     gammas[8] = {100000, 55555, 220000, 16, 39999, 50001, 20000, 625000000};
     static const unsigned char linear[4] = {1, 8, 0, 1}, curved[4] = {1, 13, 0, 1}, intent[4] = {0, 0, 0, 0};
     static const picture rgba = {9, 7, 6, 8, 0, 0};
     unsigned char gama[5] = {0, 0, 0, 0, 0}, plain[4];
@@ -1166,17 +1342,19 @@ static void test_curves(void) {
         CHECK(photo_is(&p, kinds[k][0] == 3 ? 0 : 100000)); /* behind the palette it is out of place */
     }
     encode(&rgba), insert_chunk(33, "gAMA", gama, 4, 0), write_bytes(FOLDER "/g.png");
-    if (CHECK(loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}," FRAME "]}", 0)))
+    if (CHECK(
+            loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}," FRAME "]}", 0)))
         CHECK(!strcmp(set.notes, "1 of the 2 photographs is linear (gAMA 1): converted to the sRGB curve"));
     olat_free(&set);
-    CHECK(loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
+    CHECK(
+        loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
         !set.notes[0]);
     olat_free(&set);
 }
 
 static void test_masks(void) {
-    static const picture masks[6] = {{9, 7, 0, 8, 0, 0}, {9, 7, 2, 16, 0, 0}, {9, 7, 6, 8, 1, 0}, {9, 7, 6, 16, 0, 0},
-        {9, 7, 3, 8, 0, 1}, {9, 7, 0, 1, 0, 0}};
+    static const picture masks[6] = {{9, 7, 0, 8, 0, 0},  {9, 7, 2, 16, 0, 0}, {9, 7, 6, 8, 1, 0},
+                                     {9, 7, 6, 16, 0, 0}, {9, 7, 3, 8, 0, 1},  {9, 7, 0, 1, 0, 0}};
     static const picture photos[3] = {{9, 7, 6, 8, 0, 0}, {9, 7, 6, 16, 0, 0}, {9, 7, 2, 8, 0, 0}};
     static const char *const bad[][2] = {
         {",\"mask_path\":\"none\"", "none.png: cannot be opened: "},
@@ -1208,9 +1386,10 @@ static void test_masks(void) {
                     if (of_mask[2] > most) most = of_mask[2];
                     for (c = 0; c < 4; c++) {
                         const double got = olat__sample(set.frames->pixels, set.frames->format,
-                            (size_t)(4 * (9 * y + x) + c));
-                        wrong |= fabs(got - (c < 3 ? of_photo[c] :
-                            of_photo[3] * (most / top) * (of_mask[3] / top))) > (c < 3 ? 0 : 0.5001);
+                                                        (size_t)(4 * (9 * y + x) + c));
+                        wrong |= fabs(got - (c < 3 ? of_photo[c]
+                                                   : of_photo[3] * (most / top) * (of_mask[3] / top))) >
+                                 (c < 3 ? 0 : 0.5001);
                     }
                 }
             olat_free(&set);
@@ -1231,27 +1410,41 @@ static void test_masks(void) {
 
 /* Other kinds of image, by their names and by their first bytes. */
 static void test_kinds_of_image(void) {
-    static const char *const names[][2] = {{".jpg", "JPEG"}, {".JPG", "JPEG"}, {".jpeg", "JPEG"}, {".jpe", "JPEG"},
-        {".WebP", "WebP"},
-        {".exr", "OpenEXR"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"}, {".TIFF", "TIFF"}, {".bmp", "BMP"},
-        {".gif", "GIF"},
-        {".heic", "HEIC"}, {".avif", "AVIF"}, {".dng", "DNG"}, {".ppm", "PPM"}};
-    static const struct { const char *bytes; size_t size; const char *message; } files[] = {
-        {"\xFF\xD8\xFF\xE0\0\x10JFIF", 10, "byte 0: this is a JPEG file"}, {"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
-        {"GIF89a\1\2", 8, "a GIF file"}, {"II*\0\1\2", 6, "a TIFF file"}, {"MM\0*\1\2", 6, "a TIFF file"},
-        {"BM\1\2", 4, "a BMP file"},
-        {"\x76\x2F\x31\x01\2", 5, "an OpenEXR file"}, {"\0\0\0\x20" "ftypavif", 12, "a HEIC or AVIF file"},
-        {"version https://git-lfs.github.com/spec/v1\n", 43, "Git LFS pointer, not the image itself: run git lfs pull"},
-        {"\xFF\xD8", 2, "this is not a PNG file"}, {"version https://git-lf", 22, "not a PNG file"},
-        {"", 0, "not a PNG file"},
-        {"B", 1, "not a PNG file"}, {"RIFF\1\2\3\4WEB", 11, "not a PNG file"}};
+    static const char *const names[][2] = {{".jpg", "JPEG"},         {".JPG", "JPEG"},  {".jpeg", "JPEG"},
+                                           {".jpe", "JPEG"},         {".WebP", "WebP"}, {".exr", "OpenEXR"},
+                                           {".hdr", "Radiance HDR"}, {".tif", "TIFF"},  {".TIFF", "TIFF"},
+                                           {".bmp", "BMP"},          {".gif", "GIF"},   {".heic", "HEIC"},
+                                           {".avif", "AVIF"},        {".dng", "DNG"},   {".ppm", "PPM"}};
+    static const struct {
+        const char *bytes;
+        size_t size;
+        const char *message;
+    } files[] = {{"\xFF\xD8\xFF\xE0\0\x10JFIF", 10, "byte 0: this is a JPEG file"},
+                 {"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
+                 {"GIF89a\1\2", 8, "a GIF file"},
+                 {"II*\0\1\2", 6, "a TIFF file"},
+                 {"MM\0*\1\2", 6, "a TIFF file"},
+                 {"BM\1\2", 4, "a BMP file"},
+                 {"\x76\x2F\x31\x01\2", 5, "an OpenEXR file"},
+                 {"\0\0\0\x20"
+                  "ftypavif",
+                  12, "a HEIC or AVIF file"},
+                 {"version https://git-lfs.github.com/spec/v1\n", 43,
+                  "Git LFS pointer, not the image itself: run git lfs pull"},
+                 {"\xFF\xD8", 2, "this is not a PNG file"},
+                 {"version https://git-lf", 22, "not a PNG file"},
+                 {"", 0, "not a PNG file"},
+                 {"B", 1, "not a PNG file"},
+                 {"RIFF\1\2\3\4WEB", 11, "not a PNG file"}};
     static const picture converted = {6, 4, 2, 8, 0, 0};
     char text[1200], wanted[200];
     size_t i;
     for (i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(text, sizeof text, TOP "{\"file_path\":\"t/r_000%s\"," LIGHT POSE "}]}", names[i][0]);
-        snprintf(wanted, sizeof wanted, "line 2: frames[0].file_path: t/r_000%s: %s images cannot be read: convert them to PNG, for"
-                 " instance with: mogrify -format png *.", names[i][0], names[i][1]);
+        snprintf(wanted, sizeof wanted,
+                 "line 2: frames[0].file_path: t/r_000%s: %s images cannot be read: convert them to PNG, for"
+                 " instance with: mogrify -format png *.",
+                 names[i][0], names[i][1]);
         CHECK(load_fails(text, 0, wanted));
         CHECK(loads(text, OLAT_NO_IMAGES)); /* a path: images are not needed */
         olat_free(&set);
@@ -1263,14 +1456,15 @@ static void test_kinds_of_image(void) {
     }
     encode(&converted), write_bytes(FOLDER "/a.jpg.png"), write_bytes(FOLDER "/jpg.png");
     CHECK(loads(TOP "{\"file_path\":\"a.jpg\",\"file_ext\":\".png\"," LIGHT POSE "},"
-                "{\"file_path\":\"jpg\"," LIGHT POSE "}]}", 0)); /* the name of an image that was converted, no ending */
+                    "{\"file_path\":\"jpg\"," LIGHT POSE "}]}",
+                0)); /* the name of an image that was converted, no ending */
     olat_free(&set);
     for (i = 0; i < sizeof files / sizeof *files; i++) {
         memcpy(file, files[i].bytes, file_size = files[i].size);
         CHECK(refused_with(files[i].message));
         write_bytes(FOLDER "/odd.png");
         CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0, files[i].message) &&
-            strstr(error, "odd.png: byte 0: "));
+              strstr(error, "odd.png: byte 0: "));
     }
     CHECK(live == 0);
 }
@@ -1284,13 +1478,15 @@ static void write_place(const char *name, const double place[3], int refined, do
     if (!CHECK(stream != NULL)) return;
     fprintf(stream, "{\"camera_angle_x\":1.0,\"frames\":[");
     for (i = 0; i < 12; i++) {
-        const double a = 0.5 * i, z = 0.6, eye[3] = {2 * cos(a) * size, 2 * sin(a) * size, (0.1 * i - 0.3) * size};
-        const double axes[3][3] = {{-sin(a), cos(a), 0}, {-z * cos(a), -z * sin(a), 0.8},
-            {0.8 * cos(a), 0.8 * sin(a), z}};
+        const double a = 0.5 * i, z = 0.6,
+                     eye[3] = {2 * cos(a) * size, 2 * sin(a) * size, (0.1 * i - 0.3) * size};
+        const double axes[3][3] = {
+            {-sin(a), cos(a), 0}, {-z * cos(a), -z * sin(a), 0.8}, {0.8 * cos(a), 0.8 * sin(a), z}};
         fprintf(stream, "%s{\"pl_intensity\":2,", i ? ",\n" : "");
         if (i == 5) fprintf(stream, "\"pl_dir\":[0,0.6,0.8]");
-        else fprintf(stream, "\"pl_pos\":[%.17g,%.17g,%.17g]", place[0] + eye[1], place[1] - eye[0],
-            place[2] + 0.3 * size);
+        else
+            fprintf(stream, "\"pl_pos\":[%.17g,%.17g,%.17g]", place[0] + eye[1], place[1] - eye[0],
+                    place[2] + 0.3 * size);
         fprintf(stream, ",\"%s\":[", refined ? "R_opt" : "transform_matrix");
         for (k = 0; k < 3; k++) { /* a camera's axes are columns; R_opt has y down and z forward */
             fprintf(stream, "%s[", k ? "," : "");
@@ -1317,17 +1513,19 @@ static double apart(const olat_dataset *a, const olat_dataset *b) {
     int i, k;
     for (i = 0; i < a->count && i < b->count; i++) {
         for (k = 0; k < 12; k++)
-            if ((d = fabs((double)(a->frames[i].camera.view[k] - b->frames[i].camera.view[k]))) > most) most = d;
+            if ((d = fabs((double)(a->frames[i].camera.view[k] - b->frames[i].camera.view[k]))) > most)
+                most = d;
         for (k = 0; k < 3; k++)
-            if ((d = fabs((double)(a->frames[i].light.position[k] - b->frames[i].light.position[k]))) > most) most = d;
+            if ((d = fabs((double)(a->frames[i].light.position[k] - b->frames[i].light.position[k]))) > most)
+                most = d;
         if (a->frames[i].light.kind != b->frames[i].light.kind) most = 1e9;
     }
     return most;
 }
 
 static void test_far_places(void) {
-    static const double places[6][3] = {{5e5, 6.5e5, 5e4}, {5e6, -5e6, 5e6}, {0, 0, 2e4}, {-123456.789, 0.25, 7},
-        {0, 0, 0}, {90, 0, 0}};
+    static const double places[6][3] = {{5e5, 6.5e5, 5e4},      {5e6, -5e6, 5e6}, {0, 0, 2e4},
+                                        {-123456.789, 0.25, 7}, {0, 0, 0},        {90, 0, 0}};
     static const double zero[3] = {0, 0, 0};
     olat_dataset there, again, nearby;
     char wanted[200];
@@ -1337,19 +1535,21 @@ static void test_far_places(void) {
             double offset[3];
             write_place(FOLDER "/there.json", places[i], refined, 1);
             write_place(FOLDER "/near.json", zero, refined, 1);
-            if (!CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error))) printf("%s\n", error);
+            if (!CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error)))
+                printf("%s\n", error);
             for (k = 0; k < 3; k++) {
-                offset[k] = there.origin[k] - places[i][k]; /* of the origin that was chosen, in the scene's coordinates */
-                CHECK(i < 4 ? fabs(offset[k]) < 1 && fabs(there.origin[k] - (double)(float)there.origin[k]) <= 0
-                            : fabs(there.origin[k]) <= 0);
+                offset[k] = there.origin[k] -
+                            places[i][k]; /* of the origin that was chosen, in the scene's coordinates */
+                CHECK(i < 4
+                          ? fabs(offset[k]) < 1 && fabs(there.origin[k] - (double)(float)there.origin[k]) <= 0
+                          : fabs(there.origin[k]) <= 0);
                 if (i >= 4) offset[k] = -places[i][k];
             }
             CHECK(!olat_load_at(FOLDER, "near.json", OLAT_NO_IMAGES, offset, &nearby, error));
-            if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4))) printf("    %d, %d: %g\n", i, refined,
-                apart(&there, &nearby));
-            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %.9g, %.9g, %.9g", there.origin[0],
-                there.origin[1],
-                     there.origin[2]);
+            if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4)))
+                printf("    %d, %d: %g\n", i, refined, apart(&there, &nearby));
+            snprintf(wanted, sizeof wanted, "coordinates are taken relative to %.9g, %.9g, %.9g",
+                     there.origin[0], there.origin[1], there.origin[2]);
             CHECK(!strcmp(there.notes, i < 4 ? wanted : ""));
             CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &there, error));
             CHECK(!olat_load_at(FOLDER, "saved.json", OLAT_NO_IMAGES, there.origin, &again, error));
@@ -1366,10 +1566,10 @@ static void test_far_places(void) {
     olat_free(&there);
     write_place(FOLDER "/there.json", places[1], 0, 1e5);
     CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error) && fabs(there.origin[0]) <= 0 &&
-        !there.notes[0]);
+          !there.notes[0]);
     olat_free(&there);
     CHECK(loads(TOP "{\"pl_dir\":[0,0,1]," POSE "},{\"pl_dir\":[0,0,1]," POSE "}]}", OLAT_NO_IMAGES) &&
-        fabs(set.origin[2]) <= 0);
+          fabs(set.origin[2]) <= 0);
     olat_free(&set); /* a camera that stands still does not tell how large the scene is */
     CHECK(live == 0);
 }
@@ -1384,8 +1584,9 @@ static void test_saved_digits(void) {
     int i, k;
     write_place(FOLDER "/there.json", place, 0, 1);
     CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &set, error) &&
-        !olat_save(FOLDER "/saved.json", FOLDER, &set, error));
-    if (!CHECK(!olat__read_file(FOLDER "/saved.json", &text, &size, error) && parse_open((char *)text, size))) return;
+          !olat_save(FOLDER "/saved.json", FOLDER, &set, error));
+    if (!CHECK(!olat__read_file(FOLDER "/saved.json", &text, &size, error) && parse_open((char *)text, size)))
+        return;
     frame = &json.nodes[olat__find(&json, json.nodes, "frames")->child];
     for (i = 0; i < set.count; i++, frame = &json.nodes[frame->next]) {
         double axes[3][3];
@@ -1393,10 +1594,12 @@ static void test_saved_digits(void) {
         olat_eye(&set.frames[i].camera, eye);
         CHECK(olat__get_pose(&json, frame, "transform_matrix", 1, axes, origin));
         for (k = 0; k < 3; k++) {
-            const double exact = -(double)set.frames[i].camera.view[k] * (double)set.frames[i].camera.view[3] -
+            const double exact =
+                -(double)set.frames[i].camera.view[k] * (double)set.frames[i].camera.view[3] -
                 (double)set.frames[i].camera.view[4 + k] * (double)set.frames[i].camera.view[7] -
                 (double)set.frames[i].camera.view[8 + k] * (double)set.frames[i].camera.view[11];
-            if (fabs(origin[k] - set.origin[k] - exact) > worst) worst = fabs(origin[k] - set.origin[k] - exact);
+            if (fabs(origin[k] - set.origin[k] - exact) > worst)
+                worst = fabs(origin[k] - set.origin[k] - exact);
         }
         if (!olat__get(&json, frame, "pl_pos", 3, v)) continue;
         for (k = 0; k < 3; k++) {
@@ -1415,9 +1618,10 @@ static void test_saved_digits(void) {
 static void test_saving(void) {
     olat_dataset again;
     int i, k;
-    CHECK(loads("{\"fl_x\":3.2512345,\"fl_y\":3.5432109,\"cx\":2.7654321,\"cy\":2.1234567,\"frames\":[" FRAME ",\n{" FILE_A
-                "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.12345678,1.2345678e-7,3.4567891e8],"
-                "\"transform_matrix\":[[0,-0.6,0.8,0.3],[0,0.8,0.6,-7.1],[-1,0,0,2.2],[0,0,0,1]]}]}", 0));
+    CHECK(loads("{\"fl_x\":3.2512345,\"fl_y\":3.5432109,\"cx\":2.7654321,\"cy\":2.1234567,\"frames\":[" FRAME
+                ",\n{" FILE_A "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.12345678,1.2345678e-7,3.4567891e8],"
+                "\"transform_matrix\":[[0,-0.6,0.8,0.3],[0,0.8,0.6,-7.1],[-1,0,0,2.2],[0,0,0,1]]}]}",
+                0));
     if (!CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))) printf("%s\n", error);
     if (!CHECK(!olat_load(FOLDER, "saved.json", 0, &again, error))) printf("%s\n", error);
     CHECK(again.count == 2 && set.count == 2);
@@ -1435,10 +1639,12 @@ static void test_saving(void) {
     meter_free(set.frames[0].file); /* no image, a quotation mark, and a folder that is not the image's */
     set.frames[0].file = NULL;
     memcpy(set.frames[1].file, FOLDER "/\"", sizeof FOLDER + 2);
-    CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error) && !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
+    CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error) &&
+          !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
     CHECK(!again.frames[0].file && again.frames[1].file && strstr(again.frames[1].file, "/\"."));
     olat_free(&again);
-    CHECK(!olat_save(FOLDER "/saved.json", "build/t_olat_file", &set, error) && /* a folder whose name only begins alike */
+    CHECK(!olat_save(FOLDER "/saved.json", "build/t_olat_file", &set,
+                     error) && /* a folder whose name only begins alike */
           !olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
     CHECK(!again.frames[1].file);
     olat_free(&again);
@@ -1460,7 +1666,8 @@ static const char *output(const char *path) {
 
 static int replaces(const char *path, const char *input) {
     char wanted[600];
-    snprintf(wanted, sizeof wanted, "%s: would replace an input, %s: choose another output folder", path, input);
+    snprintf(wanted, sizeof wanted, "%s: would replace an input, %s: choose another output folder", path,
+             input);
     if (!strcmp(output(path), wanted)) return 1;
     printf("%s: wanted \"%s\", got \"%s\"\n", path, wanted, error);
     return 0;
@@ -1472,10 +1679,10 @@ static void drop_guard(void) {
 }
 
 static void test_guard(void) {
-    static const char *const names[] = {"in/a.png", "in/b.png", "in/c.png", "in/m.png", "out/old.png", "in/set.json",
-        "in/bad.json"};
+    static const char *const names[] = {"in/a.png",    "in/b.png",    "in/c.png",   "in/m.png",
+                                        "out/old.png", "in/set.json", "in/bad.json"};
     static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png",
-        GUARD "/later/b/new.png"};
+                                          GUARD "/later/b/new.png"};
     char path[600], other[200];
     size_t i;
     int k, done;
@@ -1490,23 +1697,28 @@ static void test_guard(void) {
           !symlink("in", GUARD "/folder") && !symlink("nothing", GUARD "/loose.png"));
 
     CHECK(!olat_guard_input(&guard, GUARD "/in/a.png", error) &&
-        !olat_guard_input(&guard, GUARD "/in/none.png", error));
-    CHECK(!olat_guard_input(&guard, GUARD "/./in/a.png", error) && guard.count == 2); /* an input may be named twice */
-    CHECK(replaces(GUARD "/in/a.png", GUARD "/in/a.png") && replaces(GUARD "/./in//./a.png", GUARD "/in/a.png"));
-    CHECK(replaces(GUARD "/out/../in/a.png", GUARD "/in/a.png") && replaces(GUARD "/hard.png", GUARD "/in/a.png"));
-    CHECK(replaces(GUARD "/soft.png", GUARD "/in/a.png") && replaces(GUARD "/folder/a.png", GUARD "/in/a.png"));
+          !olat_guard_input(&guard, GUARD "/in/none.png", error));
+    CHECK(!olat_guard_input(&guard, GUARD "/./in/a.png", error) &&
+          guard.count == 2); /* an input may be named twice */
+    CHECK(replaces(GUARD "/in/a.png", GUARD "/in/a.png") &&
+          replaces(GUARD "/./in//./a.png", GUARD "/in/a.png"));
+    CHECK(replaces(GUARD "/out/../in/a.png", GUARD "/in/a.png") &&
+          replaces(GUARD "/hard.png", GUARD "/in/a.png"));
+    CHECK(replaces(GUARD "/soft.png", GUARD "/in/a.png") &&
+          replaces(GUARD "/folder/a.png", GUARD "/in/a.png"));
     CHECK(replaces(GUARD "/in/none.png", GUARD "/in/none.png") &&
-        replaces(GUARD "/folder/./NONE.png", GUARD "/in/none.png"));
+          replaces(GUARD "/folder/./NONE.png", GUARD "/in/none.png"));
     CHECK(!*output(GUARD "/in/b.png") && !*output(GUARD "/in/other.png") && !*output(GUARD "/none.png") &&
-        !*output(GUARD "/out/a.png"));
+          !*output(GUARD "/out/a.png"));
     drop_guard();
 
     for (i = 0; i < sizeof outputs / sizeof *outputs; i++) { /* twice, in whatever letters */
         CHECK(!*output(outputs[i]));
         snprintf(other, sizeof other, "%.*s/./%s", (int)(strrchr(outputs[i], '/') - outputs[i]), outputs[i],
-            strrchr(outputs[i], '/') + 1);
-        snprintf(path, sizeof path, "%s: would be written twice, also as %s: give the outputs different names",
-            other, outputs[i]);
+                 strrchr(outputs[i], '/') + 1);
+        snprintf(path, sizeof path,
+                 "%s: would be written twice, also as %s: give the outputs different names", other,
+                 outputs[i]);
         CHECK(!strcmp(output(other), path));
         strcpy(strrchr(other, '/') + 1, i == 1 ? "OLD.PNG" : "New.Png");
         CHECK(strstr(output(other), "twice"));
@@ -1516,23 +1728,28 @@ static void test_guard(void) {
     write_text(outputs[0], "written"); /* it is a file by now */
     CHECK(strstr(output(outputs[0]), "twice"));
     remove(outputs[0]);
-    CHECK(!*output(GUARD "/out/new2.png") && !*output("t_olat_new.png") && strstr(output("./t_olat_NEW.png"), "twice"));
+    CHECK(!*output(GUARD "/out/new2.png") && !*output("t_olat_new.png") &&
+          strstr(output("./t_olat_NEW.png"), "twice"));
     CHECK(!*output(GUARD "/loose.png") && strstr(output(GUARD "/loose.png"), "twice"));
     drop_guard();
 
     /* a dataset: what it names is safe, whatever else is wrong with it */
-    write_text(GUARD "/in/set.json", "{\"frames\":[{\"file_path\":\"./a\",\"mask_path\":\"m\"},{\"file_path\":7},1,"
+    write_text(GUARD "/in/set.json",
+               "{\"frames\":[{\"file_path\":\"./a\",\"mask_path\":\"m\"},{\"file_path\":7},1,"
                "{\"file_path\":\"b.png\"},{\"img_path\":\"..\\\\out\\\\old.png\",\"mask_path\":\"gone\"}]}");
     write_text(GUARD "/in/bad.json", "{\"frames\":[{\"file_path\":\"c\"}]");
     CHECK(!olat_guard_folder(&guard, GUARD "/in", "set.json", error) &&
-        !olat_guard_folder(&guard, GUARD "/in", "bad.json", error));
+          !olat_guard_folder(&guard, GUARD "/in", "bad.json", error));
     CHECK(!olat_guard_folder(&guard, GUARD "/in", "missing.json", error) &&
-        !olat_guard_folder(&guard, GUARD "/in", "a.png", error));
-    CHECK(replaces(GUARD "/folder/a.png", GUARD "/in/./a.png") && replaces(GUARD "/in/b.png", GUARD "/in/b.png"));
-    CHECK(replaces(GUARD "/in/m.png", GUARD "/in/m.png") && replaces(GUARD "/out/old.png", GUARD "/in/../out/old.png"));
-    CHECK(replaces(GUARD "/in/gone.png", GUARD "/in/gone.png") && replaces(GUARD "/in/set.json", GUARD "/in/set.json"));
+          !olat_guard_folder(&guard, GUARD "/in", "a.png", error));
+    CHECK(replaces(GUARD "/folder/a.png", GUARD "/in/./a.png") &&
+          replaces(GUARD "/in/b.png", GUARD "/in/b.png"));
+    CHECK(replaces(GUARD "/in/m.png", GUARD "/in/m.png") &&
+          replaces(GUARD "/out/old.png", GUARD "/in/../out/old.png"));
+    CHECK(replaces(GUARD "/in/gone.png", GUARD "/in/gone.png") &&
+          replaces(GUARD "/in/set.json", GUARD "/in/set.json"));
     CHECK(replaces(GUARD "/in/bad.json", GUARD "/in/bad.json") &&
-        replaces(GUARD "/in/missing.json", GUARD "/in/missing.json"));
+          replaces(GUARD "/in/missing.json", GUARD "/in/missing.json"));
     CHECK(!*output(GUARD "/in/c.png"));
     drop_guard();
 
@@ -1540,9 +1757,9 @@ static void test_guard(void) {
         calls = 0, fail_at = n;
         memset(error, 0, sizeof error);
         done = !olat_guard_folder(&guard, GUARD "/in", "set.json", error) &&
-            !olat_guard_input(&guard, GUARD "/in/c.png", error) &&
-            !olat_guard_output(&guard, GUARD "/out/new.png", error) &&
-            !olat_guard_output(&guard, GUARD "/out/new2.png", error);
+               !olat_guard_input(&guard, GUARD "/in/c.png", error) &&
+               !olat_guard_output(&guard, GUARD "/out/new.png", error) &&
+               !olat_guard_output(&guard, GUARD "/out/new2.png", error);
         CHECK(done || strstr(error, "out of memory"));
         drop_guard();
     }
@@ -1598,7 +1815,8 @@ static void test_views(void) {
     static const unsigned char bytes[8] = {255, 51, 0, 255, 255, 255, 0, 51};
     static const uint16_t words[8] = {65535, 13107, 0, 65535, 65535, 65535, 0, 13107};
     static const ssdgs_real background[3] = {(ssdgs_real)0.5, (ssdgs_real)0.25, 1};
-    static const double shown[6] = {1, 0.2, 0, 0.2 + 0.8 * 0.5, 0.2 + 0.8 * 0.25, 0.8}, bare[6] = {0.5, 0.25, 1, 0.5, 0.25, 1};
+    static const double shown[6] = {1, 0.2, 0, 0.2 + 0.8 * 0.5, 0.2 + 0.8 * 0.25, 0.8},
+                        bare[6] = {0.5, 0.25, 1, 0.5, 0.25, 1};
     static const ssdgs_real view[12] = {0, -1, 0, -2, 0, 0, -1, (ssdgs_real)1.25, 1, 0, 0, (ssdgs_real)-0.5};
     static const double place[3] = {0.5, -2, 1.25};
     olat_frame frame;
@@ -1640,7 +1858,7 @@ static void test_cow(void) {
             const olat_frame *f = &set.frames[i];
             const unsigned char *p = (const unsigned char *)f->pixels;
             CHECK(f->camera.width == 128 && f->camera.height == 128 &&
-                fabs((double)f->camera.fx - 196.9715) < 1e-3 && f->camera.view[11] > 1);
+                  fabs((double)f->camera.fx - 196.9715) < 1e-3 && f->camera.view[11] > 1);
             CHECK(p[3] == 0 && p[4 * (64 * 128 + 64) + 3] == 255); /* the cow is in the middle */
         }
         olat_free(&set);

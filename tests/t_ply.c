@@ -15,7 +15,10 @@
 
 /* ---- memory that counts and fails on demand ---- */
 
-typedef struct meter { long live, calls, fail_at; int for_ever; } meter;
+typedef struct meter {
+    long live, calls, fail_at;
+    int for_ever;
+} meter;
 
 static void *meter_allocate(void *user, size_t bytes) {
     meter *m = (meter *)user;
@@ -68,7 +71,8 @@ static ssdgs_model *make_model(int count) {
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     view = ssdgs_model_get(model);
     for (channel = 0; channel < SSDGS_CHANNELS; channel++)
-        for (i = 0; i < count; i++) view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
+        for (i = 0; i < count; i++)
+            view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
     if (count > 2) { /* least, largest, minus zero */
         view.gaussians[SSDGS_DIFFUSE * view.stride] = from_bits(0x00800000u);
         view.gaussians[SSDGS_DIFFUSE * view.stride + 1] = from_bits(0xff7fffffu);
@@ -89,7 +93,8 @@ static int same_globals(ssdgs_model *a, ssdgs_model *b) {
            !memcmp(u.asg_basis, v.asg_basis, SSDGS_ASG_COUNT * 4 * real) &&
            !memcmp(u.asg_sharpness, v.asg_sharpness, SSDGS_ASG_COUNT * 2 * real) &&
            !memcmp(u.asg_sigma, v.asg_sigma, SSDGS_ASG_COUNT * real) &&
-           !memcmp(u.scattering, v.scattering, u.scattering_count * real) && !memcmp(u.shadow, v.shadow, u.shadow_count * real);
+           !memcmp(u.scattering, v.scattering, u.scattering_count * real) &&
+           !memcmp(u.shadow, v.shadow, u.shadow_count * real);
 }
 
 static int same_gaussians(ssdgs_model *a, ssdgs_model *b) {
@@ -108,7 +113,10 @@ static int same(ssdgs_model *a, ssdgs_model *b) {
 
 /* ---- bytes, and files in them ---- */
 
-typedef struct bytes { unsigned char *data; size_t size, room; } bytes;
+typedef struct bytes {
+    unsigned char *data;
+    size_t size, room;
+} bytes;
 
 static void put(bytes *to, const void *from, size_t size) {
     if (to->size + size > to->room) {
@@ -148,8 +156,8 @@ static int refused(const void *data, size_t size) {
     const long live = memory.live;
     ssdgs_model *model = NULL;
     const ssdgs_result result = load(data, size, &model, NULL);
-    const int good = (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !model && ssdgs_error_message(context)[0] &&
-                     memory.live == live;
+    const int good = (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !model &&
+                     ssdgs_error_message(context)[0] && memory.live == live;
     ssdgs_model_destroy(model);
     return good;
 }
@@ -162,9 +170,20 @@ static uint32_t word_at(const unsigned char *p) {
     return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-typedef struct column { char name[32]; int integer; } column;
-typedef struct table { char name[32]; int rows, columns; struct column column[64]; const unsigned char *data; } table;
-typedef struct document { struct table table[8]; int tables; } document;
+typedef struct column {
+    char name[32];
+    int integer;
+} column;
+typedef struct table {
+    char name[32];
+    int rows, columns;
+    struct column column[64];
+    const unsigned char *data;
+} table;
+typedef struct document {
+    struct table table[8];
+    int tables;
+} document;
 
 static document parse(const bytes *file) {
     document d;
@@ -230,12 +249,14 @@ static bytes emit(const document *d, const variant *v) {
     bytes to = {NULL, 0, 0};
     int pass, t, row, c;
     char line[128];
-    sprintf(line, "ply%sformat %s 1.0%sobj_info of a test%s", v->newline, formats[v->format], v->newline, v->newline);
+    sprintf(line, "ply%sformat %s 1.0%sobj_info of a test%s", v->newline, formats[v->format], v->newline,
+            v->newline);
     text(&to, line);
     for (pass = 0; pass < 2; pass++) { /* header, data */
         if (v->extras && !pass) {
-            sprintf(line, "element face 2%sproperty list uchar int corners%selement void 99999999%scomment  %s", v->newline,
-                    v->newline, v->newline, v->newline);
+            sprintf(line,
+                    "element face 2%sproperty list uchar int corners%selement void 99999999%scomment  %s",
+                    v->newline, v->newline, v->newline, v->newline);
             text(&to, line);
         }
         for (c = 0; v->extras && pass && c < 8; c++) put_value(&to, v, c == 0 || c == 4 ? "uchar" : "int", 3);
@@ -248,7 +269,8 @@ static bytes emit(const document *d, const variant *v) {
             }
             for (row = 0; row < (pass ? from->rows : 1); row++) {
                 if (v->extras && !pass) {
-                    sprintf(line, "property list ushort double tags%sproperty char sign%s", v->newline, v->newline);
+                    sprintf(line, "property list ushort double tags%sproperty char sign%s", v->newline,
+                            v->newline);
                     text(&to, line);
                 }
                 if (v->extras && pass) {
@@ -258,12 +280,14 @@ static bytes emit(const document *d, const variant *v) {
                 }
                 for (c = 0; c < from->columns; c++) {
                     const int k = v->reversed ? from->columns - 1 - c : c;
-                    const unsigned char *raw = from->data + ((size_t)row * (size_t)from->columns + (size_t)k) * 4;
+                    const unsigned char *raw =
+                        from->data + ((size_t)row * (size_t)from->columns + (size_t)k) * 4;
                     const uint32_t bits = word_at(raw);
                     const char *type = from->column[k].integer ? integer : real;
                     if (v->skip && !strcmp(from->column[k].name, v->skip)) continue;
                     if (pass) {
-                        put_value(&to, v, type, from->column[k].integer ? (double)(int32_t)bits : (double)from_bits(bits));
+                        put_value(&to, v, type,
+                                  from->column[k].integer ? (double)(int32_t)bits : (double)from_bits(bits));
                     } else {
                         sprintf(line, "property %s %s%s", type, from->column[k].name, v->newline);
                         text(&to, line);
@@ -294,9 +318,11 @@ static void test_round_trip(void) {
         ssdgs_model *model = make_model(counts[i]), *back = NULL, *again = NULL;
         bytes file = saved(model);
         CHECK(ssdgs_model_load(context, path, &back, &stats) == SSDGS_OK && same(model, back));
-        CHECK(!stats.plain && !stats.dropped && !stats.zero_rotations && !stats.clamped_opacities && !stats.clamped_scales);
+        CHECK(!stats.plain && !stats.dropped && !stats.zero_rotations && !stats.clamped_opacities &&
+              !stats.clamped_scales);
         CHECK(load(file.data, file.size, &again, NULL) == SSDGS_OK && same(model, again));
-        CHECK(file.size > 300 && !strncmp((char *)file.data, "ply\nformat binary_little_endian 1.0\nelement vertex ", 50));
+        CHECK(file.size > 300 &&
+              !strncmp((char *)file.data, "ply\nformat binary_little_endian 1.0\nelement vertex ", 50));
         ssdgs_model_destroy(model);
         ssdgs_model_destroy(back);
         ssdgs_model_destroy(again);
@@ -323,18 +349,20 @@ static void test_variants(void) {
         CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
         ssdgs_model_destroy(back);
         if (v.format == ASCII) { /* the end of the last line may be missing */
-            CHECK(load(other.data, other.size - strlen(v.newline) - 1, &back, NULL) == SSDGS_OK && same(model, back));
+            CHECK(load(other.data, other.size - strlen(v.newline) - 1, &back, NULL) == SSDGS_OK &&
+                  same(model, back));
             ssdgs_model_destroy(back);
         }
         free(other.data);
     }
-    for (k = 0; k < d.tables; k++) { /* every property of every element is missed by its name, but for those that others use or that came later */
+    for (k = 0; k < d.tables; k++) { /* every property of every element is missed by its name, but for those
+                                        that others use or that came later */
         for (c = 0; c < d.table[k].columns; c++) {
             variant v = {LITTLE, "\n", 0, 0, 0, NULL};
             const char *name = v.skip = d.table[k].column[c].name;
             other = emit(&d, &v);
-            if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") || !strcmp(name, "nz") ||
-                strstr(name, "_octaves") || !strncmp(name, "origin_", 7)) {
+            if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") ||
+                !strcmp(name, "nz") || strstr(name, "_octaves") || !strncmp(name, "origin_", 7)) {
                 CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
                 ssdgs_model_destroy(back);
             } else if (!strcmp(name, "pixel_variance")) {
@@ -374,8 +402,10 @@ static void test_foreign(void) {
 
     d.tables = 1;
     other = emit(&d, &v);
-    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && same_gaussians(model, back) && !stats.plain);
-    CHECK(ssdgs_model_create(context, &published, 0, &fresh) == SSDGS_OK && back && same_globals(fresh, back));
+    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && same_gaussians(model, back) &&
+          !stats.plain);
+    CHECK(ssdgs_model_create(context, &published, 0, &fresh) == SSDGS_OK && back &&
+          same_globals(fresh, back));
     CHECK(back && !memcmp(ssdgs_model_settings(back), &published, sizeof published));
     ssdgs_model_destroy(model);
     ssdgs_model_destroy(back);
@@ -384,29 +414,43 @@ static void test_foreign(void) {
     free(file.data);
 
     memset(&other, 0, sizeof other); /* 62 floats */
-    text(&other, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                 "property float nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty float f_dc_1\n"
+    text(&other, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                 "y\nproperty float z\n"
+                 "property float nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty "
+                 "float f_dc_1\n"
                  "property float f_dc_2\n");
     for (i = 0; i < 45; i++) sprintf(line, "property float f_rest_%d\n", i), text(&other, line);
-    text(&other, "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n"
-                 "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n");
+    text(&other,
+         "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+         "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float "
+         "rot_3\nend_header\n");
     for (j = 0; j < 3; j++)
         for (i = 0; i < 62; i++)
-            put_value(&other, &v, "float", i == 6 ? -3 : i < 9 ? i + 0.5 * j : i < 54 ? 1e30 : i == 54 ? 25 : 0.25 * i - 14);
+            put_value(&other, &v, "float",
+                      i == 6    ? -3
+                      : i < 9   ? i + 0.5 * j
+                      : i < 54  ? 1e30
+                      : i == 54 ? 25
+                                : 0.25 * i - 14);
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
         view = ssdgs_model_get(back);
-        CHECK(stats.plain && stats.clamped_opacities == 3 && stats.dropped == 0 && stats.zero_rotations == 0 && view.count == 3);
-        CHECK(ssdgs_model_settings(back)->baked == 1 && ssdgs_model_settings(back)->transfer == SSDGS_TRANSFER_NONE);
-        CHECK(ssdgs_model_create(context, ssdgs_model_settings(back), 3, &fresh) == SSDGS_OK && same_globals(back, fresh));
+        CHECK(stats.plain && stats.clamped_opacities == 3 && stats.dropped == 0 &&
+              stats.zero_rotations == 0 && view.count == 3);
+        CHECK(ssdgs_model_settings(back)->baked == 1 &&
+              ssdgs_model_settings(back)->transfer == SSDGS_TRANSFER_NONE);
+        CHECK(ssdgs_model_create(context, ssdgs_model_settings(back), 3, &fresh) == SSDGS_OK &&
+              same_globals(back, fresh));
         CHECK(view.gaussians[view.stride + 2] == 2 && view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
               view.gaussians[SSDGS_LOG_SCALE * view.stride + 1] == (ssdgs_real)-0.25 &&
               view.gaussians[(SSDGS_ROTATION + 3) * view.stride] == (ssdgs_real)1.25);
         CHECK(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) < 2e-6); /* below black */
-        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 - 0.28209479 * 7.5) < 1e-6);
+        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 -
+                   0.28209479 * 7.5) < 1e-6);
         if (fresh) neutral = ssdgs_model_get(fresh);
         for (channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
-            CHECK(view.gaussians[(size_t)channel * view.stride] == neutral.gaussians[(size_t)channel * neutral.stride]);
+            CHECK(view.gaussians[(size_t)channel * view.stride] ==
+                  neutral.gaussians[(size_t)channel * neutral.stride]);
         file = saved(back); /* a baked model keeps its colours, f_dc shows them */
         d = parse(&file);
         CHECK(fabs((double)from_bits(word_at(d.table[0].data + 28)) - 7) < 1e-5);
@@ -418,18 +462,22 @@ static void test_foreign(void) {
 
     back = NULL;
     memset(&other, 0, sizeof other);
-    text(&other, "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
-                 "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float opacity\nproperty float scale_0\n"
-                 "property float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\n"
-                 "property float rot_2\nproperty float rot_3\nend_header\n"
-                 "1 2 3 255 0 51 inf 0 0 0 1 0 0 0\n1 2 3 0 0 0 -Infinity 0 -INF 1e3 0 0 0 0\n"
-                 "nan 2 3 0 0 0 1 0 0 0 1 0 0 0\n1 2 3 0 0 0 NaN 0 0 0 1 0 0 0\n.5 -5.E-1 +1e999 0 0 0 1 0 0 0 1 0 0 0\n");
+    text(&other,
+         "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float opacity\nproperty "
+         "float scale_0\n"
+         "property float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\n"
+         "property float rot_2\nproperty float rot_3\nend_header\n"
+         "1 2 3 255 0 51 inf 0 0 0 1 0 0 0\n1 2 3 0 0 0 -Infinity 0 -INF 1e3 0 0 0 0\n"
+         "nan 2 3 0 0 0 1 0 0 0 1 0 0 0\n1 2 3 0 0 0 NaN 0 0 0 1 0 0 0\n.5 -5.E-1 +1e999 0 0 0 1 0 0 0 1 0 0 "
+         "0\n");
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
         view = ssdgs_model_get(back);
         CHECK(view.count == 2 && stats.dropped == 3 && stats.zero_rotations == 1);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 2);
-        CHECK(view.gaussians[SSDGS_OPACITY * view.stride] == 20 && view.gaussians[SSDGS_OPACITY * view.stride + 1] == -20);
+        CHECK(view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
+              view.gaussians[SSDGS_OPACITY * view.stride + 1] == -20);
         CHECK(view.gaussians[SSDGS_ROTATION * view.stride + 1] == 1);
         CHECK(view.gaussians[(SSDGS_LOG_SCALE + 1) * view.stride + 1] == -20);
         CHECK(fabs(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) - 1) < 1e-6);
@@ -457,7 +505,8 @@ static int tells(const bytes *file, ssdgs_load_stats *stats, const char *words) 
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     told[0] = 0;
-    good = !ssdgs_context_create(&desc, &other) && !ssdgs_model_load_memory(other, file->data, file->size, &model, stats) &&
+    good = !ssdgs_context_create(&desc, &other) &&
+           !ssdgs_model_load_memory(other, file->data, file->size, &model, stats) &&
            (words ? strstr(told, words) != NULL : !told[0]);
     if (!good) printf("    wanted \"%s\", got \"%s\"\n", words ? words : "", told);
     ssdgs_model_destroy(model);
@@ -465,7 +514,8 @@ static int tells(const bytes *file, ssdgs_load_stats *stats, const char *words) 
     return good;
 }
 
-/* A model that lost what an editor drops is told, whichever part it lost, and is whole again once given it back. */
+/* A model that lost what an editor drops is told, whichever part it lost, and is whole again once given it
+   back. */
 static void test_edited(void) {
     ssdgs_model *model = make_model(9), *back = NULL, *baked = NULL;
     ssdgs_settings settings = ssdgs_settings_default();
@@ -477,8 +527,10 @@ static void test_edited(void) {
     CHECK(tells(&file, &stats, NULL) && !stats.untrained);
     cut.tables = 1;
     other = emit(&cut, &v);
-    CHECK(tells(&other, &stats, "has no settings, as editors of splats drop them") && stats.untrained == 1 && !stats.plain);
-    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && stats.untrained == 1 && !same_globals(model, back));
+    CHECK(tells(&other, &stats, "has no settings, as editors of splats drop them") && stats.untrained == 1 &&
+          !stats.plain);
+    CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && stats.untrained == 1 &&
+          !same_globals(model, back));
     memory.calls = 0;
     memory.fail_at = 1;
     CHECK(ssdgs_model_adopt(back, model) == SSDGS_ERR_MEMORY && !same_globals(model, back));
@@ -486,7 +538,8 @@ static void test_edited(void) {
     CHECK(ssdgs_model_adopt(back, model) == SSDGS_OK && same(model, back));
     settings.baked = 1;
     CHECK(ssdgs_model_create(context, &settings, 1, &baked) == SSDGS_OK);
-    CHECK(ssdgs_model_adopt(back, baked) == SSDGS_ERR_ARGUMENT && ssdgs_model_adopt(baked, model) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_adopt(back, baked) == SSDGS_ERR_ARGUMENT &&
+          ssdgs_model_adopt(baked, model) == SSDGS_ERR_ARGUMENT);
     CHECK(strstr(ssdgs_error_message(context), "a baked model has no networks") && same(model, back));
     ssdgs_model_destroy(baked);
     ssdgs_model_destroy(back);
@@ -496,7 +549,8 @@ static void test_edited(void) {
     free(file.data);
 }
 
-#define PLAIN "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n" \
+#define PLAIN \
+    "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n" \
     "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n"
 #define POINT "1 2 3 0 0 0 0 1 0 0 0 "
 
@@ -512,7 +566,9 @@ static bytes ascii(const char *count, const char *properties, const char *rows) 
 }
 
 static void test_words(void) {
-    static const struct { const char *type, *row; } colours[4] = {
+    static const struct {
+        const char *type, *row;
+    } colours[4] = {
         {"uchar", "51 0 255"}, {"ushort", "13107 0 65535"}, {"float", "0.2 0 1"}, {"double", "0.2 -1 1"}};
     static const double want[3] = {0.2, 0, 1};
     ssdgs_load_stats stats;
@@ -522,38 +578,45 @@ static void test_words(void) {
     size_t k;
     int c, kind;
     for (k = 0; k < 4; k++) {
-        sprintf(properties, "property %s red\nproperty %s green\nproperty %s blue\n", colours[k].type, colours[k].type, colours[k].type);
+        sprintf(properties, "property %s red\nproperty %s green\nproperty %s blue\n", colours[k].type,
+                colours[k].type, colours[k].type);
         sprintf(rows, POINT "%s\n", colours[k].row);
         b = ascii("1", properties, rows);
         CHECK(tells(&b, &stats, "plain splats, which have their colours baked in") && stats.plain);
         model = NULL;
         CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK);
         for (c = 0; c < 3 && model; c++)
-            CHECK(fabs(log1p(exp((double)model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity])) - want[c]) < 2e-6);
+            CHECK(fabs(log1p(exp((double)model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity])) -
+                       want[c]) < 2e-6);
         ssdgs_model_destroy(model);
         free(b.data);
     }
     b = ascii("1", "property int red\nproperty int green\nproperty int blue\n", POINT "1 1 1\n");
     CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "lacks property f_dc_0"));
     free(b.data);
-    b = ascii("3", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n", POINT "0 0 0\nnan " POINT "0 0\n" POINT "nan 0 0\n");
+    b = ascii("3", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n",
+              POINT "0 0 0\nnan " POINT "0 0\n" POINT "nan 0 0\n");
     CHECK(tells(&b, &stats, "2 Gaussians of 3 are left out") && stats.dropped == 2);
     free(b.data);
     b = ascii("0", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n", "");
     CHECK(tells(&b, &stats, "holds no Gaussians"));
     free(b.data);
     b = ascii("1", "property uint packed_position\n", POINT "1\n");
-    CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "a compressed PLY (packed_position): convert it"));
+    CHECK(refused(b.data, b.size) &&
+          strstr(ssdgs_error_message(context), "a compressed PLY (packed_position): convert it"));
     free(b.data);
-    CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+    CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                       "y\nproperty float z\nproperty uchar red\n"
                        "property uchar green\nproperty uchar blue\nend_header\n1 2 3 4 5 6\n") &&
           strstr(ssdgs_error_message(context), "lacks property opacity: these are no Gaussian splats"));
-    CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\n") && strstr(ssdgs_error_message(context), "the file ends within the header"));
+    CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\n") &&
+          strstr(ssdgs_error_message(context), "the file ends within the header"));
     for (kind = 0; kind < 3; kind++) { /* one long comment, many, too much of them */
         bytes longer = {NULL, 0, 0};
         text(&longer, "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n");
         text(&longer, "comment ");
-        for (k = 0; k < (kind == 2 ? 1100000 : 70000); k++) text(&longer, kind == 1 && k % 100 == 99 ? "\ncomment " : "x");
+        for (k = 0; k < (kind == 2 ? 1100000 : 70000); k++)
+            text(&longer, kind == 1 && k % 100 == 99 ? "\ncomment " : "x");
         text(&longer, "\n");
         put(&longer, "", 1);
         b = ascii("1", (const char *)longer.data, POINT "0 0 0\n");
@@ -566,7 +629,8 @@ static void test_words(void) {
     }
 }
 
-/* Far from 0 files hold positions as doubles, in the coordinates of the dataset; they come back to 1e-9 of what they were. */
+/* Far from 0 files hold positions as doubles, in the coordinates of the dataset; they come back to 1e-9 of
+   what they were. */
 static void test_origin(void) {
     const ssdgs_real origin[3] = {5000000, -650000, (ssdgs_real)0.5};
     ssdgs_settings settings;
@@ -579,12 +643,14 @@ static void test_origin(void) {
     memcpy(settings.origin, origin, sizeof origin);
     CHECK(ssdgs_model_create(context, &settings, 7, &model) == SSDGS_OK);
     for (c = 0; c < SSDGS_CHANNELS; c++)
-        memcpy(model->gaussians + (size_t)c * model->capacity, home->gaussians + (size_t)c * home->capacity, 7 * sizeof(ssdgs_real));
+        memcpy(model->gaussians + (size_t)c * model->capacity, home->gaussians + (size_t)c * home->capacity,
+               7 * sizeof(ssdgs_real));
     memcpy(model->globals, home->globals, home->global_count * sizeof(ssdgs_real));
     file = saved(model);
     put(&file, "", 1);
     header = (const char *)file.data;
-    CHECK(strstr(header, "property double x\nproperty double y\nproperty double z\nproperty float nx\n") != NULL);
+    CHECK(strstr(header, "property double x\nproperty double y\nproperty double z\nproperty float nx\n") !=
+          NULL);
     at = (size_t)(strstr(header, "end_header\n") + 11 - header);
     for (c = 0; c < 3; c++) {
         uint64_t bits = 0;
@@ -609,14 +675,17 @@ static void test_origin(void) {
         put(&cut, header, (size_t)(end - header));
         text(&cut, "end_header\n");
         put(&cut, body, file.size - 1 - at);
-        CHECK(load(cut.data, cut.size, &back, NULL) == SSDGS_OK && back && ssdgs_model_adopt(back, model) == SSDGS_OK);
+        CHECK(load(cut.data, cut.size, &back, NULL) == SSDGS_OK && back &&
+              ssdgs_model_adopt(back, model) == SSDGS_OK);
         for (c = 0; c < 3 && back; c++)
-            CHECK(fabs((double)back->gaussians[(size_t)c * back->capacity + 6] - (double)model->gaussians[(size_t)c * model->capacity + 6]) < 1e-6);
+            CHECK(fabs((double)back->gaussians[(size_t)c * back->capacity + 6] -
+                       (double)model->gaussians[(size_t)c * model->capacity + 6]) < 1e-6);
         ssdgs_model_destroy(back);
         free(cut.data);
     }
     free(file.data);
-    for (format = ASCII; format <= LITTLE; format++) { /* doubles and floats of others, and given back to one without an origin */
+    for (format = ASCII; format <= LITTLE;
+         format++) { /* doubles and floats of others, and given back to one without an origin */
         file = saved(home);
         {
             document d = parse(&file);
@@ -665,9 +734,12 @@ static void test_mending(void) {
         const ssdgs_model_view now = ssdgs_model_get(back);
         CHECK(now.count == 6 && stats.dropped == 2 && stats.zero_rotations == 2);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 1);
-        CHECK(now.gaussians[SSDGS_ROTATION * now.stride] == 1 && now.gaussians[SSDGS_FRAME * now.stride + 1] == 1);
-        CHECK(now.gaussians[(SSDGS_ROTATION + 2) * now.stride + 4] > 0 && now.gaussians[(SSDGS_FRAME + 3) * now.stride + 4] < 0);
-        CHECK(now.gaussians[SSDGS_OPACITY * now.stride + 2] == 20 && now.gaussians[SSDGS_OPACITY * now.stride + 3] == -20);
+        CHECK(now.gaussians[SSDGS_ROTATION * now.stride] == 1 &&
+              now.gaussians[SSDGS_FRAME * now.stride + 1] == 1);
+        CHECK(now.gaussians[(SSDGS_ROTATION + 2) * now.stride + 4] > 0 &&
+              now.gaussians[(SSDGS_FRAME + 3) * now.stride + 4] < 0);
+        CHECK(now.gaussians[SSDGS_OPACITY * now.stride + 2] == 20 &&
+              now.gaussians[SSDGS_OPACITY * now.stride + 3] == -20);
         CHECK(now.gaussians[SSDGS_LOG_SCALE * now.stride + 3] == -20);
         CHECK(now.gaussians[SSDGS_POSITION * now.stride + 5] == view.gaussians[SSDGS_POSITION * stride + 6]);
     }
@@ -687,15 +759,39 @@ static void test_mending(void) {
 }
 
 static void test_numbers(void) {
-    static const struct { const char *text; int good; uint32_t bits; } cases[] = {
-        {"0", 1, 0}, {"-0", 1, 0x80000000u}, {"1", 1, 0x3f800000u}, {"+1.", 1, 0x3f800000u}, {".5", 1, 0x3f000000u},
-        {"16777217", 1, 0x4b800000u}, {"16777219", 1, 0x4b800002u}, {"3.4028235e38", 1, 0x7f7fffffu}, {"1e39", 1, 0x7f800000u},
-        {"-1E+999999999999", 1, 0xff800000u}, {"1e-999999999999", 1, 0}, {"0e5", 1, 0}, {"inf", 1, 0x7f800000u},
-        {"-Infinity", 1, 0xff800000u}, {"nan", 1, 0x7fc00000u}, {"100000000000000000000000000000e-29", 1, 0x3f800000u},
-        {"0.00000000000000000000000000000000000000001e41", 1, 0x3f800000u}, {"", 0, 0}, {"-", 0, 0}, {".", 0, 0}, {"e5", 0, 0},
-        {"1e", 0, 0}, {"1e+", 0, 0}, {"1.2.3", 0, 0}, {"0x10", 0, 0}, {"1,5", 0, 0}, {"infinit", 0, 0}, {"nanx", 0, 0},
-        {"--1", 0, 0}
-    };
+    static const struct {
+        const char *text;
+        int good;
+        uint32_t bits;
+    } cases[] = {{"0", 1, 0},
+                 {"-0", 1, 0x80000000u},
+                 {"1", 1, 0x3f800000u},
+                 {"+1.", 1, 0x3f800000u},
+                 {".5", 1, 0x3f000000u},
+                 {"16777217", 1, 0x4b800000u},
+                 {"16777219", 1, 0x4b800002u},
+                 {"3.4028235e38", 1, 0x7f7fffffu},
+                 {"1e39", 1, 0x7f800000u},
+                 {"-1E+999999999999", 1, 0xff800000u},
+                 {"1e-999999999999", 1, 0},
+                 {"0e5", 1, 0},
+                 {"inf", 1, 0x7f800000u},
+                 {"-Infinity", 1, 0xff800000u},
+                 {"nan", 1, 0x7fc00000u},
+                 {"100000000000000000000000000000e-29", 1, 0x3f800000u},
+                 {"0.00000000000000000000000000000000000000001e41", 1, 0x3f800000u},
+                 {"", 0, 0},
+                 {"-", 0, 0},
+                 {".", 0, 0},
+                 {"e5", 0, 0},
+                 {"1e", 0, 0},
+                 {"1e+", 0, 0},
+                 {"1.2.3", 0, 0},
+                 {"0x10", 0, 0},
+                 {"1,5", 0, 0},
+                 {"infinit", 0, 0},
+                 {"nanx", 0, 0},
+                 {"--1", 0, 0}};
     size_t k;
     int wrong = 0;
     for (k = 0; k < sizeof cases / sizeof *cases; k++) {
@@ -703,7 +799,9 @@ static void test_numbers(void) {
         double value = 0;
         token.text = (const unsigned char *)cases[k].text;
         token.length = strlen(cases[k].text);
-        if (ssdgs__ply_number(token, &value) == cases[k].good && (!cases[k].good || ssdgs__ply_bits(value) == cases[k].bits)) continue;
+        if (ssdgs__ply_number(token, &value) == cases[k].good &&
+            (!cases[k].good || ssdgs__ply_bits(value) == cases[k].bits))
+            continue;
         printf("%s gives %08x\n", cases[k].text, (unsigned)ssdgs__ply_bits(value));
         wrong++;
     }
@@ -726,30 +824,47 @@ static void test_numbers(void) {
 
 static void test_hostile(void) {
     static const char *const attacks[] = {
-        "", "p", "ply", "ply\n", "PLY\nformat ascii 1.0\nend_header\n", "plyx\nformat ascii 1.0\nend_header\n",
-        "ply\nend_header\n", "ply\nformat ascii 1.0\nelement vertex 0\n", START "end_header\n",
-        START "element vertex 0\nend_header\n", "ply\nformat ascii 2.0\nend_header\n", "ply\nformat binary 1.0\nend_header\n",
-        START "format ascii 1.0\nend_header\n", START "element vertex -1\n" XYZ "end_header\n",
-        START "element vertex 1e9\n" XYZ "end_header\n", START "element vertex 18446744073709551616\n" XYZ "end_header\n",
+        "",
+        "p",
+        "ply",
+        "ply\n",
+        "PLY\nformat ascii 1.0\nend_header\n",
+        "plyx\nformat ascii 1.0\nend_header\n",
+        "ply\nend_header\n",
+        "ply\nformat ascii 1.0\nelement vertex 0\n",
+        START "end_header\n",
+        START "element vertex 0\nend_header\n",
+        "ply\nformat ascii 2.0\nend_header\n",
+        "ply\nformat binary 1.0\nend_header\n",
+        START "format ascii 1.0\nend_header\n",
+        START "element vertex -1\n" XYZ "end_header\n",
+        START "element vertex 1e9\n" XYZ "end_header\n",
+        START "element vertex 18446744073709551616\n" XYZ "end_header\n",
         START "element vertex 9223372036854775808\n" XYZ "end_header\n",
-        START "element vertex 1537228672809129302\n" XYZ "end_header\n", START "element vertex 4000000000\n" XYZ "end_header\n",
-        START "element vertex\n" XYZ "end_header\n", START "element vertex 1 2\n" XYZ "end_header\n", START XYZ "end_header\n",
+        START "element vertex 1537228672809129302\n" XYZ "end_header\n",
+        START "element vertex 4000000000\n" XYZ "end_header\n",
+        START "element vertex\n" XYZ "end_header\n",
+        START "element vertex 1 2\n" XYZ "end_header\n",
+        START XYZ "end_header\n",
         START "element vertex 0x10\n" XYZ "end_header\n",
         START "element vertex 0\nproperty float x\nproperty float x\nend_header\n",
-        START "element vertex 0\nelement vertex 0\nend_header\n", START "element vertex 0\nproperty half x\nend_header\n",
+        START "element vertex 0\nelement vertex 0\nend_header\n",
+        START "element vertex 0\nproperty half x\nend_header\n",
         START "element vertex 0\nproperty list float int x\nend_header\n",
-        START "element vertex 0\nproperty list uchar x\nend_header\n", START "\nelement vertex 0\nend_header\n",
-        START "vertex 0\nend_header\n", START "element vertex 0\nend_header now\n",
+        START "element vertex 0\nproperty list uchar x\nend_header\n",
+        START "\nelement vertex 0\nend_header\n",
+        START "vertex 0\nend_header\n",
+        START "element vertex 0\nend_header now\n",
         START "element face 1\nproperty list char int x\nend_header\n\377abcdefghijkl",
         START "element face 1\nproperty list int int x\nend_header\n\377\377\377\377abcdefghijkl",
         START "element face 1\nproperty list uint double x\nend_header\n\377\377\377\377abcdefghijkl",
         START "element face 9\nproperty list uchar double x\nend_header\n\001abcdefgh",
         "ply\nformat ascii 1.0\nelement vertex 1000000000\n" XYZ "end_header\n1 2 3\n",
         "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n-1 2 3\n",
-        "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n99999999999999999999 2 3\n",
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n99999999999999999999 2 "
+        "3\n",
         "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n3 1 2\n",
-        START "element vertex 18446744073709551615\nend_header\n"
-    };
+        START "element vertex 18446744073709551615\nend_header\n"};
     bytes b = {NULL, 0, 0};
     char line[64];
     size_t k;
@@ -789,7 +904,8 @@ static void test_damage(void) {
             ssdgs_model_destroy(back);
             bad += format == ASCII ? k + 20 < other.size && cut == SSDGS_OK : cut == SSDGS_OK;
             other.data[k] = (unsigned char)(k % 3 ? good ^ 1u << (random_bits() >> 29) : random_bits() >> 24);
-            if (load(other.data, other.size, &back, NULL) != SSDGS_OK) bad += back != NULL || !ssdgs_error_message(context)[0];
+            if (load(other.data, other.size, &back, NULL) != SSDGS_OK)
+                bad += back != NULL || !ssdgs_error_message(context)[0];
             ssdgs_model_destroy(back);
             other.data[k] = good;
         }
@@ -817,7 +933,8 @@ static void test_memory(void) {
     bytes file = saved(model);
     const long live = memory.live;
     int what;
-    for (what = 0; what < 6; what++) { /* load from memory, from a file, save; one failure, failing from then on */
+    for (what = 0; what < 6;
+         what++) { /* load from memory, from a file, save; one failure, failing from then on */
         int n, done = 0;
         for (n = 1; n < 100 && !done; n++) {
             ssdgs_result result;
@@ -825,18 +942,21 @@ static void test_memory(void) {
             memory.calls = 0;
             memory.fail_at = n;
             memory.for_ever = what % 2;
-            result = what / 2 == 0 ? load(file.data, file.size, &back, NULL)
-                   : what / 2 == 1 ? ssdgs_model_load(context, path, &back, NULL) : ssdgs_model_save(model, path);
+            result = what / 2 == 0   ? load(file.data, file.size, &back, NULL)
+                     : what / 2 == 1 ? ssdgs_model_load(context, path, &back, NULL)
+                                     : ssdgs_model_save(model, path);
             memory.fail_at = 0;
             done = memory.calls < n;
-            CHECK(done ? result == SSDGS_OK && (what / 2 == 2 || same(model, back)) : result == SSDGS_ERR_MEMORY && !back);
+            CHECK(done ? result == SSDGS_OK && (what / 2 == 2 || same(model, back))
+                       : result == SSDGS_ERR_MEMORY && !back);
             ssdgs_model_destroy(back);
             CHECK(memory.live == live);
         }
         CHECK(done && n > 2);
     }
     CHECK(temporaries() == 0);
-    CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK && same(model, back)); /* the context still works */
+    CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK &&
+          same(model, back)); /* the context still works */
     ssdgs_model_destroy(back);
     ssdgs_model_destroy(model);
     free(file.data);
@@ -850,7 +970,8 @@ static void test_disk(void) {
     CHECK(strstr(ssdgs_error_message(context), "build/t_ply.none/t_ply.ply"));
     CHECK(ssdgs_model_load(context, "build/t_ply.absent", &back, NULL) == SSDGS_ERR_IO && !back);
     CHECK(ssdgs_model_load(context, "build", &back, NULL) != SSDGS_OK && !back);
-    CHECK(ssdgs_model_save(NULL, path) == SSDGS_ERR_ARGUMENT && ssdgs_model_save(model, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_save(NULL, path) == SSDGS_ERR_ARGUMENT &&
+          ssdgs_model_save(model, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_load(context, NULL, &back, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_load(NULL, path, &back, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_load_memory(context, NULL, 0, &back, NULL) == SSDGS_ERR_ARGUMENT);
@@ -899,20 +1020,24 @@ static int found(ssdgs_model *a, int i, ssdgs_model *b) {
     int j, channel, count = 0;
     for (j = 0; j < v.count; j++) {
         for (channel = 0; channel < SSDGS_CHANNELS; channel++)
-            if (u.gaussians[(size_t)channel * u.stride + (size_t)i] != v.gaussians[(size_t)channel * v.stride + (size_t)j]) break;
+            if (u.gaussians[(size_t)channel * u.stride + (size_t)i] !=
+                v.gaussians[(size_t)channel * v.stride + (size_t)j])
+                break;
         count += channel == SSDGS_CHANNELS;
     }
     return count;
 }
 
-/* Gaussians in no order come sorted, all of them; those in order, few ones and baked ones come as they are. */
+/* Gaussians in no order come sorted, all of them; those in order, few ones and baked ones come as they
+   are. */
 static void test_order(void) {
     enum { MANY = 1500, FEW = 1000 };
     ssdgs_model *model = make_model(MANY), *back = NULL, *again = NULL, *small = make_model(FEW);
     ssdgs_load_stats stats;
     bytes file = saved(model);
     int i, once = 0;
-    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 && same_globals(model, back));
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 &&
+          same_globals(model, back));
     for (i = 0; i < MANY; i++) once += found(model, i, back) == 1;
     CHECK(once == MANY && ssdgs_model_get(back).count == MANY && mean_step(back) < 0.25 * mean_step(model));
     free(file.data);
@@ -924,7 +1049,8 @@ static void test_order(void) {
     ssdgs_model_destroy(back);
     file = saved(small);
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && !stats.sorted && same(small, back));
-    CHECK(ssdgs_model_sort(small) == SSDGS_OK && !same(small, back) && mean_step(small) < 0.25 * mean_step(back));
+    CHECK(ssdgs_model_sort(small) == SSDGS_OK && !same(small, back) &&
+          mean_step(small) < 0.25 * mean_step(back));
     ssdgs_model_destroy(back);
     ssdgs_model_destroy(small);
     free(file.data);
@@ -935,9 +1061,12 @@ static void test_order(void) {
     free(file.data);
     ssdgs_model_destroy(model);
     model = make_model(MANY);
-    for (i = 0; i < MANY; i++) model->gaussians[i] += (ssdgs_real)(100 * (4 * i / MANY)); /* four objects far apart, each in no order */
+    for (i = 0; i < MANY; i++)
+        model->gaussians[i] +=
+            (ssdgs_real)(100 * (4 * i / MANY)); /* four objects far apart, each in no order */
     file = saved(model);
-    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 && mean_step(back) < 0.5 * mean_step(model));
+    CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 &&
+          mean_step(back) < 0.5 * mean_step(model));
     ssdgs_model_destroy(back);
     free(file.data);
     ssdgs_model_destroy(model);

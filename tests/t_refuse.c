@@ -1,22 +1,49 @@
-/* What makes no sense is refused and named: every setting and option just outside of its range, and NaN; every argument that is
-   missing. The ends of the ranges are taken. */
+/* What makes no sense is refused and named: every setting and option just outside of its range, and NaN;
+   every argument that is missing. The ends of the ranges are taken. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
 
-typedef struct field { const char *name; size_t at; int real; double low, high; } field;
-#define WHOLE(type, name, low, high) {#name, offsetof(type, name), 0, low, high}
-#define REAL(type, name, low, high) {#name, offsetof(type, name), 1, low, high}
+typedef struct field {
+    const char *name;
+    size_t at;
+    int real;
+    double low, high;
+} field;
+#define WHOLE(type, name, low, high) \
+    { #name, offsetof(type, name), 0, low, high }
+#define REAL(type, name, low, high) \
+    { #name, offsetof(type, name), 1, low, high }
 
 static const field settings_fields[] = {
 #define I(name, low, high) WHOLE(ssdgs_settings, name, low, high)
 #define R(name, low, high) REAL(ssdgs_settings, name, low, high)
-    I(terms, 0, 15), I(baked, 0, 1), I(transfer, 0, 1), I(dipole, 0, 3), I(asg, 0, 2), I(per_channel_optics, 0, 1),
-    I(depth_cue, 0, 1), I(transport, 0, 1), I(residual_shadow, 0, 1), I(shadow_on_scattering, 0, 1), I(scattering_layers, 2, 16),
-    I(scattering_width, 1, 1024), I(view_octaves, 0, 8), I(light_octaves, 0, 8), I(shadow_layers, 0, 16),
-    I(shadow_width, 1, 1024), I(light_blur, 0, 1), I(light_map_size, 0, 8192), R(light_bias, 0, 1e30),
-    R(pixel_variance, 0.01, 10), R(eta, 1, 2.5), R(length_unit, 1e-15, 1e15), R(light_scale, 0, 1e30), R(centre[0], -1e30, 1e30),
-    R(centre[1], -1e30, 1e30), R(centre[2], -1e30, 1e30)
+    I(terms, 0, 15),
+    I(baked, 0, 1),
+    I(transfer, 0, 1),
+    I(dipole, 0, 3),
+    I(asg, 0, 2),
+    I(per_channel_optics, 0, 1),
+    I(depth_cue, 0, 1),
+    I(transport, 0, 1),
+    I(residual_shadow, 0, 1),
+    I(shadow_on_scattering, 0, 1),
+    I(scattering_layers, 2, 16),
+    I(scattering_width, 1, 1024),
+    I(view_octaves, 0, 8),
+    I(light_octaves, 0, 8),
+    I(shadow_layers, 0, 16),
+    I(shadow_width, 1, 1024),
+    I(light_blur, 0, 1),
+    I(light_map_size, 0, 8192),
+    R(light_bias, 0, 1e30),
+    R(pixel_variance, 0.01, 10),
+    R(eta, 1, 2.5),
+    R(length_unit, 1e-15, 1e15),
+    R(light_scale, 0, 1e30),
+    R(centre[0], -1e30, 1e30),
+    R(centre[1], -1e30, 1e30),
+    R(centre[2], -1e30, 1e30)
 #undef I
 #undef R
 };
@@ -29,12 +56,33 @@ static const field train_fields[] = {
 #define I(name, low, high) WHOLE(ssdgs_train_options, name, low, high)
 #define R(name, low, high) REAL(ssdgs_train_options, name, low, high)
 #define RATE(name) R(name.start, 0, 1e30), R(name.end, 0, 1e30)
-    I(iterations, 1, 100000000), I(schedule, 0, 3), I(max_gaussians, 1, 1 << 28), I(densify_every, 1, 2000000000),
-    I(opacity_reset_every, 0, 2000000000), R(dssim, 0, 1), R(normal_weight, 0, 1e30), R(densify_gradient, 0, 1e30), R(densify_size, 1e-30, 1e30),
-    R(densify_shadow, 0, 1e30), R(prune_opacity, 1e-30, 0.999), R(prune_weight, 0, 1e30), R(prune_outside, 0, 1), R(opacity_fade, 0, 1e30),
+    I(iterations, 1, 100000000),
+    I(schedule, 0, 3),
+    I(max_gaussians, 1, 1 << 28),
+    I(densify_every, 1, 2000000000),
+    I(opacity_reset_every, 0, 2000000000),
+    R(dssim, 0, 1),
+    R(normal_weight, 0, 1e30),
+    R(densify_gradient, 0, 1e30),
+    R(densify_size, 1e-30, 1e30),
+    R(densify_shadow, 0, 1e30),
+    R(prune_opacity, 1e-30, 0.999),
+    R(prune_weight, 0, 1e30),
+    R(prune_outside, 0, 1),
+    R(opacity_fade, 0, 1e30),
     R(adam_epsilon, 0, 1e30),
-    RATE(position), RATE(opacity), RATE(scale), RATE(rotation), RATE(color), RATE(asg), RATE(frame), RATE(material), RATE(shadow), RATE(scattering),
-    RATE(camera_rate), RATE(light_rate)
+    RATE(position),
+    RATE(opacity),
+    RATE(scale),
+    RATE(rotation),
+    RATE(color),
+    RATE(asg),
+    RATE(frame),
+    RATE(material),
+    RATE(shadow),
+    RATE(scattering),
+    RATE(camera_rate),
+    RATE(light_rate)
 #undef I
 #undef R
 };
@@ -79,8 +127,12 @@ static ssdgs_result make_trainer(void) {
 static void check_ranges(const field *f, size_t count, void *options, ssdgs_result (*use)(void)) {
     for (; count--; f++) {
         unsigned char *at = (unsigned char *)options + f->at, kept[sizeof(ssdgs_real)];
-        const double below = !f->real ? f->low - 1 : f->low > 0 ? f->low / 2 : f->low < 0 ? f->low * 1.01 : -1e-3;
-        const double values[5] = {f->low, f->high, below, f->real ? f->high * 1.01 : f->high + 1, f->real ? (double)NAN : f->low - 1};
+        const double below = !f->real     ? f->low - 1
+                             : f->low > 0 ? f->low / 2
+                             : f->low < 0 ? f->low * 1.01
+                                          : -1e-3;
+        const double values[5] = {f->low, f->high, below, f->real ? f->high * 1.01 : f->high + 1,
+                                  f->real ? (double)NAN : f->low - 1};
         int i;
         memcpy(kept, at, sizeof kept);
         for (i = 0; i < 5; i++) {
@@ -88,8 +140,10 @@ static void check_ranges(const field *f, size_t count, void *options, ssdgs_resu
             const int whole = f->real ? 0 : (int)values[i];
             if (f->real) memcpy(at, &real, sizeof real);
             else memcpy(at, &whole, sizeof whole);
-            if (!CHECK(i < 2 ? !use() : use() == SSDGS_ERR_ARGUMENT &&
-                       strstr(ssdgs_error_message(context), strchr(f->name, '.') ? ": rates " : f->name)))
+            if (!CHECK(i < 2 ? !use()
+                             : use() == SSDGS_ERR_ARGUMENT &&
+                                   strstr(ssdgs_error_message(context),
+                                          strchr(f->name, '.') ? ": rates " : f->name)))
                 printf("    %s = %g: %s\n", f->name, values[i], ssdgs_error_message(context));
         }
         memcpy(at, kept, sizeof kept);
@@ -105,26 +159,32 @@ static void test_bounds(void) {
             if (k == 1) train_options.bounds_min[i] = (ssdgs_real)NAN;
             if (k == 2) train_options.bounds_max[i] = (ssdgs_real)HUGE_VAL;
             if (k == 3) train_options.background[i] = (ssdgs_real)NAN;
-            CHECK(make_trainer() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), k < 3 ? "bounds_min" : "background"));
+            CHECK(make_trainer() == SSDGS_ERR_ARGUMENT &&
+                  strstr(ssdgs_error_message(context), k < 3 ? "bounds_min" : "background"));
             train_options = kept;
         }
     for (k = 0; k < 4; k++) { /* lengths that a model's file could not hold */
         const ssdgs_train_options kept = train_options;
         for (i = 0; i < 3; i++) {
             train_options.bounds_min[i] = 0;
-            train_options.bounds_max[i] = (ssdgs_real)(k == 0 ? 1e-15 : k == 1 ? 3e-15 : k == 2 ? 1e15 : 3e15);
+            train_options.bounds_max[i] = (ssdgs_real)(k == 0   ? 1e-15
+                                                       : k == 1 ? 3e-15
+                                                       : k == 2 ? 1e15
+                                                                : 3e15);
         }
-        CHECK(k == 1 || k == 2 ? !make_trainer() : make_trainer() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), "longest side"));
+        CHECK(k == 1 || k == 2 ? !make_trainer()
+                               : make_trainer() == SSDGS_ERR_ARGUMENT &&
+                                     strstr(ssdgs_error_message(context), "longest side"));
         train_options = kept;
     }
 }
 
 #define MISSING(call) CHECK((call) == SSDGS_ERR_ARGUMENT)
 
-#define SAYS(call, words)                                                                              \
-    do {                                                                                               \
-        CHECK((call) != SSDGS_OK);                                                                     \
-        if (!CHECK(strstr(ssdgs_error_message(context), words))) puts(ssdgs_error_message(context));   \
+#define SAYS(call, words) \
+    do { \
+        CHECK((call) != SSDGS_OK); \
+        if (!CHECK(strstr(ssdgs_error_message(context), words))) puts(ssdgs_error_message(context)); \
     } while (0)
 
 /* What was refused is named: which photograph, which light, which value. */
@@ -140,14 +200,16 @@ static void test_messages(void) {
     int i;
     for (i = 0; i < 3; i++) shots[i] = photo;
     shots[2].camera.view[3] = (ssdgs_real)NAN;
-    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 2: camera: view[3] is not finite");
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer),
+         "photograph 2: camera: view[3] is not finite");
     shots[2] = photo;
     shots[1].light.intensity[1] = -1;
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: light 0: intensity[1] = -1");
     shots[1] = photo;
     shots[1].pixels = NULL;
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: it has no pixels");
-    SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics), "photograph: it has no pixels");
+    SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics),
+         "photograph: it has no pixels");
     shots[1] = photo;
     memcpy(&shots[1].format, &numbers[0], sizeof numbers[0]); /* C++ has no such conversion */
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: format = 2");
@@ -158,21 +220,25 @@ static void test_messages(void) {
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
     SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "ssdgs_compare: reference is NULL");
     options.prune_opacity = 0;
-    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "prune_opacity = 0 is not within 1e-30 .. 0.999");
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer),
+         "prune_opacity = 0 is not within 1e-30 .. 0.999");
     options = train_options;
     options.dssim = (ssdgs_real)-1.5e20;
     SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "dssim = -1.5e20 is");
     options = train_options;
     options.bounds_max[0] = (ssdgs_real)INFINITY;
-    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "bounds_max[0] = infinite: they must be finite");
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer),
+         "bounds_max[0] = infinite: they must be finite");
     CHECK(!trainer);
     wrong.scattering_layers = 500; /* more than any array of them has */
-    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 4) > 0 && !ssdgs_train_memory(&wrong, &train_options, 4, 4));
+    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 4) > 0 &&
+          !ssdgs_train_memory(&wrong, &train_options, 4, 4));
     wrong = settings;
     wrong.version = 0;
     options = train_options;
     options.version = -3;
-    CHECK(!ssdgs_train_memory(&wrong, &train_options, 4, 4) && !ssdgs_train_memory(&settings, &options, 4, 4));
+    CHECK(!ssdgs_train_memory(&wrong, &train_options, 4, 4) &&
+          !ssdgs_train_memory(&settings, &options, 4, 4));
 }
 
 static void test_missing(void) {
@@ -191,8 +257,10 @@ static void test_missing(void) {
     ssdgs_context_destroy(NULL);
     ssdgs_model_destroy(NULL);
     ssdgs_trainer_destroy(NULL);
-    CHECK(*ssdgs_error_message(NULL) && *ssdgs_result_string(SSDGS_RESULT_COUNT) && *ssdgs_isa_string(SSDGS_ISA_COUNT));
-    CHECK(ssdgs_context_isa(NULL) == SSDGS_ISA_AUTO && !ssdgs_context_threads(NULL) && !ssdgs_model_settings(NULL));
+    CHECK(*ssdgs_error_message(NULL) && *ssdgs_result_string(SSDGS_RESULT_COUNT) &&
+          *ssdgs_isa_string(SSDGS_ISA_COUNT));
+    CHECK(ssdgs_context_isa(NULL) == SSDGS_ISA_AUTO && !ssdgs_context_threads(NULL) &&
+          !ssdgs_model_settings(NULL));
     CHECK(!ssdgs_model_get(NULL).count && !ssdgs_model_get(NULL).gaussians);
     MISSING(ssdgs_stage_cpu(NULL, SSDGS_STAGE_PROJECT));
     MISSING(ssdgs_model_create(NULL, NULL, 0, &made));
@@ -260,9 +328,12 @@ static void test_missing(void) {
     MISSING(ssdgs_trainer_load(trainer, NULL));
     ssdgs_trainer_destroy(trainer);
     CHECK(!ssdgs_train_memory(NULL, &train_options, 4, 4) && !ssdgs_train_memory(&settings, NULL, 4, 4));
-    CHECK(!ssdgs_train_memory(&settings, &train_options, 0, 4) && !ssdgs_train_memory(&settings, &train_options, 4, 0));
-    CHECK(ssdgs_train_memory(&settings, &train_options, 32768, 4) && !ssdgs_train_memory(&settings, &train_options, 32769, 4));
-    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 32768) && !ssdgs_train_memory(&settings, &train_options, 4, 32769));
+    CHECK(!ssdgs_train_memory(&settings, &train_options, 0, 4) &&
+          !ssdgs_train_memory(&settings, &train_options, 4, 0));
+    CHECK(ssdgs_train_memory(&settings, &train_options, 32768, 4) &&
+          !ssdgs_train_memory(&settings, &train_options, 32769, 4));
+    CHECK(ssdgs_train_memory(&settings, &train_options, 4, 32768) &&
+          !ssdgs_train_memory(&settings, &train_options, 4, 32769));
     settings.baked = 1;
     CHECK(!ssdgs_train_memory(&settings, &train_options, 4, 4));
     CHECK(!ssdgs_model_create(context, &settings, 0, &made));
@@ -292,7 +363,8 @@ int main(void) {
     settings = ssdgs_settings_default();
     render_options = ssdgs_render_options_default();
     train_options = ssdgs_train_options_default();
-    if (!CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 3, &model))) return 1;
+    if (!CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 3, &model)))
+        return 1;
     check_ranges(settings_fields, sizeof settings_fields / sizeof *settings_fields, &settings, make_model);
     check_ranges(render_fields, sizeof render_fields / sizeof *render_fields, &render_options, render);
     check_ranges(train_fields, sizeof train_fields / sizeof *train_fields, &train_options, make_trainer);

@@ -1,6 +1,6 @@
-/* Training under stress: spoiled gradients, degenerate photographs and cameras, explosion, extinction, soak, foreign states of
-   FPU and locale; one hash with FMA and one without, whatever the threads and the instruction set. A row per case; `t_soak full`
-   goes deeper, `t_soak full 61` runs one row. */
+/* Training under stress: spoiled gradients, degenerate photographs and cameras, explosion, extinction, soak,
+   foreign states of FPU and locale; one hash with FMA and one without, whatever the threads and the
+   instruction set. A row per case; `t_soak full` goes deeper, `t_soak full 61` runs one row. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -12,7 +12,8 @@
 #if defined(__unix__) || defined(__APPLE__)
 #include <pthread.h>
 #define POSIX_THREADS 1
-static pthread_mutex_t counting = PTHREAD_MUTEX_INITIALIZER; /* checks are counted by several threads at a time */
+static pthread_mutex_t counting =
+    PTHREAD_MUTEX_INITIALIZER; /* checks are counted by several threads at a time */
 static int locked_check(int ok, int line, const char *what) {
     pthread_mutex_lock(&counting);
     test_check(ok, __FILE__, line, what);
@@ -55,7 +56,8 @@ static uint64_t hash_model(ssdgs_model *model) {
     const ssdgs_model_view v = ssdgs_model_get(model);
     uint64_t hash = fnv(FNV_START, &v.count, sizeof v.count);
     size_t c;
-    for (c = 0; c < SSDGS_CHANNELS; c++) hash = fnv(hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        hash = fnv(hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     return fnv(hash, model->globals, model->global_count * sizeof(ssdgs_real));
 }
 
@@ -78,7 +80,9 @@ static double largest_parameter(ssdgs_model *model) {
 #define NAME(isa) ssdgs_isa_string((ssdgs_isa)(isa))
 #define ALL_FINITE(model) (largest_parameter(model) < 1e30)
 
-typedef struct meter { size_t live, peak, calls; } meter;
+typedef struct meter {
+    size_t live, peak, calls;
+} meter;
 
 static void *metered_allocate(void *user, size_t bytes) {
     meter *m = (meter *)user;
@@ -126,12 +130,15 @@ static ssdgs_model *new_truth(ssdgs_context *context) {
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(11, (uint64_t)(64 * i + c)) - 1;
             const int scale = c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY;
-            v.gaussians[(size_t)c * v.stride + (size_t)i] =
-                (ssdgs_real)(c < 3 ? 0.35 * u : scale ? 0.4 * u - 2.4 : c == SSDGS_OPACITY ? 2 + u : u);
+            v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(c < 3                ? 0.35 * u
+                                                                         : scale              ? 0.4 * u - 2.4
+                                                                         : c == SSDGS_OPACITY ? 2 + u
+                                                                                              : u);
         }
     for (i = 0; i < (int)v.scattering_count; i++) /* networks that have something to say */
         v.scattering[i] += (ssdgs_real)(0.2 * ssdgs__uniform(12, (uint64_t)i) - 0.1);
-    for (i = 0; i < (int)v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(13, (uint64_t)i) - 0.1);
+    for (i = 0; i < (int)v.shadow_count; i++)
+        v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(13, (uint64_t)i) - 0.1);
     return model;
 }
 
@@ -153,7 +160,9 @@ static void make_photos(int side) {
         ssdgs_real eye[3];
         for (c = 0; c < 3; c++) {
             eye[c] = (ssdgs_real)(c == 0 ? 2 * cos(angle) : c == 1 ? 2 * sin(angle) : i % 2 - 0.3);
-            photos[i].light.position[c] = (ssdgs_real)(c == 0 ? 2 * cos(angle + 0.8) : c == 1 ? 2 * sin(angle + 0.8) : 1);
+            photos[i].light.position[c] = (ssdgs_real)(c == 0   ? 2 * cos(angle + 0.8)
+                                                       : c == 1 ? 2 * sin(angle + 0.8)
+                                                                : 1);
             photos[i].light.intensity[c] = 12;
         }
         photos[i].camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, side, side);
@@ -186,17 +195,22 @@ static ssdgs_train_options short_run(int iterations) {
 
 static void without_density_control(ssdgs_train_options *o) { o->densify_from = 0x7FFFFFFF; }
 
-typedef struct training { ssdgs_context *context; ssdgs_model *model; ssdgs_trainer *trainer; } training;
+typedef struct training {
+    ssdgs_context *context;
+    ssdgs_model *model;
+    ssdgs_trainer *trainer;
+} training;
 
 /* Takes the context over; a NULL model starts from random points. */
-static training start(ssdgs_context *context, ssdgs_model *model, const ssdgs_settings *settings, const ssdgs_train_options *o,
-                      int photo_count) {
+static training start(ssdgs_context *context, ssdgs_model *model, const ssdgs_settings *settings,
+                      const ssdgs_train_options *o, int photo_count) {
     training t;
     t.context = context;
     t.model = model;
     t.trainer = NULL;
     if (!CHECK(context) || !CHECK(model || !ssdgs_model_create(context, settings, 0, &t.model)) ||
-        !CHECK(!ssdgs_trainer_create(t.model, photos, photo_count, o, &t.trainer))) exit(1);
+        !CHECK(!ssdgs_trainer_create(t.model, photos, photo_count, o, &t.trainer)))
+        exit(1);
     return t;
 }
 
@@ -213,16 +227,21 @@ static ssdgs_train_stats steps(training *t, int count) {
     memset(&stats, 0, sizeof stats);
     for (i = 0; i < count; i++)
         good += !ssdgs_trainer_step(t->trainer, &stats) && test_finite(stats.loss) && test_finite(stats.psnr);
-    if (!CHECK(good == count)) printf("    %d of %d steps: %s\n", good, count, ssdgs_error_message(t->context));
+    if (!CHECK(good == count))
+        printf("    %d of %d steps: %s\n", good, count, ssdgs_error_message(t->context));
     return stats;
 }
 
 /* ---- 54: one value of one gradient ---- */
 
 enum { VIEW_GRADIENT = SSDGS__GROUPS, LIGHT_GRADIENT, SPOILS };
-typedef struct spoiler { int group, from, until, spared, frame; ssdgs_real value; } spoiler;
+typedef struct spoiler {
+    int group, from, until, spared, frame;
+    ssdgs_real value;
+} spoiler;
 
-/* The CPU's backward, then a value of a group's gradient is overwritten in the frames from .. until but one. */
+/* The CPU's backward, then a value of a group's gradient is overwritten in the frames from .. until but
+   one. */
 static ssdgs_result spoil_gradient(void *user, ssdgs_frame *frame) {
     spoiler *s = (spoiler *)user;
     const ssdgs_result result = ssdgs_stage_cpu(frame, SSDGS_STAGE_PROJECT_BACKWARD);
@@ -232,7 +251,8 @@ static ssdgs_result spoil_gradient(void *user, ssdgs_frame *frame) {
         if (s->group == VIEW_GRADIENT) frame->view_gradient[7] = s->value;
         else if (s->group == LIGHT_GRADIENT) frame->light_gradient[2] = s->value;
         else if (s->group >= SSDGS__PLANE_GROUPS)
-            frame->global_gradient[first[s->group - SSDGS__PLANE_GROUPS + 1] - 1] = s->value; /* the group's last */
+            frame->global_gradient[first[s->group - SSDGS__PLANE_GROUPS + 1] - 1] =
+                s->value; /* the group's last */
         else frame->gradient[(size_t)ssdgs__group_plane[s->group] * frame->gaussians.stride + 17] = s->value;
     }
     s->frame++;
@@ -241,10 +261,12 @@ static ssdgs_result spoil_gradient(void *user, ssdgs_frame *frame) {
 
 /* Everything a step may change but the iteration, and the count of steps refused. */
 static uint64_t hash_trainer(const ssdgs_trainer *t) {
-    const size_t planes = SSDGS_CHANNELS * t->stride * sizeof(ssdgs_real), globals = t->model->global_count * sizeof(ssdgs_real);
+    const size_t planes = SSDGS_CHANNELS * t->stride * sizeof(ssdgs_real),
+                 globals = t->model->global_count * sizeof(ssdgs_real);
     uint64_t hash = fnv(fnv(hash_model(t->model), t->mean, planes), t->square, planes);
     hash = fnv(fnv(hash, t->global_mean, globals), t->global_square, globals);
-    hash = fnv(fnv(hash, t->steps, sizeof t->steps), t->corrections, (size_t)t->photo_count * sizeof *t->corrections);
+    hash = fnv(fnv(hash, t->steps, sizeof t->steps), t->corrections,
+               (size_t)t->photo_count * sizeof *t->corrections);
     return fnv(hash, t->screen_gradient, SSDGS__STATISTICS * t->stride * sizeof(ssdgs_real));
 }
 
@@ -276,10 +298,14 @@ static void row_54(void) {
             before = hash_trainer(t.trainer);
             if (group >= 0) {
                 const int refused = ssdgs_trainer_step(t.trainer, &stats) == SSDGS_ERR_NONFINITE;
-                if (!CHECK(refused && stats.skipped_steps == 1 && stats.iteration == 8 && hash_trainer(t.trainer) == before) ||
-                    !CHECK(strstr(ssdgs_error_message(t.context), group < SSDGS__GROUPS ? ssdgs__group_names[group]
-                                                                  : group == VIEW_GRADIENT ? "camera" : "light")))
-                    printf("    gradient of %s: %s\n", group < SSDGS__GROUPS ? ssdgs__group_names[group] : "camera or light",
+                if (!CHECK(refused && stats.skipped_steps == 1 && stats.iteration == 8 &&
+                           hash_trainer(t.trainer) == before) ||
+                    !CHECK(strstr(ssdgs_error_message(t.context), group < SSDGS__GROUPS
+                                                                      ? ssdgs__group_names[group]
+                                                                  : group == VIEW_GRADIENT ? "camera"
+                                                                                           : "light")))
+                    printf("    gradient of %s: %s\n",
+                           group < SSDGS__GROUPS ? ssdgs__group_names[group] : "camera or light",
                            refused ? ssdgs_error_message(t.context) : "not refused");
                 for (; stats.iteration < 11 && !ssdgs_trainer_step(t.trainer, &stats);) continue;
                 if (group == 0 && i == 0) after = hash_trainer(t.trainer);
@@ -291,7 +317,8 @@ static void row_54(void) {
             finish(&t);
         }
     CHECK(after != undisturbed);
-    for (i = 9; i <= 10; i++) { /* nine refusals in a row, a step and a tenth are got over, ten in a row end the run */
+    for (i = 9; i <= 10;
+         i++) { /* nine refusals in a row, a step and a tenth are got over, ten in a row end the run */
         training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, &hook), NULL, NULL, &o, PHOTOS);
         s.group = SSDGS__G_OPACITY;
         s.frame = 0;
@@ -327,17 +354,20 @@ static double ssim_oracle(const ssdgs_real *image, const ssdgs_real *reference, 
                         e[4] += k * (double)image[at] * (double)reference[at];
                     }
                 cov = e[4] - e[0] * e[1];
-                total += (2 * e[0] * e[1] + 1e-4) * (2 * cov + 9e-4) /
-                         ((e[0] * e[0] + e[1] * e[1] + 1e-4) * (e[2] - e[0] * e[0] + e[3] - e[1] * e[1] + 9e-4));
+                total +=
+                    (2 * e[0] * e[1] + 1e-4) * (2 * cov + 9e-4) /
+                    ((e[0] * e[0] + e[1] * e[1] + 1e-4) * (e[2] - e[0] * e[0] + e[3] - e[1] * e[1] + 9e-4));
             }
     return total / (3.0 * w * h);
 }
 
-/* Photographs of one colour, of none, and smaller than the window of SSIM; trained a little under every term. */
+/* Photographs of one colour, of none, and smaller than the window of SSIM; trained a little under every
+   term. */
 static void row_55(void) {
-    static const struct { int width, height, rgb, alpha; } cases[8] = {
-        {1, 1, 128, 255}, {1, 1, 255, 0}, {2, 1, 0, 255}, {5, 7, 255, 255},
-        {16, 16, 0, 255}, {16, 16, 255, 255}, {16, 16, 90, 0}, {1, 16, 7, 128}};
+    static const struct {
+        int width, height, rgb, alpha;
+    } cases[8] = {{1, 1, 128, 255}, {1, 1, 255, 0},     {2, 1, 0, 255},  {5, 7, 255, 255},
+                  {16, 16, 0, 255}, {16, 16, 255, 255}, {16, 16, 90, 0}, {1, 16, 7, 128}};
     static unsigned char flat[16 * 16 * 4];
     static ssdgs_real image[3 * 16 * 16], reference[3 * 16 * 16], gradient[3 * 16 * 16];
     const ssdgs_train_options o = short_run(20);
@@ -360,7 +390,8 @@ static void row_55(void) {
         }
         for (j = 0; j < n; j++) {
             image[j] = (ssdgs_real)ssdgs__uniform(21, (uint64_t)(i * 1000 + j));
-            reference[j] = (ssdgs_real)(0.5 * (double)image[j] + 0.5 * ssdgs__uniform(22, (uint64_t)(i * 1000 + j)));
+            reference[j] =
+                (ssdgs_real)(0.5 * (double)image[j] + 0.5 * ssdgs__uniform(22, (uint64_t)(i * 1000 + j)));
         }
         CHECK(!ssdgs__loss(context, &memory, image, reference, w, h, (ssdgs_real)0.2, gradient, &values));
         ssdgs__release(context, memory.memory);
@@ -373,7 +404,8 @@ static void row_55(void) {
             ssdgs_metrics m;
             const ssdgs_real black[3] = {0, 0, 0};
             CHECK(!ssdgs_evaluate(t.model, &photos[j], black, NULL, &m));
-            k += test_finite(m.psnr) && test_finite(m.ssim) && m.ssim <= 1 + 1e-6 && m.flip >= 0 && m.flip <= 1;
+            k += test_finite(m.psnr) && test_finite(m.ssim) && m.ssim <= 1 + 1e-6 && m.flip >= 0 &&
+                 m.flip <= 1;
         }
         CHECK(k == PHOTOS);
         if (cases[i].alpha == 255 && w == 16) CHECK(last.loss < first.loss);
@@ -381,8 +413,8 @@ static void row_55(void) {
     }
 }
 
-/* An image against itself. Gradients are relative to L1's slope, 1 / values: terms of 2 / C2 = 2222 cancel but for float's
-   6e-8, times the mean's square beyond 1. */
+/* An image against itself. Gradients are relative to L1's slope, 1 / values: terms of 2 / C2 = 2222 cancel
+   but for float's 6e-8, times the mean's square beyond 1. */
 static void row_56(void) {
     static ssdgs_real image[3 * LARGEST], gradient[3 * LARGEST];
     static const double constants[4] = {0, 0.6, 1, 100};
@@ -396,10 +428,12 @@ static void row_56(void) {
             double here = 0;
             if (!context) continue;
             for (j = 0; j < 3 * LARGEST; j++)
-                image[j] = (ssdgs_real)(i < 4 ? constants[i] : i == 4 ? ssdgs__uniform(31, (uint64_t)j)
-                                                                      : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
+                image[j] = (ssdgs_real)(i < 4    ? constants[i]
+                                        : i == 4 ? ssdgs__uniform(31, (uint64_t)j)
+                                                 : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
             CHECK(!ssdgs__loss(context, &memory, image, image, SIDE, SIDE, 1, gradient, &values));
-            for (j = 0; j < 3 * LARGEST; j++) here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
+            for (j = 0; j < 3 * LARGEST; j++)
+                here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
             here *= 3 * LARGEST;
             if (!CHECK(fabs(values.ssim - 1) < 1e-7) || !CHECK(here < (i == 3 ? 1e-2 : 6e-4)))
                 printf("    %s, image %d: SSIM - 1 = %g, gradient %g\n", NAME(isa), i, values.ssim - 1, here);
@@ -452,7 +486,8 @@ static void row_58(void) {
             memset(&t, 0, sizeof t);
             t.context = new_context(SSDGS_ISA_AUTO, 1, NULL, NULL);
             CHECK(!ssdgs_model_create(t.context, NULL, 0, &t.model));
-            CHECK(ssdgs_trainer_create(t.model, photos, PHOTOS, &o, &t.trainer) == SSDGS_ERR_ARGUMENT && !t.trainer);
+            CHECK(ssdgs_trainer_create(t.model, photos, PHOTOS, &o, &t.trainer) == SSDGS_ERR_ARGUMENT &&
+                  !t.trainer);
             CHECK(strstr(ssdgs_error_message(t.context), "points") != NULL);
         }
         finish(&t);
@@ -470,7 +505,8 @@ static void row_58(void) {
     finish(&t);
 }
 
-/* Everything densifies: the cap holds and so does the memory announced. All opacities gone: someone remains. */
+/* Everything densifies: the cap holds and so does the memory announced. All opacities gone: someone
+   remains. */
 static void row_59(void) {
     meter m;
     ssdgs_train_options o = short_run(full ? 400 : 120 / SLOW);
@@ -495,9 +531,10 @@ static void row_59(void) {
             CHECK(t.model->count <= o.max_gaussians);
         }
         CHECK(most > o.max_gaussians * 3 / 4 && ALL_FINITE(t.model));
-        printf("    %d Gaussians of %d, %lu bytes at most, %lu announced\n", most, o.max_gaussians, (unsigned long)m.peak,
-               (unsigned long)announced);
-        CHECK((double)m.peak < 1.3 * (double)announced && (double)m.peak > 0.6 * (double)announced); /* "about" */
+        printf("    %d Gaussians of %d, %lu bytes at most, %lu announced\n", most, o.max_gaussians,
+               (unsigned long)m.peak, (unsigned long)announced);
+        CHECK((double)m.peak < 1.3 * (double)announced &&
+              (double)m.peak > 0.6 * (double)announced); /* "about" */
         worst = (double)m.peak / (double)announced > worst ? (double)m.peak / (double)announced : worst;
         finish(&t);
         CHECK(m.live == 0);
@@ -516,8 +553,9 @@ static void row_59(void) {
 /* A hundred times every rate: a bad model, but a model. */
 static void row_60(void) {
     ssdgs_train_options o = short_run(full ? 2000 : 300 / SLOW);
-    ssdgs_rate *const rates[12] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material,
-                                   &o.shadow, &o.scattering, &o.camera_rate, &o.light_rate};
+    ssdgs_rate *const rates[12] = {&o.position, &o.opacity,    &o.scale,       &o.rotation,
+                                   &o.color,    &o.asg,        &o.frame,       &o.material,
+                                   &o.shadow,   &o.scattering, &o.camera_rate, &o.light_rate};
     training t;
     int i;
     make_photos(16);
@@ -556,8 +594,10 @@ static void row_61(void) {
     for (i = 1; i < 4; i++) {
         calls = m.calls;
         steps(&t, o.iterations / 4);
-        CHECK(m.live <= live + live / 10); /* buffers still meet larger frames; 8 bytes a step would be more */
-        CHECK(m.calls - calls <= (size_t)o.iterations / 4 / 5); /* density control's own and what grows, nothing a step */
+        CHECK(m.live <=
+              live + live / 10); /* buffers still meet larger frames; 8 bytes a step would be more */
+        CHECK(m.calls - calls <=
+              (size_t)o.iterations / 4 / 5); /* density control's own and what grows, nothing a step */
     }
     printf("    %d Gaussians, %lu bytes live, largest parameter %g\n", t.model->count, (unsigned long)m.live,
            largest_parameter(t.model));
@@ -568,9 +608,12 @@ static void row_61(void) {
 
 /* A term not yet joined is a term the model does not have; what serves only absent terms never moves. */
 static void row_62(void) {
-    static const struct { int terms; double until; } phases[3] = {
-        {SSDGS_DIFFUSE_TERM, 5e3}, {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM, 9e3},
-        {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM, 16e3}};
+    static const struct {
+        int terms;
+        double until;
+    } phases[3] = {{SSDGS_DIFFUSE_TERM, 5e3},
+                   {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM, 9e3},
+                   {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM, 16e3}};
     ssdgs_train_options o = short_run(120);
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_real *globals, was[SSDGS_CHANNELS];
@@ -604,7 +647,8 @@ static void row_62(void) {
     v = ssdgs_model_get(t.model);
     for (c = SSDGS_SPECULAR; c < SSDGS_MATERIAL; c++) /* every Gaussian's start is the same */
         for (i = 0; i < (size_t)v.count && (c < SSDGS_FRAME || c >= SSDGS_ASG_WEIGHT); i++)
-            moved += c != SSDGS_ASG_WEIGHT + 3 && memcmp(v.gaussians + c * v.stride + i, &was[c], sizeof was[c]) != 0; /* but shadows' softness */
+            moved += c != SSDGS_ASG_WEIGHT + 3 && memcmp(v.gaussians + c * v.stride + i, &was[c],
+                                                         sizeof was[c]) != 0; /* but shadows' softness */
     ssdgs__global_groups(&t.model->settings, first);
     last = first[SSDGS__SHADOW_NET];
     CHECK(moved == 0 && !memcmp(globals, t.model->globals, last * sizeof *globals));
@@ -625,7 +669,8 @@ static void exponential(const double w[3], double e[9], double integral[9]) {
     for (n = 1; n < 60; n++) {
         for (i = 0; i < 3; i++)
             for (j = 0; j < 3; j++)
-                for (l = 0, next[3 * i + j] = 0; l < 3; l++) next[3 * i + j] += term[3 * i + l] * k[3 * l + j] / n;
+                for (l = 0, next[3 * i + j] = 0; l < 3; l++)
+                    next[3 * i + j] += term[3 * i + l] * k[3 * l + j] / n;
         for (i = 0; i < 9; i++) {
             term[i] = next[i];
             e[i] += term[i];
@@ -649,9 +694,11 @@ static double weighted_view(const ssdgs_photo *photo, const double value[9], con
 }
 
 static void row_63(void) {
-    static const double pi = 3.14159265358979323846, seam = 0.03162277660168379; /* where the series take over */
-    const double angles[12] = {0, 1e-300, 1e-160, 1e-12, 1e-6, 1e-3, seam * (1 - 1e-9), seam * (1 + 1e-9),
-                               1, pi, 2 * pi - 1e-6, 2 * pi};
+    static const double pi = 3.14159265358979323846,
+                        seam = 0.03162277660168379; /* where the series take over */
+    const double angles[12] = {
+        0, 1e-300, 1e-160,        1e-12, 1e-6, 1e-3, seam * (1 - 1e-9), seam * (1 + 1e-9),
+        1, pi,     2 * pi - 1e-6, 2 * pi};
     ssdgs_train_options o = short_run(12);
     double worst = 0, slope = 0;
     int a, axis, i;
@@ -661,7 +708,9 @@ static void row_63(void) {
             double value[9], e[9], jacobian[9], want[9], integral[9], d[6], scale = 0;
             ssdgs_real weight[12];
             for (i = 0; i < 9; i++)
-                value[i] = i < 3 || i > 5 ? 0.1 * i : axis == 3 ? ssdgs__uniform(41, (uint64_t)i) - 0.5 : i - 3 == axis;
+                value[i] = i < 3 || i > 5 ? 0.1 * i
+                           : axis == 3    ? ssdgs__uniform(41, (uint64_t)i) - 0.5
+                                          : i - 3 == axis;
             for (i = 3; i < 6; i++) scale += value[i] * value[i];
             for (i = 3; i < 6; i++) value[i] *= angles[a] / sqrt(scale);
             for (i = 0; i < 12; i++) weight[i] = (ssdgs_real)(ssdgs__uniform(42, (uint64_t)i) - 0.5);
@@ -682,7 +731,8 @@ static void row_63(void) {
                     moved[i] += h;
                     difference[half] = weighted_view(&photos[1], moved, weight);
                     moved[i] -= 2 * h;
-                    difference[half] = (difference[half] - weighted_view(&photos[1], moved, weight)) / (2 * h);
+                    difference[half] =
+                        (difference[half] - weighted_view(&photos[1], moved, weight)) / (2 * h);
                 }
                 difference[0] = (4 * difference[1] - difference[0]) / 3;
                 slope = fabs(d[i] - difference[0]) > slope ? fabs(d[i] - difference[0]) : slope;
@@ -708,7 +758,8 @@ static void row_63(void) {
 }
 
 /* Adds how far a photograph's pose and light are from the true ones: centre, angle in radians, light. */
-static void pose_error(const ssdgs_camera *camera, const ssdgs_light *light, const ssdgs_photo *truth, double error[3]) {
+static void pose_error(const ssdgs_camera *camera, const ssdgs_light *light, const ssdgs_photo *truth,
+                       double error[3]) {
     double trace = 0, centre = 0, place = 0;
     int i, j;
     for (i = 0; i < 3; i++) {
@@ -732,8 +783,8 @@ static void row_64(void) {
     static const char *const names[3] = {"pose_centre_left", "pose_angle_left", "light_left"};
     static ssdgs_photo truth[PHOTOS];
     ssdgs_train_options o = short_run((full ? 1000 : 500) * (full ? PHOTOS : 2));
-    ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale, &o.rotation, &o.color, &o.asg, &o.frame, &o.material,
-                                   &o.shadow, &o.scattering};
+    ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale,    &o.rotation, &o.color,
+                                   &o.asg,      &o.frame,   &o.material, &o.shadow,   &o.scattering};
     double before[3] = {0, 0, 0}, after[3] = {0, 0, 0};
     training t;
     uint64_t hash;
@@ -741,7 +792,8 @@ static void row_64(void) {
     int i, c;
     make_photos(SIDE);
     memcpy(truth, photos, sizeof truth);
-    for (i = 0; i < 10; i++) rates[i]->start = rates[i]->end = 0; /* a moving model could take the disturbance over */
+    for (i = 0; i < 10; i++)
+        rates[i]->start = rates[i]->end = 0; /* a moving model could take the disturbance over */
     without_density_control(&o);
     o.refine_camera = o.refine_light = 1;
     o.camera_rate.start = o.light_rate.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
@@ -776,7 +828,10 @@ static void row_64(void) {
 
 /* ---- 66 to 69: one result ---- */
 
-typedef struct hashes { uint64_t render, light, training; double psnr; } hashes;
+typedef struct hashes {
+    uint64_t render, light, training;
+    double psnr;
+} hashes;
 
 /* A rendering of the truth with its components, what its light pass finds, a model after `count` steps. */
 static hashes hash_all(ssdgs_context *context, const ssdgs_train_options *o, int count) {
@@ -795,7 +850,8 @@ static hashes hash_all(ssdgs_context *context, const ssdgs_train_options *o, int
     truth->settings.transport = 1; /* the walk sums the flux too */
     CHECK(!ssdgs__frame_begin(&frame, truth, &photos[1].camera, &photos[3].light, 1, NULL, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
-    h.light = fnv(fnv(FNV_START, frame.visibility, TRUTH * sizeof(ssdgs_real)), frame.depth_cue, TRUTH * sizeof(ssdgs_real));
+    h.light = fnv(fnv(FNV_START, frame.visibility, TRUTH * sizeof(ssdgs_real)), frame.depth_cue,
+                  TRUTH * sizeof(ssdgs_real));
     h.light = fnv(h.light, frame.flux, TRUTH * sizeof(ssdgs_real));
     t = start(context, NULL, NULL, o, PHOTOS);
     stats = steps(&t, count);
@@ -808,7 +864,9 @@ static hashes hash_all(ssdgs_context *context, const ssdgs_train_options *o, int
     return h;
 }
 
-static int same_hashes(hashes a, hashes b) { return a.render == b.render && a.light == b.light && a.training == b.training; }
+static int same_hashes(hashes a, hashes b) {
+    return a.render == b.render && a.light == b.light && a.training == b.training;
+}
 
 static void row_66(void) {
     static const int threads[5] = {1, 2, 3, 7, 16};
@@ -831,11 +889,13 @@ static void row_66(void) {
         if (!known[isa]) continue;
         printf("hash %s %016llx %016llx %016llx\n", NAME(isa), (unsigned long long)first[isa].render,
                (unsigned long long)first[isa].light, (unsigned long long)first[isa].training);
-        for (other = SSDGS_ISA_SCALAR; other < isa && !(known[other] && same_hashes(first[isa], first[other])); other++) {}
+        for (other = SSDGS_ISA_SCALAR;
+             other < isa && !(known[other] && same_hashes(first[isa], first[other])); other++) {}
         groups += other == isa;
 #if FLT_EVAL_METHOD == 0 && !defined(__FAST_MATH__)
         for (other = SSDGS_ISA_SCALAR; other < isa; other++) /* from AVX2 on all have FMA */
-            if (known[other] && (other >= SSDGS_ISA_AVX2) == (isa >= SSDGS_ISA_AVX2)) CHECK(same_hashes(first[isa], first[other]));
+            if (known[other] && (other >= SSDGS_ISA_AVX2) == (isa >= SSDGS_ISA_AVX2))
+                CHECK(same_hashes(first[isa], first[other]));
 #endif
     }
     printf("figure hash_groups %d\n", groups);
@@ -849,10 +909,14 @@ static void set_flush(int on) { _mm_setcsr(on ? _mm_getcsr() | 0x8040u : _mm_get
 static void set_flush(int on) { (void)on; }
 #endif
 
-/* Subnormals flushed, before or after the context makes its threads: no bit moves. Other roundings: close, and finite. */
+/* Subnormals flushed, before or after the context makes its threads: no bit moves. Other roundings: close,
+   and finite. */
 static void row_67(void) {
     enum { STEPS = 30 };
-    static const struct { const char *name; int mode; } modes[] = {
+    static const struct {
+        const char *name;
+        int mode;
+    } modes[] = {
 #ifdef FE_UPWARD
         {"up", FE_UPWARD},
 #endif
@@ -882,15 +946,16 @@ static void row_67(void) {
             h = hash_all(own, &o, STEPS);
             set_flush(0);
             if (!CHECK(same_hashes(h, plain)))
-                printf("    %s, flushed: render %d, light %d, training %d\n", NAME(isa), h.render == plain.render,
-                       h.light == plain.light, h.training == plain.training);
+                printf("    %s, flushed: render %d, light %d, training %d\n", NAME(isa),
+                       h.render == plain.render, h.light == plain.light, h.training == plain.training);
             if (!i) ssdgs_context_destroy(own);
         }
         ssdgs_context_destroy(context);
         for (i = (int)(sizeof modes / sizeof *modes) - 1; i >= 0; i--) {
-            /* these two round as the mode says inside exp and sin, too: half a step outside of their polynomials' range; without
-               transport, which takes the 16th power of that (5.2e-3 with it) */
-            const int nearest = modes[i].mode == FE_TONEAREST, follows = isa == SSDGS_ISA_SCALAR || isa == SSDGS_ISA_SSE2;
+            /* these two round as the mode says inside exp and sin, too: half a step outside of their
+               polynomials' range; without transport, which takes the 16th power of that (5.2e-3 with it) */
+            const int nearest = modes[i].mode == FE_TONEAREST,
+                      follows = isa == SSDGS_ISA_SCALAR || isa == SSDGS_ISA_SSE2;
             double most = 0;
             ssdgs_model *truth;
             int sizes[SSDGS_MAX_LAYERS + 1];
@@ -899,7 +964,8 @@ static void row_67(void) {
             truth = new_truth(context);
             ssdgs__network_sizes(&truth->settings, 0, sizes);
             for (j = 0; follows && j < sizes[1]; j++)
-                memset(ssdgs_model_get(truth).scattering + (j + 1) * sizes[0] - SSDGS__LENGTHS, 0, SSDGS__LENGTHS * sizeof(ssdgs_real));
+                memset(ssdgs_model_get(truth).scattering + (j + 1) * sizes[0] - SSDGS__LENGTHS, 0,
+                       SSDGS__LENGTHS * sizeof(ssdgs_real));
             image.color = color[!nearest];
             CHECK(!ssdgs_render(truth, &photos[1].camera, &photos[2].light, 1, &image));
             h = hash_all(context, &o, STEPS);
@@ -909,13 +975,15 @@ static void row_67(void) {
                 most = test_finite(d) ? d > most ? d : most : HUGE_VAL;
             }
             if (!CHECK(most < (follows ? 5e-3 : 1e-5)) || !CHECK(fabs(h.psnr - plain.psnr) < 1))
-                printf("    %s, rounding %s: off by %g, %g dB for %g\n", NAME(isa), modes[i].name, most, h.psnr, plain.psnr);
+                printf("    %s, rounding %s: off by %g, %g dB for %g\n", NAME(isa), modes[i].name, most,
+                       h.psnr, plain.psnr);
             worst[!follows] = most > worst[!follows] ? most : worst[!follows];
             ssdgs_model_destroy(truth);
             ssdgs_context_destroy(context);
         }
     }
-    printf("figure rounding_mode_error_scalar_sse2 %.2g\nfigure rounding_mode_error_wider %.2g\n", worst[0], worst[1]);
+    printf("figure rounding_mode_error_scalar_sse2 %.2g\nfigure rounding_mode_error_wider %.2g\n", worst[0],
+           worst[1]);
 }
 
 /* Bytes of a file; 0 when it cannot be read. */
@@ -932,10 +1000,13 @@ static uint64_t hash_file(const char *path) {
 
 /* A locale with a decimal comma changes no byte written and no number read. */
 static void row_68(void) {
-    static const char *const locales[] = {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8",
+    static const char *const locales[] = {"de_DE.UTF-8", "de_DE.utf8",          "de_DE",
+                                          "fr_FR.UTF-8", "fr_FR.utf8",          "es_ES.UTF-8",
                                           "ru_RU.UTF-8", "German_Germany.1252", "de-DE"};
-    static const char ascii[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-        "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\n"
+    static const char ascii[] =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+        "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float "
+        "scale_2\nproperty float rot_0\n"
         "property float rot_1\nproperty float rot_2\nproperty float rot_3\n"
         "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nend_header\n"
         "0.25 -1.5e-1 2.125 0.5 -2.75 -3 -3.5 0.5 0.5 -0.5 0.5 0.5 0.25 0.75\n";
@@ -962,7 +1033,8 @@ static void row_68(void) {
         ssdgs_model_destroy(loaded);
         CHECK(!ssdgs_model_load_memory(t.context, ascii, sizeof ascii - 1, &loaded, NULL));
         v = ssdgs_model_get(loaded);
-        CHECK(fabs((double)v.gaussians[0] - 0.25) < 1e-7 && fabs((double)v.gaussians[v.stride] + 0.15) < 1e-7);
+        CHECK(fabs((double)v.gaussians[0] - 0.25) < 1e-7 &&
+              fabs((double)v.gaussians[v.stride] + 0.15) < 1e-7);
         CHECK(fabs((double)v.gaussians[SSDGS_LOG_SCALE * v.stride] + 2.75) < 1e-7);
         hash[round][2] = hash_model(loaded);
         ssdgs_model_destroy(loaded);
@@ -976,7 +1048,10 @@ static void row_68(void) {
     printf("    %s\n", comma ? "a decimal comma" : "no locale here has a decimal comma");
 }
 
-typedef struct job { int threads, seed; hashes result; } job;
+typedef struct job {
+    int threads, seed;
+    hashes result;
+} job;
 
 static void *run_job(void *data) {
     job *j = (job *)data;
@@ -1013,22 +1088,24 @@ static void row_69(void) {
 }
 
 int main(int argc, char **argv) {
-    static const struct { const char *number, *name; void (*run)(void); } rows[] = {
-        {"54", "a gradient that is not finite", row_54},
-        {"55", "degenerate photographs", row_55},
-        {"56", "SSIM of an image and itself", row_56},
-        {"57", "one photograph, one camera", row_57},
-        {"58", "few points, coincident points", row_58},
-        {"59", "explosion, extinction", row_59},
-        {"60", "rates times 100", row_60},
-        {"61", "soak", row_61},
-        {"62", "terms that never join", row_62},
-        {"63", "pose series", row_63},
-        {"64", "disturbed poses and lights come back", row_64},
-        {"66", "one hash for any threads and vector width", row_66},
-        {"67", "flushed subnormals, other roundings", row_67},
-        {"68", "decimal comma", row_68},
-        {"69", "contexts side by side", row_69}};
+    static const struct {
+        const char *number, *name;
+        void (*run)(void);
+    } rows[] = {{"54", "a gradient that is not finite", row_54},
+                {"55", "degenerate photographs", row_55},
+                {"56", "SSIM of an image and itself", row_56},
+                {"57", "one photograph, one camera", row_57},
+                {"58", "few points, coincident points", row_58},
+                {"59", "explosion, extinction", row_59},
+                {"60", "rates times 100", row_60},
+                {"61", "soak", row_61},
+                {"62", "terms that never join", row_62},
+                {"63", "pose series", row_63},
+                {"64", "disturbed poses and lights come back", row_64},
+                {"66", "one hash for any threads and vector width", row_66},
+                {"67", "flushed subnormals, other roundings", row_67},
+                {"68", "decimal comma", row_68},
+                {"69", "contexts side by side", row_69}};
     const int count = (int)(sizeof rows / sizeof *rows);
     int i;
     full = argc > 1 && !strcmp(argv[1], "full");

@@ -1,18 +1,20 @@
-/* The stress catalogue, rows 1 to 52: geometry, rasteriser, light and shading at their extremes, through the public interface.
-   Every row runs on each instruction set this machine has, with 1 and with 8 threads: the pictures of both must have the same
-   bits. All planes of every picture must be finite. Rows that other programs cover are not here. */
+/* The stress catalogue, rows 1 to 52: geometry, rasteriser, light and shading at their extremes, through the
+   public interface. Every row runs on each instruction set this machine has, with 1 and with 8 threads: the
+   pictures of both must have the same bits. All planes of every picture must be finite. Rows that other
+   programs cover are not here. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
 
 enum { W = 64, H = 48, PIXELS = W * H, GOOD = 1000, CENTRE = H / 2 * W + W / 2 };
 static const double white = 0.54132485461291810; /* softplus of it is 1 */
-static const double centre[3] = {0, 0, 2};       /* of every scene; the camera is at the origin and looks along z */
+static const double centre[3] = {0, 0, 2}; /* of every scene; the camera is at the origin and looks along z */
 static ssdgs_context *context;
 static uint64_t digest; /* of all that a row has rendered */
 
 typedef struct picture {
-    ssdgs_real color[3 * PIXELS], diffuse[3 * PIXELS], specular[3 * PIXELS], scattering[3 * PIXELS], normal[3 * PIXELS];
+    ssdgs_real color[3 * PIXELS], diffuse[3 * PIXELS], specular[3 * PIXELS], scattering[3 * PIXELS],
+        normal[3 * PIXELS];
     ssdgs_real alpha[PIXELS], depth[PIXELS], shadow[PIXELS];
     ssdgs_render_stats stats;
 } picture;
@@ -51,7 +53,8 @@ static double bits_number(uint32_t bits) {
 #define NOT_A_NUMBER bits_number(0x7FC00000u) /* by their bits: -ffast-math may fold NAN and INFINITY */
 #define INFINITE bits_number(0x7F800000u)
 
-static ssdgs_settings full(void) { /* every term, small networks, a map whose size does not depend on the scene */
+static ssdgs_settings full(
+    void) { /* every term, small networks, a map whose size does not depend on the scene */
     ssdgs_settings s = ssdgs_settings_default();
     s.scattering_layers = s.shadow_layers = 2;
     s.scattering_width = s.shadow_width = 8;
@@ -60,7 +63,8 @@ static ssdgs_settings full(void) { /* every term, small networks, a map whose si
     return s;
 }
 
-static ssdgs_settings lambert(ssdgs_asg asg, double bias, int map) { /* Lambert's term and the measured visibility, no networks */
+static ssdgs_settings lambert(ssdgs_asg asg, double bias,
+                              int map) { /* Lambert's term and the measured visibility, no networks */
     ssdgs_settings s = full();
     s.asg = (int)asg;
     s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
@@ -93,7 +97,8 @@ static void set(ssdgs_model *model, int gaussian, int channel, int channels, dou
     for (; channels--; channel++) *raw(model, channel, gaussian) = (ssdgs_real)value;
 }
 
-static void put(ssdgs_model *model, int gaussian, double x, double y, double z, double log_scale, double logit) {
+static void put(ssdgs_model *model, int gaussian, double x, double y, double z, double log_scale,
+                double logit) {
     set(model, gaussian, SSDGS_POSITION, 1, x);
     set(model, gaussian, SSDGS_POSITION + 1, 1, y);
     set(model, gaussian, SSDGS_POSITION + 2, 1, z);
@@ -114,8 +119,10 @@ static ssdgs_model *cloud(ssdgs_settings settings, int count) {
             for (k = 0, r2 = 0; k < 3; k++) x[k] = draw(1, n++), r2 += x[k] * x[k];
         for (k = 0; k < SSDGS_CHANNELS; k++) {
             const double r = draw(2, (uint64_t)(i * SSDGS_CHANNELS + k));
-            v.gaussians[(size_t)k * v.stride + (size_t)i] = (ssdgs_real)(
-                k < SSDGS_ROTATION ? centre[k] + 0.5 * x[k] : k >= SSDGS_LOG_SCALE && k < SSDGS_OPACITY ? r - 3.5 : 2 * r);
+            v.gaussians[(size_t)k * v.stride + (size_t)i] =
+                (ssdgs_real)(k < SSDGS_ROTATION                          ? centre[k] + 0.5 * x[k]
+                             : k >= SSDGS_LOG_SCALE && k < SSDGS_OPACITY ? r - 3.5
+                                                                         : 2 * r);
         }
     }
     return model;
@@ -147,8 +154,9 @@ static ssdgs_light lamp(double x, double y, double z, double power) {
 /* The scene turned about its centre by a unit quaternion, camera and light with it. */
 static void turn(const double q[4], ssdgs_model *model, ssdgs_camera *camera, ssdgs_light *light) {
     const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
-        1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                         2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                         2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
     const ssdgs_model_view v = ssdgs_model_get(model);
     const ssdgs_camera was = *camera;
     double p[4];
@@ -158,7 +166,8 @@ static void turn(const double q[4], ssdgs_model *model, ssdgs_camera *camera, ss
         const size_t step = i < 0 ? 1 : v.stride;
         for (k = 0; k < 3; k++) p[k] = (double)at[(size_t)k * step] - centre[k];
         for (k = 0; k < 3; k++)
-            at[(size_t)k * step] = (ssdgs_real)(centre[k] + m[3 * k] * p[0] + m[3 * k + 1] * p[1] + m[3 * k + 2] * p[2]);
+            at[(size_t)k * step] =
+                (ssdgs_real)(centre[k] + m[3 * k] * p[0] + m[3 * k + 1] * p[1] + m[3 * k + 2] * p[2]);
         for (f = 0; i >= 0 && f < 2; f++) {
             at = v.gaussians + (size_t)(f ? SSDGS_FRAME : SSDGS_ROTATION) * step + i;
             for (k = 0; k < 4; k++) p[k] = (double)at[(size_t)k * step];
@@ -182,8 +191,8 @@ static void turn(const double q[4], ssdgs_model *model, ssdgs_camera *camera, ss
 
 /* ---- rendering ---- */
 
-static ssdgs_result shoot(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
-                          const ssdgs_render_options *options, picture *out) {
+static ssdgs_result shoot(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                          int count, const ssdgs_render_options *options, picture *out) {
     ssdgs_image image;
     memset(&image, 0, sizeof image);
     memset(out, 0, sizeof *out);
@@ -200,8 +209,8 @@ static ssdgs_result shoot(ssdgs_model *model, const ssdgs_camera *camera, const 
 }
 
 /* Must succeed, with every value finite. */
-static const picture *show(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
-                           const ssdgs_render_options *options, picture *out) {
+static const picture *show(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                           int count, const ssdgs_render_options *options, picture *out) {
     const ssdgs_result result = shoot(model, camera, lights, count, options, out);
     uint32_t bits;
     int i, finite = 1;
@@ -230,7 +239,8 @@ static int same(const picture *p, const picture *q) { return !memcmp(p, q, offse
 static double distance(const ssdgs_real *p, const ssdgs_real *q, int count) { /* the largest difference */
     double worst = 0;
     int i;
-    for (i = 0; i < count; i++) worst = fabs((double)p[i] - (double)q[i]) > worst ? fabs((double)p[i] - (double)q[i]) : worst;
+    for (i = 0; i < count; i++)
+        worst = fabs((double)p[i] - (double)q[i]) > worst ? fabs((double)p[i] - (double)q[i]) : worst;
     return worst;
 }
 
@@ -246,7 +256,8 @@ static double peak(const picture *p) {
     return distance(p->color, black, 3 * PIXELS);
 }
 
-/* Must fail with this code and a message that has `word`; nothing is allocated and what follows has the bits it had. */
+/* Must fail with this code and a message that has `word`; nothing is allocated and what follows has the bits
+   it had. */
 static void refused(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
                     const ssdgs_render_options *options, ssdgs_result code, const char *word) {
     size_t before;
@@ -254,7 +265,8 @@ static void refused(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_
     before = held, most = held;
     if (!CHECK(shoot(model, camera, lights, count, options, &b) == code)) return;
     CHECK(held == before && most == before);
-    if (!CHECK(strstr(ssdgs_error_message(context), word))) printf("    %s: %s\n", word, ssdgs_error_message(context));
+    if (!CHECK(strstr(ssdgs_error_message(context), word)))
+        printf("    %s: %s\n", word, ssdgs_error_message(context));
     CHECK(same(&a, look(model, &b)));
 }
 
@@ -282,11 +294,13 @@ static ssdgs_load_stats loaded(const char *scale, const char *opacity, const cha
     char text[512];
     ssdgs_load_stats stats;
     ssdgs_model *model = NULL;
-    snprintf(text, sizeof text, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+    snprintf(text, sizeof text,
+             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
              "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
              "property float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\n"
              "property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n"
-             "0 0 2 1 1 1 %s -4 -4 %s %s %s %s %s\n", opacity, scale, rotation, rotation, rotation, rotation);
+             "0 0 2 1 1 1 %s -4 -4 %s %s %s %s %s\n",
+             opacity, scale, rotation, rotation, rotation, rotation);
     if (!CHECK(!ssdgs_model_load_memory(context, text, strlen(text), &model, &stats)))
         printf("    %s\n", ssdgs_error_message(context));
     else look(model, &c);
@@ -323,7 +337,8 @@ static void row_01(void) { /* nothing to draw: the background's very bits */
     for (lights = 0; lights < 2; lights++) {
         show(model, &camera, &light, lights, &options, &a);
         for (i = 0; i < PIXELS; i++)
-            wrong += memcmp(a.color + 3 * i, options.background, sizeof options.background) || a.alpha[i] > 0 || a.depth[i] > 0;
+            wrong += memcmp(a.color + 3 * i, options.background, sizeof options.background) ||
+                     a.alpha[i] > 0 || a.depth[i] > 0;
     }
     CHECK(!wrong);
     ssdgs_model_destroy(model);
@@ -337,24 +352,52 @@ static void row_02(void) { /* at its centre a splat's alpha is its opacity: 1 ul
     ssdgs_model_destroy(model);
 }
 
-static void row_04(void) { /* sizes and focal lengths that no camera has: refused before anything is allocated */
-    static const struct { size_t field; int is_int; double value; } bad[] = {
-        {offsetof(ssdgs_camera, width), 1, 0}, {offsetof(ssdgs_camera, width), 1, -1},
-        {offsetof(ssdgs_camera, width), 1, 2147483647}, {offsetof(ssdgs_camera, height), 1, 0},
-        {offsetof(ssdgs_camera, height), 1, -7}, {offsetof(ssdgs_camera, height), 1, 32769},
-        {offsetof(ssdgs_camera, fx), 0, 0}, {offsetof(ssdgs_camera, fx), 0, -64}, {offsetof(ssdgs_camera, fx), 0, 2},
-        {offsetof(ssdgs_camera, fy), 0, 0}, {offsetof(ssdgs_camera, fy), 0, 1}, {offsetof(ssdgs_camera, cx), 0, 2},
-        {offsetof(ssdgs_camera, cy), 0, 1}, {offsetof(ssdgs_camera, near_plane), 0, -1},
+static void row_04(
+    void) { /* sizes and focal lengths that no camera has: refused before anything is allocated */
+    static const struct {
+        size_t field;
+        int is_int;
+        double value;
+    } bad[] = {
+        {offsetof(ssdgs_camera, width), 1, 0},
+        {offsetof(ssdgs_camera, width), 1, -1},
+        {offsetof(ssdgs_camera, width), 1, 2147483647},
+        {offsetof(ssdgs_camera, height), 1, 0},
+        {offsetof(ssdgs_camera, height), 1, -7},
+        {offsetof(ssdgs_camera, height), 1, 32769},
+        {offsetof(ssdgs_camera, fx), 0, 0},
+        {offsetof(ssdgs_camera, fx), 0, -64},
+        {offsetof(ssdgs_camera, fx), 0, 2},
+        {offsetof(ssdgs_camera, fy), 0, 0},
+        {offsetof(ssdgs_camera, fy), 0, 1},
+        {offsetof(ssdgs_camera, cx), 0, 2},
+        {offsetof(ssdgs_camera, cy), 0, 1},
+        {offsetof(ssdgs_camera, near_plane), 0, -1},
         {offsetof(ssdgs_camera, near_plane), 0, 2}}; /* real numbers: 1 stands for infinity, 2 for NaN */
-    static const char *const words[] = {"0", "-1", "2147483647", "0", "-7", "32769", "fx = 0", "fx = -64", "fx = NaN", "fy = 0",
-        "fy = infinite", "cx = NaN", "cy = infinite", "near_plane = -1", "near_plane = NaN"};
+    static const char *const words[] = {"0",
+                                        "-1",
+                                        "2147483647",
+                                        "0",
+                                        "-7",
+                                        "32769",
+                                        "fx = 0",
+                                        "fx = -64",
+                                        "fx = NaN",
+                                        "fy = 0",
+                                        "fy = infinite",
+                                        "cx = NaN",
+                                        "cy = infinite",
+                                        "near_plane = -1",
+                                        "near_plane = NaN"};
     ssdgs_model *model = cloud(full(), 50);
     size_t i;
     for (i = 0; i < sizeof bad / sizeof *bad; i++) {
         ssdgs_camera camera = ahead();
         char *field = (char *)&camera + bad[i].field;
         const int whole = (int)bad[i].value;
-        const ssdgs_real real = (ssdgs_real)(whole == 1 ? INFINITE : whole == 2 ? NOT_A_NUMBER : bad[i].value);
+        const ssdgs_real real = (ssdgs_real)(whole == 1   ? INFINITE
+                                             : whole == 2 ? NOT_A_NUMBER
+                                                          : bad[i].value);
         if (bad[i].is_int) memcpy(field, &whole, sizeof whole);
         else memcpy(field, &real, sizeof real);
         refused(model, &camera, NULL, 0, NULL, SSDGS_ERR_ARGUMENT, words[i]);
@@ -372,8 +415,10 @@ static void row_05(void) { /* drawn where z > near and z is finite, else as if i
     int i;
     memcpy(&bits, &near_plane, 4);
     for (i = 0; i < 2; i++) bits += i ? 2 : -1u, memcpy(close + i, &bits, 4);
-    depths[0] = (double)close[0], depths[1] = 0.5, depths[2] = (double)close[1], depths[3] = 0, depths[4] = -0.0, depths[5] = -1;
-    depths[6] = bits_number(1), depths[7] = -INFINITE, depths[8] = INFINITE, depths[9] = NOT_A_NUMBER, depths[10] = -1e38;
+    depths[0] = (double)close[0], depths[1] = 0.5, depths[2] = (double)close[1], depths[3] = 0,
+    depths[4] = -0.0, depths[5] = -1;
+    depths[6] = bits_number(1), depths[7] = -INFINITE, depths[8] = INFINITE, depths[9] = NOT_A_NUMBER,
+    depths[10] = -1e38;
     depths[11] = 1e29, depths[12] = 1e38;
     camera.near_plane = (ssdgs_real)0.5;
     model = cloud(plain(), GOOD);
@@ -405,10 +450,13 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
     trains(model, &camera, &light);
     ssdgs_model_destroy(model);
     model = cloud(plain(), BESIDE);
-    for (i = -12; i <= 12; i++) { /* 90 degrees to the side and about that, at a distance of 1, a ball of radius 1/2 is not seen */
+    for (i = -12; i <= 12; i++) { /* 90 degrees to the side and about that, at a distance of 1, a ball of
+                                     radius 1/2 is not seen */
         const double angle = (90 + i) * 3.14159265358979324 / 180;
-        const ssdgs_real eye[3] = {(ssdgs_real)centre[0], (ssdgs_real)centre[1], (ssdgs_real)(centre[2] - 1)}, up[3] = {0, 1, 0};
-        const ssdgs_real target[3] = {eye[0] + (ssdgs_real)sin(angle), eye[1], eye[2] + (ssdgs_real)cos(angle)};
+        const ssdgs_real eye[3] = {(ssdgs_real)centre[0], (ssdgs_real)centre[1], (ssdgs_real)(centre[2] - 1)},
+                         up[3] = {0, 1, 0};
+        const ssdgs_real target[3] = {eye[0] + (ssdgs_real)sin(angle), eye[1],
+                                      eye[2] + (ssdgs_real)cos(angle)};
         const ssdgs_camera turned = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.9, W, H);
         double alpha = 0;
         int k;
@@ -419,8 +467,10 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
     ssdgs_model_destroy(model);
 }
 
-static void row_07(void) { /* log scales are clamped to +-20 at use, infinite ones too; NaN is not drawn but counted */
-    static const double scales[8] = {-20, -44, -100, -1e38, 20, 44.4, 88.8, 1e38}; /* 44.4: its square overflows */
+static void row_07(
+    void) { /* log scales are clamped to +-20 at use, infinite ones too; NaN is not drawn but counted */
+    static const double scales[8] = {-20, -44,  -100, -1e38,
+                                     20,  44.4, 88.8, 1e38}; /* 44.4: its square overflows */
     ssdgs_camera camera = ahead();
     ssdgs_model *model = make(plain(), 1);
     int i, sign;
@@ -432,7 +482,8 @@ static void row_07(void) { /* log scales are clamped to +-20 at use, infinite on
     }
     ssdgs_model_destroy(model);
     for (sign = -1; sign < 2; sign += 2) {
-        with(full(), SSDGS_LOG_SCALE, 1, sign < 0 ? -INFINITE : INFINITE, &a); /* a product with it -ffast-math may take for nothing */
+        with(full(), SSDGS_LOG_SCALE, 1, sign < 0 ? -INFINITE : INFINITE,
+             &a); /* a product with it -ffast-math may take for nothing */
         CHECK(same(&a, with(full(), SSDGS_LOG_SCALE, 1, sign * 20, &b)) && a.stats.rejected == 0);
     }
     for (i = 0; i < 3; i++) {
@@ -525,7 +576,8 @@ static void row_12(void) { /* opacity logits are clamped to +-20 at use; files c
     CHECK(loaded("-4", "20", "1").clamped_opacities == 0 && loaded("-4", "nan", "1").dropped == 1);
 }
 
-static void row_13(void) { /* around o = 1/255, in steps of the logit's ulp: nothing, then from one logit on one pixel */
+static void row_13(
+    void) { /* around o = 1/255, in steps of the logit's ulp: nothing, then from one logit on one pixel */
     ssdgs_model *model = make(plain(), 1);
     double first = 0;
     int i, k, wrong = 0;
@@ -537,13 +589,15 @@ static void row_13(void) { /* around o = 1/255, in steps of the logit's ulp: not
         look(model, &a);
         for (k = 0; k < PIXELS; k++) lit += a.alpha[k] > 0;
         if (lit && !(first < 0)) first = logit; /* the first one drawn; all after it are */
-        wrong += lit != (first < 0) || a.stats.shaded != lit || (lit && !(fabs((double)a.alpha[CENTRE] * 255 - 1) < 2e-5));
+        wrong += lit != (first < 0) || a.stats.shaded != lit ||
+                 (lit && !(fabs((double)a.alpha[CENTRE] * 255 - 1) < 2e-5));
     }
     CHECK(!wrong && fabs(first + log(254)) < 3e-6);
     ssdgs_model_destroy(model);
 }
 
-static void row_14(void) { /* a thousand veils below the threshold: it hides them all; without it they let exp(-3.9) through */
+static void row_14(void) { /* a thousand veils below the threshold: it hides them all; without it they let
+                              exp(-3.9) through */
     const ssdgs_camera camera = ahead();
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = make(plain(), 1000);
@@ -552,7 +606,8 @@ static void row_14(void) { /* a thousand veils below the threshold: it hides the
     show(model, &camera, NULL, 0, &options, &a);
     CHECK(a.alpha[CENTRE] <= 0 && a.stats.shaded <= 1); /* one is shaded where none is seen */
     options.alpha_threshold = 0;
-    show(model, &camera, NULL, 0, &options, &b); /* every alpha is 2e-7 off at most, a thousand times that in T */
+    show(model, &camera, NULL, 0, &options,
+         &b); /* every alpha is 2e-7 off at most, a thousand times that in T */
     CHECK(fabs((1 - (double)b.alpha[CENTRE]) / pow(1 - 0.0039, 1000) - 1) < 1e-5 && b.stats.shaded == 1000);
     ssdgs_model_destroy(model);
 }
@@ -581,7 +636,8 @@ static void row_16(void) { /* equal depths are drawn in the order of the indices
     ssdgs_model *model = cloud(plain(), N);
     int order, i;
     for (order = 0; order < 3; order++) { /* all equal, farther with the index, nearer with it */
-        for (i = 0; i < N; i++) set(model, i, SSDGS_POSITION + 2, 1, 2 + (order == 1 ? i : order == 2 ? -i : 0) * 2.4e-7);
+        for (i = 0; i < N; i++)
+            set(model, i, SSDGS_POSITION + 2, 1, 2 + (order == 1 ? i : order == 2 ? -i : 0) * 2.4e-7);
         look(model, order == 0 ? &a : order == 1 ? &b : &c);
         CHECK(!order || same(look(model, &c), order == 1 ? &b : &c));
     }
@@ -589,11 +645,13 @@ static void row_16(void) { /* equal depths are drawn in the order of the indices
     ssdgs_model_destroy(model);
 }
 
-static void row_17(void) { /* the image does not know where tiles begin: centres on corners, ellipses that touch edges */
+static void row_17(
+    void) { /* the image does not know where tiles begin: centres on corners, ellipses that touch edges */
     ssdgs_model *model = make(plain(), 4);
     ssdgs_camera camera = ahead();
     int shift, i, x, y, wrong = 0;
-    /* dyadic numbers, so that shifted centres are exact; the last has its edge, sqrt(2 ln(255 o) variance), near a tile's */
+    /* dyadic numbers, so that shifted centres are exact; the last has its edge, sqrt(2 ln(255 o) variance),
+       near a tile's */
     put(model, 0, 0, 0, 1, -4, 1);
     put(model, 1, 0.25, -0.125, 1, -3, 0);
     put(model, 2, -0.25, 0.25, 1, -12, 3);
@@ -606,7 +664,8 @@ static void row_17(void) { /* the image does not know where tiles begin: centres
         for (y = 0; y < H - shift; y++)
             for (x = shift; x < W; x++)
                 for (i = 0; i < 3; i++) {
-                    const ssdgs_real here = b.color[3 * (y * W + x) + i], there = a.color[3 * ((y + shift) * W + x - shift) + i];
+                    const ssdgs_real here = b.color[3 * (y * W + x) + i],
+                                     there = a.color[3 * ((y + shift) * W + x - shift) + i];
                     wrong += memcmp(&here, &there, sizeof here) != 0;
                 }
     }
@@ -620,11 +679,13 @@ static ssdgs_model *curtains(int count) {
     const ssdgs_model_view v = ssdgs_model_get(model);
     int i;
     for (i = 0; i < count; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = 1;
-    for (i = 0; i < 3 * count; i++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + i % 3) * v.stride + (size_t)i / 3] = 5;
+    for (i = 0; i < 3 * count; i++)
+        v.gaussians[(size_t)(SSDGS_LOG_SCALE + i % 3) * v.stride + (size_t)i / 3] = 5;
     return model;
 }
 
-static void row_18(void) { /* more pairs of tile and splat than the allocator grants, then than 31 bits count: an error each */
+static void row_18(void) { /* more pairs of tile and splat than the allocator grants, then than 31 bits count:
+                              an error each */
     const size_t grants = (size_t)640 << 20;
     ssdgs_camera camera = ahead();
     ssdgs_image nothing;
@@ -679,8 +740,9 @@ static void row_19(void) { /* what lies behind the camera costs a record, whatev
     context = shared;
 }
 
-static void row_20(void) { /* a scene far away, in units that grow with the distance: coordinates on a grid keep every bit. Real
-                              numbers of 32 bits resolve 1e-3 of it; recentring is the caller's, before they become 32 bits */
+static void row_20(void) { /* a scene far away, in units that grow with the distance: coordinates on a grid
+                              keep every bit. Real numbers of 32 bits resolve 1e-3 of it; recentring is the
+                              caller's, before they become 32 bits */
     static const double offsets[4] = {0, 8192, 1048576, 134217728};
     int o, i, k;
     for (o = 0; o < 4; o++) {
@@ -702,10 +764,14 @@ static void row_20(void) { /* a scene far away, in units that grow with the dist
     CHECK(peak(&a) > 0.1);
 }
 
-static void row_26(void) { /* colours beyond all measure: a finite image, bytes at their ends, every other pixel as it was */
+static void row_26(
+    void) { /* colours beyond all measure: a finite image, bytes at their ends, every other pixel as it was */
     static const ssdgs_real huge[4] = {(ssdgs_real)1e30, (ssdgs_real)-1e30, 3, (ssdgs_real)0.5};
-    const int groups[5][2] = {{SSDGS_DIFFUSE, 9}, {SSDGS_FRAME, 4}, {SSDGS_ASG_WEIGHT, 8}, {SSDGS_MATERIAL, 6},
-        {SSDGS_SPECULAR, 3}};
+    const int groups[5][2] = {{SSDGS_DIFFUSE, 9},
+                              {SSDGS_FRAME, 4},
+                              {SSDGS_ASG_WEIGHT, 8},
+                              {SSDGS_MATERIAL, 6},
+                              {SSDGS_SPECULAR, 3}};
     ssdgs_real ends[2];
     unsigned char bytes[6];
     int s, g, i;
@@ -714,22 +780,29 @@ static void row_26(void) { /* colours beyond all measure: a finite image, bytes 
             const ssdgs_settings settings = s ? plain() : full();
             int v, changed;
             for (v = -1; v < 5; v++) { /* first as it should be */
-                const double value = v == 0 ? NOT_A_NUMBER : v == 1 ? INFINITE : v == 2 ? -INFINITE : v == 3 ? 1e30 : -1e30;
+                const double value = v == 0   ? NOT_A_NUMBER
+                                     : v == 1 ? INFINITE
+                                     : v == 2 ? -INFINITE
+                                     : v == 3 ? 1e30
+                                              : -1e30;
                 ssdgs_model *model = cloud(settings, 200);
                 put(model, 9, 0, 0, 1.4, -6, 3);
                 if (v >= 0) set(model, 9, groups[g][0], groups[g][1], value);
                 look(model, v < 0 ? &b : &a);
                 for (i = changed = 0; i < PIXELS; i++) {
                     const int near_it = abs(i % W - W / 2) < 4 && abs(i / W - H / 2) < 4;
-                    changed += !near_it && memcmp(a.color + 3 * i, b.color + 3 * i, 3 * sizeof(ssdgs_real)) != 0;
+                    changed +=
+                        !near_it && memcmp(a.color + 3 * i, b.color + 3 * i, 3 * sizeof(ssdgs_real)) != 0;
                 }
                 CHECK(v < 0 || !changed);
-                if (v == 0 && g != 3 && (s == 0 || g == 0)) CHECK(a.stats.blackened == 1); /* a ReLU takes NaN for 0 */
+                if (v == 0 && g != 3 && (s == 0 || g == 0))
+                    CHECK(a.stats.blackened == 1); /* a ReLU takes NaN for 0 */
                 if (v > 2 && g == 0) CHECK(a.stats.blackened == 0);
                 ssdgs_model_destroy(model);
             }
         }
-    for (s = 0; s < 4; s++) { /* what all deferred lobes share, and reflectances within what is not yet black */
+    for (s = 0; s < 4;
+         s++) { /* what all deferred lobes share, and reflectances within what is not yet black */
         ssdgs_model *model = cloud(full(), 200);
         const ssdgs_model_view v = ssdgs_model_get(model);
         for (i = 0; i < SSDGS_ASG_COUNT; i++) {
@@ -771,24 +844,29 @@ static void brute(ssdgs_model *model, const ssdgs_camera *camera, double varianc
     for (p = 0; p < PIXELS; p++) through[p] = 1;
     for (p = 0; p < 3 * PIXELS; p++) color[p] = 0;
     for (n = 0; n < v.count; n++) {
-        double x[3], q[4], s[3], l[2][3], m[2][3], cov[3] = {variance, 0, variance}, det, t[3], length = 0, best = 1e300;
+        double x[3], q[4], s[3], l[2][3], m[2][3], cov[3] = {variance, 0, variance}, det, t[3], length = 0,
+                                                   best = 1e300;
         int g = 0;
         for (i = 0; i < v.count; i++) { /* the nearest one left */
             double z = (double)camera->view[11];
-            for (k = 0; k < 3; k++) z += (double)camera->view[8 + k] * (double)v.gaussians[(size_t)k * v.stride + (size_t)i];
+            for (k = 0; k < 3; k++)
+                z += (double)camera->view[8 + k] * (double)v.gaussians[(size_t)k * v.stride + (size_t)i];
             if (!done[i] && z < best) best = z, g = i;
         }
         done[g] = 1;
-#define RAW(channel) ((double)v.gaussians[(size_t)(channel) * v.stride + (size_t)g])
+#define RAW(channel) ((double)v.gaussians[(size_t)(channel)*v.stride + (size_t)g])
         if (best <= 0.01) continue;
         for (k = 0; k < 4; k++) q[k] = RAW(SSDGS_ROTATION + k), length += q[k] * q[k];
         for (k = 0; k < 4; k++) q[k] /= sqrt(length);
         for (k = 0; k < 3; k++) x[k] = RAW(k), s[k] = exp(RAW(SSDGS_LOG_SCALE + k));
         for (k = 0; k < 3; k++)
-            for (j = 0, t[k] = (double)camera->view[4 * k + 3]; j < 3; j++) t[k] += (double)camera->view[4 * k + j] * x[j];
+            for (j = 0, t[k] = (double)camera->view[4 * k + 3]; j < 3; j++)
+                t[k] += (double)camera->view[4 * k + j] * x[j];
         for (j = 0; j < 3; j++) { /* J W, then its product with the rotation's columns and the scales */
-            l[0][j] = (double)camera->fx / t[2] * ((double)camera->view[j] - t[0] / t[2] * (double)camera->view[8 + j]);
-            l[1][j] = (double)camera->fy / t[2] * ((double)camera->view[4 + j] - t[1] / t[2] * (double)camera->view[8 + j]);
+            l[0][j] = (double)camera->fx / t[2] *
+                      ((double)camera->view[j] - t[0] / t[2] * (double)camera->view[8 + j]);
+            l[1][j] = (double)camera->fy / t[2] *
+                      ((double)camera->view[4 + j] - t[1] / t[2] * (double)camera->view[8 + j]);
         }
         for (j = 0; j < 3; j++) {
             const int a1 = (j + 1) % 3, a2 = (j + 2) % 3;
@@ -796,9 +874,11 @@ static void brute(ssdgs_model *model, const ssdgs_camera *camera, double varianc
             column[j] = 1 - 2 * (q[1 + a1] * q[1 + a1] + q[1 + a2] * q[1 + a2]);
             column[a1] = 2 * (q[1 + j] * q[1 + a1] + q[0] * q[1 + a2]);
             column[a2] = 2 * (q[1 + j] * q[1 + a2] - q[0] * q[1 + a1]);
-            for (i = 0; i < 2; i++) m[i][j] = s[j] * (l[i][0] * column[0] + l[i][1] * column[1] + l[i][2] * column[2]);
+            for (i = 0; i < 2; i++)
+                m[i][j] = s[j] * (l[i][0] * column[0] + l[i][1] * column[1] + l[i][2] * column[2]);
         }
-        for (j = 0; j < 3; j++) cov[0] += m[0][j] * m[0][j], cov[1] += m[0][j] * m[1][j], cov[2] += m[1][j] * m[1][j];
+        for (j = 0; j < 3; j++)
+            cov[0] += m[0][j] * m[0][j], cov[1] += m[0][j] * m[1][j], cov[2] += m[1][j] * m[1][j];
         det = cov[0] * cov[2] - cov[1] * cov[1];
         for (p = 0; p < PIXELS; p++) {
             const double dx = p % W + 0.5 - (double)camera->fx * t[0] / t[2] - (double)camera->cx;
@@ -806,7 +886,8 @@ static void brute(ssdgs_model *model, const ssdgs_camera *camera, double varianc
             double alpha = exp(-0.5 * (cov[2] * dx * dx - 2 * cov[1] * dx * dy + cov[0] * dy * dy) / det);
             alpha /= 1 + exp(-RAW(SSDGS_OPACITY));
             alpha = alpha < 0.999 ? alpha : 0.999;
-            for (k = 0; k < 3; k++) color[3 * p + k] += through[p] * alpha * log(1 + exp(RAW(SSDGS_DIFFUSE + k)));
+            for (k = 0; k < 3; k++)
+                color[3 * p + k] += through[p] * alpha * log(1 + exp(RAW(SSDGS_DIFFUSE + k)));
             through[p] *= 1 - alpha;
         }
     }
@@ -814,9 +895,10 @@ static void brute(ssdgs_model *model, const ssdgs_camera *camera, double varianc
 #undef RAW
 }
 
-static void row_28(void) { /* pixels sixteen times as wide as high, principal points far outside of the image */
-    static const double cases[5][4] = {{64, 4, 32, 24}, {4, 64, 32, 24}, {64, 64, -200, 24}, {64, 4, 300, -40},
-        {16, 256, 32, 900}};
+static void row_28(
+    void) { /* pixels sixteen times as wide as high, principal points far outside of the image */
+    static const double cases[5][4] = {
+        {64, 4, 32, 24}, {4, 64, 32, 24}, {64, 64, -200, 24}, {64, 4, 300, -40}, {16, 256, 32, 900}};
     static double want[3 * PIXELS];
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = cloud(plain(), 60);
@@ -828,24 +910,28 @@ static void row_28(void) { /* pixels sixteen times as wide as high, principal po
         camera.fy = (ssdgs_real)cases[i][1];
         camera.cx = (ssdgs_real)cases[i][2];
         camera.cy = (ssdgs_real)cases[i][3];
-        camera.view[3] = (ssdgs_real)(2 * (32 - cases[i][2]) / cases[i][0]); /* the scene stays in the image */
+        camera.view[3] =
+            (ssdgs_real)(2 * (32 - cases[i][2]) / cases[i][0]); /* the scene stays in the image */
         camera.view[7] = (ssdgs_real)(2 * (24 - cases[i][3]) / cases[i][1]);
         show(model, &camera, NULL, 0, &options, &a);
         brute(model, &camera, (double)ssdgs_model_settings(model)->pixel_variance, want);
         for (k = 0; k < 3 * PIXELS; k++) b.color[k] = (ssdgs_real)want[k];
         /* centres are rounded to an ulp of cx, whatever it is */
-        CHECK(distance(a.color, b.color, 3 * PIXELS) < 2e-5 * (1 + (fabs(cases[i][2]) + fabs(cases[i][3])) / 64));
+        CHECK(distance(a.color, b.color, 3 * PIXELS) <
+              2e-5 * (1 + (fabs(cases[i][2]) + fabs(cases[i][3])) / 64));
         CHECK(peak(&a) > 0.1);
     }
     ssdgs_model_destroy(model);
 }
 
 static void row_29(void) { /* views that are no rigid motion: an error; within 1e-3 of one they pass */
-    static const struct { double v[9]; const char *word; } bad[] = {
-        {{2, 0, 0, 0, 2, 0, 0, 0, 2}, "orthonormal"}, {{1, 0.01, 0, 0, 1, 0, 0, 0, 1}, "orthonormal"},
-        {{0, 0, 0, 0, 0, 0, 0, 0, 0}, "orthonormal"}, {{1, 0, 0, 1, 0, 0, 0, 0, 1}, "orthonormal"},
-        {{-1, 0, 0, 0, 1, 0, 0, 0, 1}, "mirror"}, {{0, 1, 0, 1, 0, 0, 0, 0, 1}, "mirror"},
-        {{-1, 0, 0, 0, -1, 0, 0, 0, -1}, "mirror"}, {{1e20, 0, 0, 0, 1, 0, 0, 0, 1}, "orthonormal"}};
+    static const struct {
+        double v[9];
+        const char *word;
+    } bad[] = {{{2, 0, 0, 0, 2, 0, 0, 0, 2}, "orthonormal"}, {{1, 0.01, 0, 0, 1, 0, 0, 0, 1}, "orthonormal"},
+               {{0, 0, 0, 0, 0, 0, 0, 0, 0}, "orthonormal"}, {{1, 0, 0, 1, 0, 0, 0, 0, 1}, "orthonormal"},
+               {{-1, 0, 0, 0, 1, 0, 0, 0, 1}, "mirror"},     {{0, 1, 0, 1, 0, 0, 0, 0, 1}, "mirror"},
+               {{-1, 0, 0, 0, -1, 0, 0, 0, -1}, "mirror"},   {{1e20, 0, 0, 0, 1, 0, 0, 0, 1}, "orthonormal"}};
     ssdgs_model *model = cloud(full(), 50);
     ssdgs_camera camera = ahead();
     int i, k;
@@ -886,23 +972,29 @@ static void random_turn(int i, double q[4]) {
     for (k = 0; k < 4; k++) q[k] /= sqrt(norm);
 }
 
-static void row_31(void) { /* a light straight above, below, beside: as the same scene turned, but for the map's pixels */
+static void row_31(
+    void) { /* a light straight above, below, beside: as the same scene turned, but for the map's pixels */
     double q[4], d, worst = 0, mean = 0;
     int i, k;
     for (i = 0; i < 12; i++) {
         const double side = i & 1 ? -3 : 3;
-        const ssdgs_light light = lamp(i / 2 % 3 == 0 ? side : 0, i / 2 % 3 == 1 ? side : 0, 2 + (i / 2 % 3 == 2 ? side : 0), 3);
+        const ssdgs_light light =
+            lamp(i / 2 % 3 == 0 ? side : 0, i / 2 % 3 == 1 ? side : 0, 2 + (i / 2 % 3 == 2 ? side : 0), 3);
         random_turn(i % 6, q);
         d = turned(i < 6 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED, &light, q, 256);
         if (i < 6) worst = d > worst ? d : worst;
-        else for (k = 0, d = 0; k < PIXELS; k++) mean += fabs((double)(a.shadow[k] - b.shadow[k])) / (6 * PIXELS);
+        else
+            for (k = 0, d = 0; k < PIXELS; k++)
+                mean += fabs((double)(a.shadow[k] - b.shadow[k])) / (6 * PIXELS);
     }
     CHECK(worst < 1e-3 && mean < 4e-3); /* pixels' own shadows show those of the map: 1.5e-3 on average */
 }
 
-static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1e-8 from it: finite. The nearer, the brighter, to
-                              1/1000 of the length unit; nearer than that the light has no direction, and fades */
-    static const double places[5][3] = {{0, 0, 0}, {0, 0, 2}, {0.3, 0.1, 2}, {0.3 + 1e-8, 0.1, 2}, {0.3, 0.101, 2}};
+static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1e-8 from it: finite. The
+                              nearer, the brighter, to 1/1000 of the length unit; nearer than that the light
+                              has no direction, and fades */
+    static const double places[5][3] = {
+        {0, 0, 0}, {0, 0, 2}, {0.3, 0.1, 2}, {0.3 + 1e-8, 0.1, 2}, {0.3, 0.101, 2}};
     const ssdgs_camera camera = ahead();
     ssdgs_light light;
     ssdgs_model *model = cloud(full(), 300);
@@ -925,7 +1017,9 @@ static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1
         if (d > 6e-4) {
             CHECK((double)a.color[3 * CENTRE] > last);
             last = (double)a.color[3 * CENTRE];
-            if (d >= 1) CHECK(fabs((double)a.color[3 * CENTRE] * 3.14159265358979 * d * d / (double)a.alpha[CENTRE] - 1) < 1e-5);
+            if (d >= 1)
+                CHECK(fabs((double)a.color[3 * CENTRE] * 3.14159265358979 * d * d / (double)a.alpha[CENTRE] -
+                           1) < 1e-5);
             floor_color = 1 / (0.25e-6 * 3.14159265358979);
         } else CHECK((double)a.color[3 * CENTRE] <= floor_color);
     }
@@ -945,8 +1039,9 @@ static void row_33(void) { /* a light a million extents away is a directional on
     ssdgs_model_destroy(model);
 }
 
-static void row_34(void) { /* Gaussians all around the light, in each of 14 directions one, first free, then behind another of
-                              opacity 1/2. The middles, edges and corners of the cube's faces are no different */
+static void row_34(
+    void) { /* Gaussians all around the light, in each of 14 directions one, first free, then behind another
+               of opacity 1/2. The middles, edges and corners of the cube's faces are no different */
     static const ssdgs_asg forms[2] = {SSDGS_ASG_GEOMETRIC, SSDGS_ASG_DEFERRED};
     ssdgs_model *model;
     ssdgs_camera camera;
@@ -962,15 +1057,19 @@ static void row_34(void) { /* Gaussians all around the light, in each of 14 dire
                 int j;
                 for (j = 0; j < 14; j++) { /* all of them, then a look at number i */
                     for (k = 0, norm = 0; k < 3; k++)
-                        d[k] = j < 6 ? (j / 2 == k) * (j & 1 ? -1 : 1) : (j >> k & 1 ? -1 : 1), norm += d[k] * d[k];
+                        d[k] = j < 6 ? (j / 2 == k) * (j & 1 ? -1 : 1) : (j >> k & 1 ? -1 : 1),
+                        norm += d[k] * d[k];
                     for (k = 0; k < 3; k++) d[k] /= sqrt(norm);
-                    put(model, 2 * j, centre[0] + 2 * d[0], centre[1] + 2 * d[1], centre[2] + 2 * d[2], -4, 3);
-                    put(model, 2 * j + 1, centre[0] + d[0], centre[1] + d[1], centre[2] + d[2], -2, shaded ? 0 : -20);
+                    put(model, 2 * j, centre[0] + 2 * d[0], centre[1] + 2 * d[1], centre[2] + 2 * d[2], -4,
+                        3);
+                    put(model, 2 * j + 1, centre[0] + d[0], centre[1] + d[1], centre[2] + d[2], -2,
+                        shaded ? 0 : -20);
                     if (j == i) memcpy(e, d, sizeof e);
                 }
                 for (k = 0; k < 3; k++) { /* from the side */
                     at[k] = (ssdgs_real)(centre[k] + 2 * e[k]);
-                    eye[k] = (ssdgs_real)(centre[k] + 2 * e[k] + 0.3 * (e[(k + 1) % 3] - e[(k + 2) % 3]) + (i < 6 ? 0 : 0.2 * e[k]));
+                    eye[k] = (ssdgs_real)(centre[k] + 2 * e[k] + 0.3 * (e[(k + 1) % 3] - e[(k + 2) % 3]) +
+                                          (i < 6 ? 0 : 0.2 * e[k]));
                     up[k] = (ssdgs_real)e[k];
                 }
                 camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, H);
@@ -983,11 +1082,13 @@ static void row_34(void) { /* Gaussians all around the light, in each of 14 dire
             }
         ssdgs_model_destroy(model);
     }
-    CHECK(worst[0] < 0.03); /* footprints are averages, and at a cube's corner the affine projection is 4% off */
+    CHECK(worst[0] <
+          0.03); /* footprints are averages, and at a cube's corner the affine projection is 4% off */
     CHECK(worst[1] < 0.06); /* half of it looked up, between the distances of two levels */
 }
 
-static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative ones and those that are not finite are refused */
+static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative ones and those that are not
+                              finite are refused */
     const ssdgs_camera camera = ahead();
     ssdgs_model *model = cloud(full(), 300);
     ssdgs_light light = lamp(1, -1, 0, 0);
@@ -1004,7 +1105,8 @@ static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative 
         const ssdgs_real value = (ssdgs_real)(k % 3 == 0 ? -1 : k % 3 == 1 ? INFINITE : NOT_A_NUMBER);
         lights[0] = lights[1] = lamp(1, -1, 0, 1);
         lights[1].intensity[k / 3] = value;
-        refused(model, &camera, lights, 2, NULL, SSDGS_ERR_ARGUMENT, k % 3 == 0 ? "light 1: intensity[" : "light 1");
+        refused(model, &camera, lights, 2, NULL, SSDGS_ERR_ARGUMENT,
+                k % 3 == 0 ? "light 1: intensity[" : "light 1");
         lights[1] = lights[0];
         if (k % 3) lights[1].position[k / 3] = value;
         else lights[1].kind = SSDGS_LIGHT_DIRECTIONAL; /* not a unit vector */
@@ -1015,7 +1117,8 @@ static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative 
     ssdgs_model_destroy(model);
 }
 
-static void row_36(void) { /* no light: black, there is no ambient one; 64 lights: the sum of the single ones */
+static void row_36(
+    void) { /* no light: black, there is no ambient one; 64 lights: the sum of the single ones */
     enum { LIGHTS = 64 };
     const ssdgs_camera camera = ahead();
     const ssdgs_render_options options = ssdgs_render_options_exact();
@@ -1030,7 +1133,8 @@ static void row_36(void) { /* no light: black, there is no ambient one; 64 light
     CHECK(peak(&a) <= 0 && a.alpha[CENTRE] > 0);
     for (k = 0; k < 3 * PIXELS; k++) sum[k] = 0;
     for (i = 0; i < LIGHTS; i++) {
-        lights[i] = lamp(3 * draw(6, 3 * (uint64_t)i), 3 * draw(6, 3 * (uint64_t)i + 1), 2 + 3 * draw(6, 3 * (uint64_t)i + 2), 1);
+        lights[i] = lamp(3 * draw(6, 3 * (uint64_t)i), 3 * draw(6, 3 * (uint64_t)i + 1),
+                         2 + 3 * draw(6, 3 * (uint64_t)i + 2), 1);
         show(model, &camera, lights + i, 1, &options, &a);
         for (k = 0; k < 3 * PIXELS; k++) sum[k] += (double)a.color[k];
     }
@@ -1040,7 +1144,8 @@ static void row_36(void) { /* no light: black, there is no ambient one; 64 light
     ssdgs_model_destroy(model);
 }
 
-static void row_37(void) { /* the light straight behind a Gaussian, seen against it: the half vector's length goes through 0 */
+static void row_37(void) { /* the light straight behind a Gaussian, seen against it: the half vector's length
+                              goes through 0 */
     const ssdgs_camera camera = ahead();
     int i;
     for (i = -1; i < 9; i++) {
@@ -1057,7 +1162,8 @@ static void row_37(void) { /* the light straight behind a Gaussian, seen against
     }
 }
 
-static void row_41(void) { /* the camera at a Gaussian's centre: culled, so never shaded; one a hair in front is, and finite */
+static void row_41(void) { /* the camera at a Gaussian's centre: culled, so never shaded; one a hair in front
+                              is, and finite */
     ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(1, -1, 0, 1);
     ssdgs_model *model = cloud(full(), 200);
@@ -1076,7 +1182,8 @@ static void row_41(void) { /* the camera at a Gaussian's centre: culled, so neve
     ssdgs_model_destroy(model);
 }
 
-static void row_44(void) { /* networks with weights a thousand times too large, or inputs of 1e4, saturate; files refuse NaN */
+static void row_44(void) { /* networks with weights a thousand times too large, or inputs of 1e4, saturate;
+                              files refuse NaN */
     static const char path[] = "build/t_stress.ply";
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(1, -1, 0, 1);
@@ -1103,8 +1210,9 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
         v = ssdgs_model_get(model);
         (k ? v.shadow : v.scattering)[5] = 12345;
         CHECK(!ssdgs_model_save(model, path) && !ssdgs__read_file(context, path, &bytes, &size));
-        for (i = 0, at = size; i + 4 <= size; i++) at = memcmp(bytes + i, "\0\344\100\106", 4) ? at : i; /* 12345 */
-        if (CHECK(at < size)) memcpy(bytes + at, "\0\0\300\177", 4);                              /* NaN */
+        for (i = 0, at = size; i + 4 <= size; i++)
+            at = memcmp(bytes + i, "\0\344\100\106", 4) ? at : i;    /* 12345 */
+        if (CHECK(at < size)) memcpy(bytes + at, "\0\0\300\177", 4); /* NaN */
         CHECK(ssdgs_model_load_memory(context, bytes, size, &back, NULL) == SSDGS_ERR_FORMAT && !back);
         CHECK(strstr(ssdgs_error_message(context), k ? "shadow" : "scattering"));
         ssdgs__release(context, bytes);
@@ -1115,8 +1223,8 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     }
 }
 
-static void row_46(void) { /* the shadow's error falls with the map's resolution, a floor blurs less than an added variance,
-                               and one stray Gaussian in 400 does not coarsen it */
+static void row_46(void) { /* the shadow's error falls with the map's resolution, a floor blurs less than an
+                              added variance, and one stray Gaussian in 400 does not coarsen it */
     enum { FINEST = 5 };
     static const double tolerance[4] = {5e-5, 5e-4, 1e-2, 1e-3};
     const ssdgs_camera camera = ahead();
@@ -1134,7 +1242,8 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
                 ssdgs_model *model;
                 settings.light_blur = blur;
                 model = cloud(settings, 300);
-                for (i = 0; sub % 2 && i < 300; i++) set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
+                for (i = 0; sub % 2 && i < 300; i++)
+                    set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
                 show(model, &camera, &light, 1, NULL, step == FINEST && blur ? &finest : &a);
                 if (step < 0) { /* a hundredth of it too */
                     show(model, &camera, &light, 1, &coarse, &a);
@@ -1148,9 +1257,12 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
                     error[blur][step] += fabs((double)(a.shadow[i] - finest.shadow[i])) / PIXELS;
                 b = a;
             }
-        for (blur = 0; blur < 2 - sub % 2; blur++) CHECK(error[blur][4] < error[blur][2] && error[blur][2] < error[blur][0]);
-        CHECK(error[SSDGS_BLUR_FLOOR][3] < tolerance[sub]); /* at 128^2, measured 1.8e-5, 1.8e-4; pixels' own 3.2e-3, 3.4e-4 */
-        for (step = 1; step < FINEST; step++) CHECK(error[SSDGS_BLUR_FLOOR][step] < error[SSDGS_BLUR_ADD][step]);
+        for (blur = 0; blur < 2 - sub % 2; blur++)
+            CHECK(error[blur][4] < error[blur][2] && error[blur][2] < error[blur][0]);
+        CHECK(error[SSDGS_BLUR_FLOOR][3] <
+              tolerance[sub]); /* at 128^2, measured 1.8e-5, 1.8e-4; pixels' own 3.2e-3, 3.4e-4 */
+        for (step = 1; step < FINEST; step++)
+            CHECK(error[SSDGS_BLUR_FLOOR][step] < error[SSDGS_BLUR_ADD][step]);
     }
     for (step = 0; step < 2; step++) { /* nor do those that alpha_threshold hides, even of few */
         ssdgs_model *model = cloud(lambert(step ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, 0.02, 0), 100);
@@ -1161,9 +1273,11 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
         CHECK(same(&a, &b));
         ssdgs_model_destroy(model);
     }
-    for (step = 0; step < 12; step++) { /* faint, or giant and faint, 10 to 1e7 extents away; the light far, near, directional */
+    for (step = 0; step < 12;
+         step++) { /* faint, or giant and faint, 10 to 1e7 extents away; the light far, near, directional */
         static const double away[4] = {10, 1e3, 1e5, 1e7};
-        ssdgs_model *model = cloud(lambert(step % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, 0.02, 256), 400);
+        ssdgs_model *model =
+            cloud(lambert(step % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, 0.02, 256), 400);
         ssdgs_light lit = step / 4 == 0 ? lamp(20, -20, 0, 400) : light;
         double off = 0;
         if (step / 4 == 2) {
@@ -1197,7 +1311,8 @@ static void row_47(void) { /* the cube of maps about a light in the scene: ten r
     CHECK(spread < 0.04);
 }
 
-static void row_48(void) { /* the bias: 0 shadows all that is behind, a huge one nothing, a negative one is refused */
+static void row_48(
+    void) { /* the bias: 0 shadows all that is behind, a huge one nothing, a negative one is refused */
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, -2, 1);
     static const double biases[4] = {0, 0.8, 1.2, 1e30}; /* in units of 1/2: the Gaussians are 1/2 apart */
@@ -1217,7 +1332,7 @@ static void row_48(void) { /* the bias: 0 shadows all that is behind, a huge one
         set(model, 0, SSDGS_ASG_WEIGHT + 3, 1, 40); /* S is the Gaussians' */
         set(model, 1, SSDGS_ASG_WEIGHT + 3, 1, 40);
         show(model, &camera, &light, 1, NULL, &a);
-                /* the front one's weight, and the other's 1/2 opacity(5) of light 1/2 or 1 */
+        /* the front one's weight, and the other's 1/2 opacity(5) of light 1/2 or 1 */
         want = (double)a.alpha[CENTRE] - (i < 4 ? 0.5 * ((double)a.alpha[CENTRE] - 0.5) : 0);
         CHECK(fabs((double)a.shadow[CENTRE] - want) < 2e-3);
         ssdgs_model_destroy(model);
@@ -1235,14 +1350,16 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
         ssdgs_model *model;
         settings.shadow_layers = 0;
         settings.light_bias = (ssdgs_real)(t == 2 ? 1e30 : 0.06); /* S = 1 */
-        settings.depth_cue = settings.transport = t != 2; /* which need the light pass, too, for the scattering */
+        settings.depth_cue = settings.transport =
+            t != 2; /* which need the light pass, too, for the scattering */
         model = cloud(settings, 300);
         for (i = 0; t < 2 && i < 300; i++) set(model, i, t ? SSDGS_SCATTERING : SSDGS_SPECULAR, 3, -INFINITE);
         options.terms = SSDGS_ALL_TERMS;
         show(model, &camera, &light, 1, &options, &a);
         options.terms = SSDGS_ALL_TERMS & ~terms[t];
         show(model, &camera, &light, 1, &options, &b);
-        CHECK(distance(a.color, b.color, 3 * PIXELS) < (t == 2 ? 1e-6 * peak(&a) : 1e-36)); /* a mean of ones is 1 but for rounding */
+        CHECK(distance(a.color, b.color, 3 * PIXELS) <
+              (t == 2 ? 1e-6 * peak(&a) : 1e-36)); /* a mean of ones is 1 but for rounding */
         CHECK(peak(&a) > 0.01 && a.stats.blackened == 0);
         if (t == 1) CHECK(a.stats.network_work > 0 && b.stats.network_work <= 0);
         if (t == 2) CHECK(a.stats.light_views == 1 && b.stats.light_views == 0);
@@ -1250,7 +1367,8 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
     }
 }
 
-static void row_50(void) { /* lights at rest: no new maps for a new view, and the picture has the bits of one with new maps */
+static void row_50(void) { /* lights at rest: no new maps for a new view, and the picture has the bits of one
+                              with new maps */
     const ssdgs_light light = lamp(1, -1.5, 0.5, 1);
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = cloud(full(), 300);
@@ -1287,7 +1405,7 @@ static void row_51(void) { /* what the camera does not see is not shaded, and wo
         desc.isa = ssdgs_context_isa(shared);
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
         model = cloud(full(), GOOD);
-        put(model, 3, 0, 0, 0, -3, 1);    /* at the eye, at the light, behind both, far away */
+        put(model, 3, 0, 0, 0, -3, 1); /* at the eye, at the light, behind both, far away */
         put(model, 4, 1, -1.5, 0.5, -3, 1);
         put(model, 5, 0, 0, -9, 1, 1);
         put(model, 6, 1e19, 1e19, 1e19, -3, 1);
@@ -1330,19 +1448,45 @@ typedef struct row {
 } row;
 
 static row rows[] = {
-#define ROW(number, once, name) {1##number - 100, once, row_##number, name, 0, 0}
-    ROW(01, 0, "no Gaussians"), ROW(02, 0, "alpha at a centre"), ROW(04, 0, "sizes and focal lengths"),
-    ROW(05, 0, "depths about the near plane"), ROW(06, 0, "camera inside a Gaussian"), ROW(07, 0, "log scales"),
+#define ROW(number, once, name) \
+    { 1##number - 100, once, row_##number, name, 0, 0 }
+    ROW(01, 0, "no Gaussians"),
+    ROW(02, 0, "alpha at a centre"),
+    ROW(04, 0, "sizes and focal lengths"),
+    ROW(05, 0, "depths about the near plane"),
+    ROW(06, 0, "camera inside a Gaussian"),
+    ROW(07, 0, "log scales"),
     ROW(10, 0, "discs"),
-    ROW(11, 0, "quaternions"), ROW(12, 0, "opacity logits"), ROW(13, 0, "opacity 1/255"), ROW(14, 0, "a thousand veils"),
-    ROW(15, 0, "ten thousand walls"), ROW(16, 0, "equal depths"), ROW(17, 0, "tile edges"), ROW(18, 1, "screen-filling splats"),
-    ROW(19, 1, "splats behind the camera"), ROW(20, 0, "far from the origin"), ROW(26, 0, "colours beyond measure"),
-    ROW(27, 0, "background not finite"), ROW(28, 0, "sheared intrinsics"), ROW(29, 0, "views that are no motion"),
-    ROW(31, 0, "light overhead"), ROW(32, 0, "light at a Gaussian"), ROW(33, 0, "light a million away"),
+    ROW(11, 0, "quaternions"),
+    ROW(12, 0, "opacity logits"),
+    ROW(13, 0, "opacity 1/255"),
+    ROW(14, 0, "a thousand veils"),
+    ROW(15, 0, "ten thousand walls"),
+    ROW(16, 0, "equal depths"),
+    ROW(17, 0, "tile edges"),
+    ROW(18, 1, "screen-filling splats"),
+    ROW(19, 1, "splats behind the camera"),
+    ROW(20, 0, "far from the origin"),
+    ROW(26, 0, "colours beyond measure"),
+    ROW(27, 0, "background not finite"),
+    ROW(28, 0, "sheared intrinsics"),
+    ROW(29, 0, "views that are no motion"),
+    ROW(31, 0, "light overhead"),
+    ROW(32, 0, "light at a Gaussian"),
+    ROW(33, 0, "light a million away"),
     ROW(34, 0, "light amid the scene"),
-    ROW(35, 0, "intensities"), ROW(36, 0, "no light, 64 lights"), ROW(37, 0, "no half vector"), ROW(41, 0, "eye at a Gaussian"),
-    ROW(44, 0, "networks saturate"), ROW(46, 0, "light map sizes"), ROW(47, 0, "light cube turned"), ROW(48, 0, "light bias"),
-    ROW(49, 0, "terms of weight 0"), ROW(50, 0, "lights at rest"), ROW(51, 0, "all shaded"), ROW(52, 0, "linear in the light")
+    ROW(35, 0, "intensities"),
+    ROW(36, 0, "no light, 64 lights"),
+    ROW(37, 0, "no half vector"),
+    ROW(41, 0, "eye at a Gaussian"),
+    ROW(44, 0, "networks saturate"),
+    ROW(46, 0, "light map sizes"),
+    ROW(47, 0, "light cube turned"),
+    ROW(48, 0, "light bias"),
+    ROW(49, 0, "terms of weight 0"),
+    ROW(50, 0, "lights at rest"),
+    ROW(51, 0, "all shaded"),
+    ROW(52, 0, "linear in the light")
 #undef ROW
 };
 enum { ROWS = sizeof rows / sizeof *rows };
@@ -1369,7 +1513,8 @@ int main(int count, char **argument) {
                 rows[r].digest = digest;
                 CHECK(held >= before); /* frames keep their memory */
                 if (test_failed == failed) continue;
-                printf("row %d: %s, %d threads\n", rows[r].number, ssdgs_isa_string((ssdgs_isa)isa), desc.threads);
+                printf("row %d: %s, %d threads\n", rows[r].number, ssdgs_isa_string((ssdgs_isa)isa),
+                       desc.threads);
                 rows[r].bad = 1;
             }
             ran++;

@@ -1,4 +1,5 @@
-/* Rendering and training as a whole: the same bits for any threads, hook or interruption; refusals; what components add up to. */
+/* Rendering and training as a whole: the same bits for any threads, hook or interruption; refusals; what
+   components add up to. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -9,7 +10,9 @@
 static unsigned char pixels[PHOTOS][SIDE * SIDE * 4];
 static ssdgs_photo photos[PHOTOS];
 
-static uint64_t hash_values(uint64_t hash, const ssdgs_real *values, size_t n) { return ssdgs__fold(hash, values, n * sizeof *values); }
+static uint64_t hash_values(uint64_t hash, const ssdgs_real *values, size_t n) {
+    return ssdgs__fold(hash, values, n * sizeof *values);
+}
 
 /* A lit ball on a transparent ground, seen from all around. */
 static void make_photos(void) {
@@ -31,9 +34,11 @@ static void make_photos(void) {
         }
         for (y = 0; y < SIDE; y++)
             for (x = 0; x < SIDE; x++) {
-                const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3), dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3), r2 = dx * dx + dy * dy;
+                const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3),
+                             dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3), r2 = dx * dx + dy * dy;
                 unsigned char *p = pixels[i] + 4 * (y * SIDE + x);
-                for (c = 0; c < 3; c++) p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c == 0 ? 1 : 0.7) + 30 * dx) : 0;
+                for (c = 0; c < 3; c++)
+                    p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c == 0 ? 1 : 0.7) + 30 * dx) : 0;
                 p[3] = r2 < 1 ? 255 : 0;
             }
         photos[i].pixels = pixels[i];
@@ -54,10 +59,15 @@ static ssdgs_train_options short_run(int iterations) {
     return o;
 }
 
-typedef struct run_result { uint64_t model, image; int count; double psnr; } run_result;
+typedef struct run_result {
+    uint64_t model, image;
+    int count;
+    double psnr;
+} run_result;
 
 /* Trains and renders with components; hashes every parameter and pixel. */
-static run_result train_and_render(ssdgs_context *context, const ssdgs_settings *settings, const ssdgs_train_options *options) {
+static run_result train_and_render(ssdgs_context *context, const ssdgs_settings *settings,
+                                   const ssdgs_train_options *options) {
     static ssdgs_real color[SIDE * SIDE * 3], shadow[SIDE * SIDE], normal[SIDE * SIDE * 3];
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
@@ -73,14 +83,16 @@ static run_result train_and_render(ssdgs_context *context, const ssdgs_settings 
     r.psnr = stats.psnr;
     r.count = model->count;
     r.model = UINT64_C(0xCBF29CE484222325);
-    for (i = 0; i < SSDGS_CHANNELS; i++) r.model = hash_values(r.model, model->gaussians + (size_t)i * model->capacity, (size_t)model->count);
+    for (i = 0; i < SSDGS_CHANNELS; i++)
+        r.model = hash_values(r.model, model->gaussians + (size_t)i * model->capacity, (size_t)model->count);
     r.model = hash_values(r.model, model->globals, model->global_count);
     memset(&image, 0, sizeof image);
     image.color = color;
     image.shadow = shadow;
     image.normal = normal;
     CHECK(!ssdgs_render(model, &photos[1].camera, &photos[2].light, 1, &image));
-    r.image = hash_values(hash_values(hash_values(1, color, SIDE * SIDE * 3), shadow, SIDE * SIDE), normal, SIDE * SIDE * 3);
+    r.image = hash_values(hash_values(hash_values(1, color, SIDE * SIDE * 3), shadow, SIDE * SIDE), normal,
+                          SIDE * SIDE * 3);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     return r;
@@ -90,7 +102,10 @@ static ssdgs_result through_cpu(void *user, ssdgs_frame *frame, ssdgs_stage stag
     ((int *)user)[stage]++;
     return ssdgs_stage_cpu(frame, stage);
 }
-#define HOOK(name, stage) static ssdgs_result hook_##name(void *user, ssdgs_frame *frame) { return through_cpu(user, frame, stage); }
+#define HOOK(name, stage) \
+    static ssdgs_result hook_##name(void *user, ssdgs_frame *frame) { \
+        return through_cpu(user, frame, stage); \
+    }
 HOOK(project, SSDGS_STAGE_PROJECT)
 HOOK(sort, SSDGS_STAGE_SORT)
 HOOK(bin, SSDGS_STAGE_BIN)
@@ -106,7 +121,8 @@ static void backwards_run(void *user, int count, void (*task)(void *, int), void
     while (count > 0) task(data, --count);
 }
 
-/* One thread, several, a host's own loop that runs backwards, and a hook for every stage: one result, per instruction set. */
+/* One thread, several, a host's own loop that runs backwards, and a hook for every stage: one result, per
+   instruction set. */
 static void test_same_bits(void) {
     const ssdgs_train_options options = short_run(60);
     ssdgs_settings settings = ssdgs_settings_default();
@@ -143,11 +159,13 @@ static void test_same_bits(void) {
             r = train_and_render(context, &settings, &options);
             if (variant == 0) {
                 first = r;
-                printf("%s: %d Gaussians, model %016llx, image %016llx\n", ssdgs_isa_string((ssdgs_isa)isa), r.count, (unsigned long long)r.model, (unsigned long long)r.image);
+                printf("%s: %d Gaussians, model %016llx, image %016llx\n", ssdgs_isa_string((ssdgs_isa)isa),
+                       r.count, (unsigned long long)r.model, (unsigned long long)r.image);
                 CHECK(r.count > 200 && r.count <= 500); /* about 100 of the 300 lie within the outlines */
             }
             CHECK(r.model == first.model && r.image == first.image);
-            for (i = 0; i < SSDGS_STAGE_COUNT; i++) CHECK(calls[i] == (variant == 4 ? (i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61 : 60) : 0));
+            for (i = 0; i < SSDGS_STAGE_COUNT; i++)
+                CHECK(calls[i] == (variant == 4 ? (i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61 : 60) : 0));
             ssdgs_context_destroy(context);
         }
     }
@@ -179,7 +197,8 @@ static void test_resume(void) {
             if (!CHECK(!ssdgs_trainer_step(trainer, NULL))) exit(1);
         }
         hash = hash_values(UINT64_C(0xCBF29CE484222325), model->globals, model->global_count);
-        for (c = 0; c < SSDGS_CHANNELS; c++) hash = hash_values(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            hash = hash_values(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
         hash = ssdgs__fold(hash, trainer->corrections, PHOTOS * sizeof *trainer->corrections);
         if (k < 0) whole = hash;
         CHECK(hash == whole);
@@ -222,7 +241,9 @@ static void test_resume(void) {
             if (i == 2) head.count = 0x0FFFFFFF;
             if (i == 4) head.start_size = -1;
             memcpy(copy, &head, sizeof head);
-            if (i == 3) memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo, sizeof photo);
+            if (i == 3)
+                memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo,
+                       sizeof photo);
             sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
             memcpy(copy + size - 8, &sum, 8);
             f = fopen("build/t_train_bad.ckpt", "wb");
@@ -235,8 +256,10 @@ static void test_resume(void) {
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         CHECK(ssdgs_trainer_load(trainer, "build/none.ckpt") == SSDGS_ERR_IO);
         ssdgs_trainer_destroy(trainer);
-        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer)); /* on Gaussians: none were drawn */
-        CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") && trainer->start_size > 0);
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options,
+                                    &trainer)); /* on Gaussians: none were drawn */
+        CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
+              trainer->start_size > 0);
         ssdgs_trainer_destroy(trainer);
         for (i = 0; i < 5; i++) { /* another bias, filter, eta, near plane, format */
             ssdgs_settings changed = settings;
@@ -296,7 +319,8 @@ static void test_refused_step(void) {
 
 /* diffuse + specular + scattering + (1 - alpha) background = color; a second light adds; 2 I doubles. */
 static void test_components(void) {
-    static ssdgs_real color[SIDE * SIDE * 3], part[3][SIDE * SIDE * 3], alpha[SIDE * SIDE], again[SIDE * SIDE * 3], lone[2][SIDE * SIDE * 3], depth[SIDE * SIDE];
+    static ssdgs_real color[SIDE * SIDE * 3], part[3][SIDE * SIDE * 3], alpha[SIDE * SIDE],
+        again[SIDE * SIDE * 3], lone[2][SIDE * SIDE * 3], depth[SIDE * SIDE];
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_render_options options = ssdgs_render_options_default();
     ssdgs_render_stats stats;
@@ -311,7 +335,9 @@ static void test_components(void) {
     CHECK(!ssdgs_model_create(context, &settings, 200, &model));
     v = ssdgs_model_get(model);
     for (i = 0; i < 200; i++) {
-        for (c = 0; c < SSDGS_CHANNELS; c++) v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1);
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            v.gaussians[(size_t)c * v.stride + (size_t)i] =
+                (ssdgs_real)(2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1);
         for (c = 0; c < 3; c++) {
             v.gaussians[(size_t)(SSDGS_POSITION + c) * v.stride + (size_t)i] *= (ssdgs_real)0.5;
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] -= (ssdgs_real)2.5;
@@ -328,9 +354,11 @@ static void test_components(void) {
     image.alpha = alpha;
     image.depth = depth;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, &stats));
-    CHECK(stats.gaussians == 200 && stats.shaded > 0 && stats.shaded <= stats.visible && stats.light_views >= 2 && stats.rejected == 0);
+    CHECK(stats.gaussians == 200 && stats.shaded > 0 && stats.shaded <= stats.visible &&
+          stats.light_views >= 2 && stats.rejected == 0);
     for (i = 0; i < SIDE * SIDE * 3; i++)
-        sum[i] = (double)(part[0][i] + part[1][i] + part[2][i]) + (1 - (double)alpha[i / 3]) * (double)options.background[i % 3];
+        sum[i] = (double)(part[0][i] + part[1][i] + part[2][i]) +
+                 (1 - (double)alpha[i / 3]) * (double)options.background[i % 3];
     CHECK_NEAR(sum, color, SIDE * SIDE * 3, 1e-4, 1e-6, "the components and the background make the image");
     for (i = 0; i < SIDE * SIDE; i++) blank += alpha[i] > (ssdgs_real)0.99 && !(depth[i] > 1 && depth[i] < 3);
     CHECK(blank == 0);
@@ -343,8 +371,10 @@ static void test_components(void) {
         options.bf16 = 1;
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
         options.bf16 = 0;
-        for (i = 0; i < SIDE * SIDE * 3; i++) most = fabs((double)(again[i] - color[i])) > most ? fabs((double)(again[i] - color[i])) : most;
-        printf("bf16 networks: %s, largest difference %.2g of %.2g\n", context->bf16 ? "yes" : "no", most, (double)color[0]);
+        for (i = 0; i < SIDE * SIDE * 3; i++)
+            most = fabs((double)(again[i] - color[i])) > most ? fabs((double)(again[i] - color[i])) : most;
+        printf("bf16 networks: %s, largest difference %.2g of %.2g\n", context->bf16 ? "yes" : "no", most,
+               (double)color[0]);
         CHECK(context->bf16 ? most > 0 && most < 0.02 : most == 0);
     }
     for (c = 0; c < 3; c++) options.background[c] = 0;
@@ -366,7 +396,9 @@ static void test_components(void) {
 
 /* The light pass wherever the light is. */
 static void test_lights(void) {
-    static const double places[12][3] = {{3, 0, 0}, {-3, 0, 0}, {0, 3, 0}, {0, -3, 0}, {0, 0, 3}, {0, 0, -3}, {0, 0, 0}, {0.1, 0.1, 0.1}, {0.45, 0, 0}, {0.9, 0, 0}, {0, 0, 1e-8}, {0, 0, 1e6}};
+    static const double places[12][3] = {{3, 0, 0},    {-3, 0, 0},  {0, 3, 0},    {0, -3, 0},
+                                         {0, 0, 3},    {0, 0, -3},  {0, 0, 0},    {0.1, 0.1, 0.1},
+                                         {0.45, 0, 0}, {0.9, 0, 0}, {0, 0, 1e-8}, {0, 0, 1e6}};
     static ssdgs_real color[SIDE * SIDE * 3], far_color[SIDE * SIDE * 3];
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_context *context = NULL;
@@ -387,14 +419,16 @@ static void test_lights(void) {
             r2 += x * x;
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -4;
         }
-        for (c = 0; c < 3; c++) v.gaussians[(size_t)c * v.stride + (size_t)i] *= (ssdgs_real)(0.4 / sqrt(r2)); /* a shell */
+        for (c = 0; c < 3; c++)
+            v.gaussians[(size_t)c * v.stride + (size_t)i] *= (ssdgs_real)(0.4 / sqrt(r2)); /* a shell */
         v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = 4;
     }
     memset(&image, 0, sizeof image);
     image.color = color;
     for (p = 0; p < 12; p++) {
         double mean = 0, least = 1, most = 0;
-        const double distance = sqrt(places[p][0] * places[p][0] + places[p][1] * places[p][1] + places[p][2] * places[p][2]);
+        const double distance =
+            sqrt(places[p][0] * places[p][0] + places[p][1] * places[p][1] + places[p][2] * places[p][2]);
         int finite = 1;
         memset(&light, 0, sizeof light);
         for (c = 0; c < 3; c++) {
@@ -415,7 +449,8 @@ static void test_lights(void) {
         }
         CHECK(least >= 0 && most <= 1.000001);
         /* from the centre the shell is met from inside: most of it is lit; from outside about half is */
-        if (!CHECK(distance < 0.2 ? mean > 0.5 : distance > 1 ? mean > 0.3 && mean < 0.7 : 1)) printf("    light %d: mean visibility %g\n", p, mean);
+        if (!CHECK(distance < 0.2 ? mean > 0.5 : distance > 1 ? mean > 0.3 && mean < 0.7 : 1))
+            printf("    light %d: mean visibility %g\n", p, mean);
         if (p == 11) memcpy(far_color, color, sizeof color);
     }
     light.kind = SSDGS_LIGHT_DIRECTIONAL;
@@ -424,7 +459,8 @@ static void test_lights(void) {
         light.intensity[c] = 1;
     }
     CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
-    CHECK_NEAR(far_color, color, SIDE * SIDE * 3, 1e-5, 1e-4, "a light at a million extents is a directional one");
+    CHECK_NEAR(far_color, color, SIDE * SIDE * 3, 1e-5, 1e-4,
+               "a light at a million extents is a directional one");
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
@@ -454,7 +490,12 @@ static void test_refusals(void) {
     desc.isa = SSDGS_ISA_COUNT;
     CHECK(ssdgs_context_create(&desc, &context) == SSDGS_ERR_ISA);
     CHECK(!ssdgs_context_create(NULL, &context));
-#define REFUSED(code, call) do { CHECK((call) == (code)); CHECK(*ssdgs_error_message(context)); context->message[0] = 0; } while (0)
+#define REFUSED(code, call) \
+    do { \
+        CHECK((call) == (code)); \
+        CHECK(*ssdgs_error_message(context)); \
+        context->message[0] = 0; \
+    } while (0)
     settings.eta = 5;
     REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_model_create(context, &settings, 1, &model));
     settings = ssdgs_settings_default();
@@ -464,7 +505,12 @@ static void test_refusals(void) {
     REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_model_create(context, &settings, -1, &model));
     REFUSED(SSDGS_ERR_LIMIT, ssdgs_model_create(context, &settings, 0x7FFFFFFF, &model));
     CHECK(!ssdgs_model_create(context, &settings, 3, &model));
-#define BAD_CAMERA(code, change) do { camera = photos[0].camera; change; REFUSED(code, ssdgs_render(model, &camera, &light, 1, &image)); } while (0)
+#define BAD_CAMERA(code, change) \
+    do { \
+        camera = photos[0].camera; \
+        change; \
+        REFUSED(code, ssdgs_render(model, &camera, &light, 1, &image)); \
+    } while (0)
     BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.width = 0);
     BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.height = -5);
     BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.width = 0x7FFFFFFF);
@@ -472,7 +518,8 @@ static void test_refusals(void) {
     BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.fy = (ssdgs_real)NAN);
     BAD_CAMERA(SSDGS_ERR_NONFINITE, camera.view[7] = (ssdgs_real)NAN);
     BAD_CAMERA(SSDGS_ERR_ARGUMENT, camera.view[0] += 1);
-    BAD_CAMERA(SSDGS_ERR_ARGUMENT, (camera.view[0] = -camera.view[0], camera.view[1] = -camera.view[1], camera.view[2] = -camera.view[2]));
+    BAD_CAMERA(SSDGS_ERR_ARGUMENT, (camera.view[0] = -camera.view[0], camera.view[1] = -camera.view[1],
+                                    camera.view[2] = -camera.view[2]));
     camera = photos[0].camera;
     light.intensity[1] = -1;
     REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_render(model, &camera, &light, 1, &image));
@@ -508,7 +555,9 @@ static void test_refusals(void) {
 
 /* ---- every allocation fails once ---- */
 
-typedef struct counter { long live, calls, fail_at; } counter;
+typedef struct counter {
+    long live, calls, fail_at;
+} counter;
 
 static void *counting_allocate(void *user, size_t bytes) {
     counter *c = (counter *)user;
@@ -619,23 +668,38 @@ static void test_learning(void) {
     CHECK(!ssdgs_refine_photo(model, &photo, background, 150));
     CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &refined));
     CHECK(disturbed.psnr < before.psnr - 1 && refined.psnr > before.psnr - 0.5);
-    printf("trained %.1f dB, disturbed %.1f dB, refined %.1f dB\n", before.psnr, disturbed.psnr, refined.psnr);
+    printf("trained %.1f dB, disturbed %.1f dB, refined %.1f dB\n", before.psnr, disturbed.psnr,
+           refined.psnr);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
 
-/* Every parameter takes Adam's steps at its group's rate, by its group's clock; what is frozen or not in use stands still. Epsilon is
-   a share of what 1/255 in one of 3 x 20 x 15 colours costs, the published one or nothing (1e30: no step at all). */
+/* Every parameter takes Adam's steps at its group's rate, by its group's clock; what is frozen or not in use
+   stands still. Epsilon is a share of what 1/255 in one of 3 x 20 x 15 colours costs, the published one or
+   nothing (1e30: no step at all). */
 static void test_adam(double share) {
     enum { MANY = 70, STEPS = 6, ALL = SSDGS_ALL_TERMS };
     static const double times[STEPS] = {0, 1, 45e3, 45001, 70e3, 95e3}; /* of 100,000 */
-    static const struct { int rate, terms; double from, over; } learning[SSDGS__GROUPS] = { /* rate: in the order of the options */
-        {0, ALL, 0, 1e5}, {3, ALL, 0, 1e5}, {2, ALL, 0, 1e5}, {1, ALL, 0, 1e5}, {4, SSDGS_DIFFUSE_TERM, 0, 1e5},
-        {4, SSDGS_SPECULAR_TERM, 0, 1e5}, {4, SSDGS_SCATTERING_TERM, 0, 1e5}, {6, ALL, 40e3, 50e3},
-        {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {7, SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM, 50e3, 50e3},
-        {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {5, SSDGS_SPECULAR_TERM, 40e3, 50e3}, {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
-        {9, SSDGS_SCATTERING_TERM, 50e3, 50e3}, {8, SSDGS_SHADOW_TERM, 50e3, 50e3}};
+    static const struct {
+        int rate, terms;
+        double from, over;
+    } learning[SSDGS__GROUPS] = {/* rate: in the order of the options */
+                                 {0, ALL, 0, 1e5},
+                                 {3, ALL, 0, 1e5},
+                                 {2, ALL, 0, 1e5},
+                                 {1, ALL, 0, 1e5},
+                                 {4, SSDGS_DIFFUSE_TERM, 0, 1e5},
+                                 {4, SSDGS_SPECULAR_TERM, 0, 1e5},
+                                 {4, SSDGS_SCATTERING_TERM, 0, 1e5},
+                                 {6, ALL, 40e3, 50e3},
+                                 {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
+                                 {7, SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM, 50e3, 50e3},
+                                 {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
+                                 {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
+                                 {5, SSDGS_SPECULAR_TERM, 40e3, 50e3},
+                                 {9, SSDGS_SCATTERING_TERM, 50e3, 50e3},
+                                 {8, SSDGS_SHADOW_TERM, 50e3, 50e3}};
     ssdgs_train_options options = short_run(100000);
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_context *context = NULL;
@@ -652,7 +716,7 @@ static void test_adam(double share) {
     }
     memcpy(&options.position, rates, sizeof rates);
     options.adam_epsilon = (ssdgs_real)share;
-    options.bounds_max[1] = 2; /* so that the longest side is 2.5 */
+    options.bounds_max[1] = 2;        /* so that the longest side is 2.5 */
     settings.asg = SSDGS_ASG_ANGULAR; /* so that there is a sigma */
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, MANY, &model));
@@ -671,9 +735,13 @@ static void test_adam(double share) {
         frame.camera.height = 15;
         frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
         frame.global_gradient = frame.gradient + planes;
-        for (i = 0; i < values; i++) { /* of all sizes: those below 1e-18 count as 0, those beyond 1e18 as that */
+        for (i = 0; i < values;
+             i++) { /* of all sizes: those below 1e-18 count as 0, those beyond 1e18 as that */
             const double u = ssdgs__uniform((uint64_t)step, i);
-            gradient[step][i] = (ssdgs_real)((u < 0.4 ? u - 0.9 : u + 0.1) * (i % 16 < 14 ? pow(10, -(double)(i % 16)) : i % 16 < 15 ? 1e30 : 8e-19));
+            gradient[step][i] =
+                (ssdgs_real)((u < 0.4 ? u - 0.9 : u + 0.1) * (i % 16 < 14   ? pow(10, -(double)(i % 16))
+                                                              : i % 16 < 15 ? 1e30
+                                                                            : 8e-19));
         }
         for (g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
         terms[step] = step & 1 ? ALL : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
@@ -687,8 +755,11 @@ static void test_adam(double share) {
         while (i >= planes && i - planes >= first[g - SSDGS__PLANE_GROUPS + 1]) g++;
         epsilon = fmax(g ? epsilon : epsilon / 2.5, 1e-15);
         for (step = 0; step < STEPS; step++) {
-            const double raw = (double)gradient[step][i], slope = fabs(raw) < 1e-18 ? 0 : fmin(fmax(raw, -1e18), 1e18);
-            const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0 ? 0 : past > 1 ? 1 : past;
+            const double raw = (double)gradient[step][i],
+                         slope = fabs(raw) < 1e-18 ? 0 : fmin(fmax(raw, -1e18), 1e18);
+            const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0   ? 0
+                                                                                         : past > 1 ? 1
+                                                                                                    : past;
             const ssdgs_rate rate = rates[learning[g].rate];
             if ((g + step) % 3 == 0 || !(learning[g].terms & terms[step])) continue;
             clock++;
@@ -700,7 +771,8 @@ static void test_adam(double share) {
         value = fabs(value - (double)(i < planes ? model->gaussians[i] : model->globals[i - planes]));
         worst = value <= worst ? worst : value;
     }
-    if (!CHECK(worst < 4e-6)) printf("    Adam, epsilon %g: off by %.3g\n", share, worst); /* six roundings of values up to 4 */
+    if (!CHECK(worst < 4e-6))
+        printf("    Adam, epsilon %g: off by %.3g\n", share, worst); /* six roundings of values up to 4 */
     for (step = 0; step < STEPS; step++) free(gradient[step]);
     free(start);
     ssdgs_trainer_destroy(trainer);
@@ -708,8 +780,8 @@ static void test_adam(double share) {
     ssdgs_context_destroy(context);
 }
 
-/* Photographs of a model itself under cameras and lights disturbed in different ways: a run in which nothing else learns brings
-   each of them back. */
+/* Photographs of a model itself under cameras and lights disturbed in different ways: a run in which nothing
+   else learns brings each of them back. */
 static void test_refinement(void) {
     enum { MANY = 300 };
     static unsigned char pictures[PHOTOS][SIDE * SIDE * 4];
@@ -729,10 +801,13 @@ static void test_refinement(void) {
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
     for (i = 0; i < MANY; i++)
         for (c = 0; c < 3; c++) {
-            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)(ssdgs__uniform(6, (uint64_t)(3 * i + c)) - 0.5);
+            model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
+                (ssdgs_real)(ssdgs__uniform(6, (uint64_t)(3 * i + c)) - 0.5);
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
-            model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity + (size_t)i] = (ssdgs_real)(3 * ssdgs__uniform(7, (uint64_t)(3 * i + c)));
-            model->gaussians[(size_t)(SSDGS_FRAME + c) * model->capacity + (size_t)i] = (ssdgs_real)(2 * ssdgs__uniform(8, (uint64_t)(3 * i + c)) - 1);
+            model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity + (size_t)i] =
+                (ssdgs_real)(3 * ssdgs__uniform(7, (uint64_t)(3 * i + c)));
+            model->gaussians[(size_t)(SSDGS_FRAME + c) * model->capacity + (size_t)i] =
+                (ssdgs_real)(2 * ssdgs__uniform(8, (uint64_t)(3 * i + c)) - 1);
         }
     for (p = 0; p < PHOTOS; p++) {
         const double way = p & 1 ? -1 : 1;
@@ -754,30 +829,36 @@ static void test_refinement(void) {
     options.densify_until = 0;
     options.random_background = 0; /* the model is not as opaque as its photographs */
     CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
-    for (i = 0; i < 31; i++) CHECK(!ssdgs_trainer_step(trainer, NULL)); /* the last moves a camera, at 5,000 of 60,000 */
+    for (i = 0; i < 31; i++)
+        CHECK(!ssdgs_trainer_step(trainer, NULL)); /* the last moves a camera, at 5,000 of 60,000 */
     for (p = 0, first = 0; p < PHOTOS; p++) first += fabs(trainer->corrections[p].value[0]);
-    CHECK(fabs(first / (2e-3 * 0.25 * sqrt(300.0 * PHOTOS / 360)) - 1) < 1e-3); /* Adam's first step is the rate, whatever it is of */
-    for (p = 0, turn = 0; p < PHOTOS; p++) turn += fabs(trainer->corrections[p].value[3]); /* its turns, of the picture's width */
+    CHECK(fabs(first / (2e-3 * 0.25 * sqrt(300.0 * PHOTOS / 360)) - 1) <
+          1e-3); /* Adam's first step is the rate, whatever it is of */
+    for (p = 0, turn = 0; p < PHOTOS; p++)
+        turn += fabs(trainer->corrections[p].value[3]); /* its turns, of the picture's width */
     CHECK(fabs(turn / first / (2 * atan(0.5 * SIDE / (double)photos[0].camera.fx)) - 1) < 1e-3);
     CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
     for (p = 0; p < PHOTOS; p++) {
         ssdgs_photo now;
         CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
         for (i = 0; i < 3; i++) {
-            off[0][0] += fabs((double)(disturbed[p].camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
+            off[0][0] +=
+                fabs((double)(disturbed[p].camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
             off[0][1] += fabs((double)(disturbed[p].light.position[i] - photos[p].light.position[i]));
             off[1][0] += fabs((double)(now.camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
             off[1][1] += fabs((double)(now.light.position[i] - photos[p].light.position[i]));
         }
     }
     if (!CHECK(off[1][0] < 0.2 * off[0][0] && off[1][1] < 0.4 * off[0][1]))
-        printf("    cameras off by %g of %g, lights by %g of %g\n", off[1][0], off[0][0], off[1][1], off[0][1]);
+        printf("    cameras off by %g of %g, lights by %g of %g\n", off[1][0], off[0][0], off[1][1],
+               off[0][1]);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
 
-/* What moves and turns all cameras as one goes out of their corrections, what two do against each other stays. */
+/* What moves and turns all cameras as one goes out of their corrections, what two do against each other
+   stays. */
 static void test_anchor(void) {
     static const double centre[3] = {0.1, -0.2, 0.3}, motion[6] = {1e-4, -2e-4, 3e-4, 2e-4, 1e-4, -3e-4};
     ssdgs_train_options options = short_run(360);
@@ -825,7 +906,8 @@ static void test_anchor(void) {
             worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
             largest = fmax(largest, fabs(kept[p].value[i]));
         }
-    if (!CHECK(largest > 1e-4 && worst < 1e-7 * largest)) /* done after every step; a float view turns by 1 + 1e-8 */
+    if (!CHECK(largest > 1e-4 &&
+               worst < 1e-7 * largest)) /* done after every step; a float view turns by 1 + 1e-8 */
         printf("    %g of %g\n", worst, largest);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -838,22 +920,31 @@ static void test_schedule(void) {
     int learns[SSDGS__GROUPS];
     o.iterations = 6000;
     CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 499), learns) == SSDGS_DIFFUSE_TERM);
-    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 500), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 500), learns) ==
+          (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
     CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && learns[SSDGS__G_MATERIAL]);
-    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 900), learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM));
-    CHECK(!learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__G_MATERIAL] && learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET]);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 900), learns) ==
+          (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM));
+    CHECK(!learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__G_MATERIAL] &&
+          learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET]);
     CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 1600), learns) == SSDGS_ALL_TERMS);
-    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && !learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] &&
+          !learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] &&
+          !learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
     ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 2000), learns);
-    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] && learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] &&
+          learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_BASIS]);
     ssdgs__phase(&o, SSDGS_ASG_DEFERRED, ssdgs__schedule_time(&o, 1600), learns); /* no bases to wait for */
-    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SHARPNESS] && learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SIGMA]);
+    CHECK(learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SHARPNESS] &&
+          learns[SSDGS__PLANE_GROUPS + SSDGS__ASG_SIGMA]);
     o.schedule = SSDGS_SCHEDULE_JOINT;
     CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 0, learns) == SSDGS_ALL_TERMS);
     o.schedule = SSDGS_SCHEDULE_SWAPPED;
-    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 9000, learns) == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SPECULAR_TERM));
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 9000, learns) ==
+          (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SPECULAR_TERM));
     o = ssdgs_train_options_default();
-    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 4999, learns) == SSDGS_DIFFUSE_TERM && ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 5000, learns) == SSDGS_ALL_TERMS);
+    CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 4999, learns) == SSDGS_DIFFUSE_TERM &&
+          ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 5000, learns) == SSDGS_ALL_TERMS);
 }
 
 /* The bf16 product against the float one: an odd depth, a row count that is no multiple of four. */
@@ -862,7 +953,8 @@ static void test_bf16(void) {
     ssdgs_context *context = NULL;
     CHECK(!ssdgs_context_create(NULL, &context));
     if (context->bf16) {
-        static ssdgs_real weights[(IN + 1) * OUT], inputs[IN * SSDGS__BLOCK], exact[OUT * SSDGS__BLOCK], half[OUT * SSDGS__BLOCK];
+        static ssdgs_real weights[(IN + 1) * OUT], inputs[IN * SSDGS__BLOCK], exact[OUT * SSDGS__BLOCK],
+            half[OUT * SSDGS__BLOCK];
         static uint32_t packed[OUT * (IN + 1) / 2], pairs[(IN + 1) / 2 * SSDGS__BLOCK];
         static const int sizes[2] = {IN, OUT};
         ssdgs__row_lists lists;
@@ -870,7 +962,8 @@ static void test_bf16(void) {
         double error = 0, norm = 0;
         int i;
         for (i = 0; i < (IN + 1) * OUT; i++) weights[i] = (ssdgs_real)(ssdgs__uniform(8, (uint64_t)i) - 0.5);
-        for (i = 0; i < IN * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)(ssdgs__uniform(9, (uint64_t)i) - 0.5);
+        for (i = 0; i < IN * SSDGS__BLOCK; i++)
+            inputs[i] = (ssdgs_real)(ssdgs__uniform(9, (uint64_t)i) - 0.5);
         memset(&p, 0, sizeof p);
         ssdgs__row_lists_fill(&lists);
         p.row_list = p.depth_list = lists.all;
@@ -918,13 +1011,16 @@ static void test_isolation(void) {
         if (ssdgs_context_create(&desc, &context)) continue;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < 4; i++) model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + 5 * i)] = (ssdgs_real)NAN;
+        for (i = 0; i < 4; i++)
+            model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + 5 * i)] = (ssdgs_real)NAN;
         for (i = 0; i < 5; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
         image.color = color;
         render.stop = (ssdgs_real)0.3; /* so that some entries of a tile are not seen */
-        for (i = 0; i < model->count; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] += 6;
+        for (i = 0; i < model->count; i++)
+            model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] += 6;
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
-        for (k = 0; k < 3; k++) { /* close to the far side, and too bright for the colours there to be finite */
+        for (k = 0; k < 3;
+             k++) { /* close to the far side, and too bright for the colours there to be finite */
             bright.intensity[k] = sizeof(ssdgs_real) == 4 ? (ssdgs_real)3e38 : (ssdgs_real)1e308;
             bright.position[k] = k == 0 ? (ssdgs_real)-0.6 : (ssdgs_real)0;
         }
@@ -949,7 +1045,8 @@ static void test_isolation(void) {
     }
 }
 
-/* The cap holds for a model that starts above it; a start of few points survives; a light or camera fitted late starts small. */
+/* The cap holds for a model that starts above it; a start of few points survives; a light or camera fitted
+   late starts small. */
 static void test_density(void) {
     ssdgs_train_options options = short_run(100);
     ssdgs_context *context = NULL;
@@ -962,7 +1059,8 @@ static void test_density(void) {
     CHECK(!ssdgs_model_create(context, NULL, 400, &model));
     for (i = 0; i < 400; i++)
         for (c = 0; c < 3; c++) {
-            model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)(0.6 * ssdgs__uniform(4, (uint64_t)(3 * i + c)) - 0.3);
+            model->gaussians[(size_t)c * model->capacity + (size_t)i] =
+                (ssdgs_real)(0.6 * ssdgs__uniform(4, (uint64_t)(3 * i + c)) - 0.3);
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
         }
     options.max_gaussians = 150;
@@ -987,11 +1085,12 @@ static void test_density(void) {
     before = correction.value[6];
     ssdgs__correction_step(&correction, gradient, 1, 1e-3, 3, 0.1);
     CHECK(before == 0 && fabs(correction.value[6] + 3e-3) < 1e-6);
-    CHECK(fabs(correction.value[0] + 0.15) < 3e-4 && fabs(correction.value[3] + 0.005) < 1e-5); /* lengths, turns */
+    CHECK(fabs(correction.value[0] + 0.15) < 3e-4 &&
+          fabs(correction.value[3] + 0.005) < 1e-5); /* lengths, turns */
 }
 
-/* Over the cap those go that show least where they are seen; those of photographs that were not drawn stay; none makes room while
-   opacities recover. */
+/* Over the cap those go that show least where they are seen; those of photographs that were not drawn stay;
+   none makes room while opacities recover. */
 static void test_cap(void) {
     enum { MANY = 40, UNSEEN = 10 }; /* the last */
     ssdgs_train_options options = short_run(100);
@@ -1009,7 +1108,9 @@ static void test_cap(void) {
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
         for (i = 0; i < MANY; i++) {
             model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
-            trainer->screen_count[i] = i >= MANY - UNSEEN ? 0 : (ssdgs_real)(1 + i); /* each photograph shows less of the next ones */
+            trainer->screen_count[i] =
+                i >= MANY - UNSEEN ? 0
+                                   : (ssdgs_real)(1 + i); /* each photograph shows less of the next ones */
             trainer->contribution[i] = i >= MANY - UNSEEN ? 0 : 50;
             trainer->screen_gradient[i] = i == 0 && pass ? 2 : 0;
         }
@@ -1027,10 +1128,12 @@ static void test_cap(void) {
     }
 }
 
-/* What a fresh model is given: a light inside of the object or hardly any does not put its scale out of range; lengths follow the
-   bounds unless the paper's form, without a unit, is asked for; refinement's steps follow them too. */
+/* What a fresh model is given: a light inside of the object or hardly any does not put its scale out of
+   range; lengths follow the bounds unless the paper's form, without a unit, is asked for; refinement's steps
+   follow them too. */
 static void test_units(void) {
-    static const ssdgs_rate to_zero = {(ssdgs_real)0.01, 0}, by_factors = {(ssdgs_real)0.01, (ssdgs_real)1e-4};
+    static const ssdgs_rate to_zero = {(ssdgs_real)0.01, 0},
+                            by_factors = {(ssdgs_real)0.01, (ssdgs_real)1e-4};
     const ssdgs_real black[3] = {0, 0, 0};
     ssdgs_train_options options = short_run(10);
     ssdgs_context *context = NULL;
@@ -1044,17 +1147,23 @@ static void test_units(void) {
         ssdgs_trainer *trainer = NULL;
         ssdgs_frame frame;
         double want;
-        if (kind == 2) settings.depth_cue = settings.residual_shadow = settings.transport = 0; /* the light bias has a length */
+        if (kind == 2)
+            settings.depth_cue = settings.residual_shadow = settings.transport =
+                0; /* the light bias has a length */
         for (i = 0; i < PHOTOS; i++) {
             lit[i] = photos[i];
             for (c = 0; c < 3; c++)
-                lit[i].light.position[c] = (ssdgs_real)(c == 1 && i ? 4 : 0), lit[i].light.intensity[c] = (ssdgs_real)(kind ? 1e-32 : 100);
+                lit[i].light.position[c] = (ssdgs_real)(c == 1 && i ? 4 : 0),
+                lit[i].light.intensity[c] = (ssdgs_real)(kind ? 1e-32 : 100);
         }
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, lit, PHOTOS, &options, &trainer));
-        want = kind ? 1e30 : 1 / (100 * pow(0.25, 1.0 / PHOTOS) * pow(1 / 16.0, 1 - 1.0 / PHOTOS)); /* at the centre: as from 2 away */
+        want = kind ? 1e30
+                    : 1 / (100 * pow(0.25, 1.0 / PHOTOS) *
+                           pow(1 / 16.0, 1 - 1.0 / PHOTOS)); /* at the centre: as from 2 away */
         CHECK(fabs((double)model->settings.light_scale / want - 1) < 1e-6);
-        CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 && fabs(trainer->unit - 4) < 1e-12);
+        CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 &&
+              fabs(trainer->unit - 4) < 1e-12);
         CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
         CHECK(fabs((double)frame.views[0].near_plane - (kind == 1 ? 0.01 : 0.04)) < 1e-7);
         ssdgs_trainer_destroy(trainer);
@@ -1067,17 +1176,23 @@ static void test_units(void) {
         double turned;
         if (kind < 2) settings.length_unit = (ssdgs_real)(kind ? 0.25 : 0.5);
         CHECK(!ssdgs_model_create(context, &settings, 2, &model));
-        for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] = (ssdgs_real)log(0.2 + 0.1 * c);
-        model->gaussians[(size_t)(SSDGS_POSITION + 1) * model->capacity + 1] = (ssdgs_real)0.5; /* the published form's box */
+        for (c = 0; c < 3; c++)
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] =
+                (ssdgs_real)log(0.2 + 0.1 * c);
+        model->gaussians[(size_t)(SSDGS_POSITION + 1) * model->capacity + 1] =
+            (ssdgs_real)0.5; /* the published form's box */
         CHECK(!ssdgs_refine_photo(model, &photo, black, 1));
-        CHECK(fabs(fabs((double)(photo.light.position[0] - photos[0].light.position[0])) - (kind ? 5e-4 : 1e-3)) < 1e-6);
+        CHECK(fabs(fabs((double)(photo.light.position[0] - photos[0].light.position[0])) -
+                   (kind ? 5e-4 : 1e-3)) < 1e-6);
         for (c = 0, turned = 0; c < 3; c++) /* its trace: 1 + 2 cos(root of 3 x the step) */
-            for (i = 0; i < 3; i++) turned += (double)photo.camera.view[4 * c + i] * (double)photos[0].camera.view[4 * c + i];
+            for (i = 0; i < 3; i++)
+                turned += (double)photo.camera.view[4 * c + i] * (double)photos[0].camera.view[4 * c + i];
         CHECK(fabs(sqrt((3 - turned) / 3) / (1e-3 * SIDE / (double)photo.camera.fx) - 1) < 0.1);
         ssdgs_model_destroy(model);
     }
     ssdgs_context_destroy(context);
-    CHECK(fabs(ssdgs__decay(to_zero, 0, 60e3, 15e3) - 0.0075) < 1e-8 && fabs(ssdgs__decay(to_zero, 0, 60e3, 60e3)) < 1e-12);
+    CHECK(fabs(ssdgs__decay(to_zero, 0, 60e3, 15e3) - 0.0075) < 1e-8 &&
+          fabs(ssdgs__decay(to_zero, 0, 60e3, 60e3)) < 1e-12);
     CHECK(fabs(ssdgs__decay(by_factors, 0, 60e3, 30e3) - 1e-3) < 1e-8);
 }
 
@@ -1092,18 +1207,22 @@ static void test_blur(void) {
         settings.pixel_variance = (ssdgs_real)(i ? 0.7 : 0.1);
         settings.light_blur = i ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 1, &model));
-        for (pass = 0; pass < 3; pass++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);
+        for (pass = 0; pass < 3; pass++)
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);
         model->gaussians[(size_t)SSDGS_OPACITY * model->capacity] = 4;
-        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) && frame.view_count > 1);
+        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) &&
+              frame.view_count > 1);
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_PROJECT));
-        CHECK(fabs(-0.5 * 1.4426950408889634 / (double)frame.views[0].record[2] - (double)settings.pixel_variance) < 1e-3);
+        CHECK(fabs(-0.5 * 1.4426950408889634 / (double)frame.views[0].record[2] -
+                   (double)settings.pixel_variance) < 1e-3);
         CHECK(fabs((double)frame.views[1].variance - (i ? 0.3 : 0.2)) < 1e-6);
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
     }
 }
 
-/* Opacities are reset every so often, but not where less than half of that is left until density control ends, at 5/6 of a run. */
+/* Opacities are reset every so often, but not where less than half of that is left until density control
+   ends, at 5/6 of a run. */
 static void test_resets(void) {
     ssdgs_train_options options = short_run(90);
     int i;
@@ -1134,7 +1253,8 @@ static void test_prune_weight(void) {
             names[i] = (ssdgs_real)i;
             trainer->screen_count[i] = i == LIGHT ? 0 : 4;
             trainer->screen_gradient[i] = 3; /* in four photographs: too little to make more of it */
-            trainer->contribution[i] = trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
+            trainer->contribution[i] =
+                trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
         }
         trainer->iteration = pass == 2 ? 100 : pass ? 50 : 40;
         CHECK(!ssdgs__densify(trainer));
@@ -1147,16 +1267,57 @@ static void test_prune_weight(void) {
 }
 
 /* Notes in the log, by words of theirs. */
-enum { NO_POINT, NO_OUTLINES, NO_VIEW, OUTSIDE, WITHIN, CUBE, ONE_PLACE, NO_PLACE, BEHIND, DARK, EMPTY, WRONG, BACKDROP, FILLED,
-    ALIKE, LIT_WITHIN, ONE_LIGHT, LIGHT_MOVES, CONTRADICTED, LIT_BEHIND, READ_AS, MULTIPLIED, NOTES };
-static const char *const note_words[NOTES + 1] = {"no random point is inside", "too few photographs are transparent", "no Gaussian in view",
-    "in 100 pixels lie outside", "cameras of 6 stand within", "object lies about within", "taken from one place", "in no one place",
-    "behind the cameras", "photographs of 6 have a light of intensity 0", "photographs of 6 are wholly transparent",
-    "are transparent where the others show", "taken for empty", "taken for opaque", "all alike", "lights of",
-    "lit from one place", "light moves with the camera", "shading contradicts", "lights stand behind", "read as (", "multiplied by alpha", NULL};
+enum {
+    NO_POINT,
+    NO_OUTLINES,
+    NO_VIEW,
+    OUTSIDE,
+    WITHIN,
+    CUBE,
+    ONE_PLACE,
+    NO_PLACE,
+    BEHIND,
+    DARK,
+    EMPTY,
+    WRONG,
+    BACKDROP,
+    FILLED,
+    ALIKE,
+    LIT_WITHIN,
+    ONE_LIGHT,
+    LIGHT_MOVES,
+    CONTRADICTED,
+    LIT_BEHIND,
+    READ_AS,
+    MULTIPLIED,
+    NOTES
+};
+static const char *const note_words[NOTES + 1] = {"no random point is inside",
+                                                  "too few photographs are transparent",
+                                                  "no Gaussian in view",
+                                                  "in 100 pixels lie outside",
+                                                  "cameras of 6 stand within",
+                                                  "object lies about within",
+                                                  "taken from one place",
+                                                  "in no one place",
+                                                  "behind the cameras",
+                                                  "photographs of 6 have a light of intensity 0",
+                                                  "photographs of 6 are wholly transparent",
+                                                  "are transparent where the others show",
+                                                  "taken for empty",
+                                                  "taken for opaque",
+                                                  "all alike",
+                                                  "lights of",
+                                                  "lit from one place",
+                                                  "light moves with the camera",
+                                                  "shading contradicts",
+                                                  "lights stand behind",
+                                                  "read as (",
+                                                  "multiplied by alpha",
+                                                  NULL};
 static int heard[NOTES], told; /* how often; the number that the last one begins with */
-static double cube[6]; /* that is said to hold the object */
-static char reading[300]; /* that is said to suit the lights */
+static double cube[6];         /* that is said to hold the object */
+static char reading[300];      /* that is said to suit the lights */
 
 static void hear(void *user, ssdgs_result code, const char *message) {
     int i;
@@ -1165,16 +1326,20 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     for (i = 0; i < NOTES; i++) heard[i] += code == SSDGS_OK && strstr(message, note_words[i]) != NULL;
     if (strstr(message, note_words[READ_AS])) snprintf(reading, sizeof reading, "%s", message);
     if (strstr(message, note_words[CUBE]))
-        CHECK(sscanf(strstr(message, "bounds_min"), "bounds_min=%lf,%lf,%lf bounds_max=%lf,%lf,%lf", cube, cube + 1, cube + 2, cube + 3,
-                     cube + 4, cube + 5) == 6);
+        CHECK(sscanf(strstr(message, "bounds_min"), "bounds_min=%lf,%lf,%lf bounds_max=%lf,%lf,%lf", cube,
+                     cube + 1, cube + 2, cube + 3, cube + 4, cube + 5) == 6);
 }
 
-/* Photographs, cameras and bounds that do not suit each other are noted, and others are not; the ball's cube is found. */
+/* Photographs, cameras and bounds that do not suit each other are noted, and others are not; the ball's cube
+   is found. */
 static void test_doubts(void) {
-    static int wanted[11][NOTES] = { /* the rest 0 */
-        {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0},
-        {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1},
-        {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
+    static int wanted[11][NOTES] = {/* the rest 0 */
+                                    {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0},
+                                    {0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0},
+                                    {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0},
+                                    {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1},
+                                    {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0},
+                                    {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
     static unsigned char clear[SIDE * SIDE * 4], cut[SIDE * SIDE * 4];
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
@@ -1194,14 +1359,19 @@ static void test_doubts(void) {
         for (c = 0; c < 3 && (kind == 1 || kind == 2 || kind == 9); c++)
             options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)(kind == 2 ? 3 : 0.1));
         if (kind == 9) shots[1].pixels = cut;
-        if (kind == 10) options.bounds_min[0] = -(options.bounds_max[0] = (ssdgs_real)1.2); /* as wide as cameras stand, not as deep */
+        if (kind == 10)
+            options.bounds_min[0] =
+                -(options.bounds_max[0] = (ssdgs_real)1.2); /* as wide as cameras stand, not as deep */
         for (i = 0; i < PHOTOS; i++) {
             if (kind == 3) shots[i].camera = photos[0].camera;
-            for (c = 0; c < (kind == 10 ? 1 : 3) && (kind == 10 || (kind == 4 && i < 2)); c++) shots[i].light.intensity[c] = 0;
+            for (c = 0; c < (kind == 10 ? 1 : 3) && (kind == 10 || (kind == 4 && i < 2)); c++)
+                shots[i].light.intensity[c] = 0;
             for (c = 4; c < 12 && kind == 5; c++) shots[i].camera.view[c] = -shots[i].camera.view[c];
             if (kind == 6) shots[i].camera.cx += 20;
             if (kind == 7) shots[i].pixels = clear;
-            for (c = 0; c < 3 && kind == 8; c++) shots[i].camera.view[4 * c + 3] -= 5 * shots[i].camera.view[4 * c + 1]; /* the world moves by 5 */
+            for (c = 0; c < 3 && kind == 8; c++)
+                shots[i].camera.view[4 * c + 3] -=
+                    5 * shots[i].camera.view[4 * c + 1]; /* the world moves by 5 */
         }
         memset(heard, 0, sizeof heard);
         told = 0;
@@ -1214,7 +1384,8 @@ static void test_doubts(void) {
             for (i = 0; i < NOTES; i++) printf("    %d: \"%s\" %d times\n", kind, note_words[i], heard[i]);
         CHECK(kind == 4 ? told == 2 : kind != 7 || told == 6);
         for (c = 0; c < 6 && heard[CUBE]; c++) /* its radius is 0.4 */
-            CHECK(fabs(fabs(cube[c] - (kind == 8 && c % 3 == 1 ? 5 : 0)) - 0.42) < 0.06 && (cube[c] > (kind == 8 && c % 3 == 1 ? 5 : 0)) == (c > 2));
+            CHECK(fabs(fabs(cube[c] - (kind == 8 && c % 3 == 1 ? 5 : 0)) - 0.42) < 0.06 &&
+                  (cube[c] > (kind == 8 && c % 3 == 1 ? 5 : 0)) == (c > 2));
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1222,7 +1393,8 @@ static void test_doubts(void) {
     memset(heard, 0, sizeof heard);
 }
 
-/* How soft shadows are is learnt with the shadow term, whether there are highlights or not; other forms' weights rest without them. */
+/* How soft shadows are is learnt with the shadow term, whether there are highlights or not; other forms'
+   weights rest without them. */
 static void test_softness(void) {
     int kind, i, k;
     for (kind = 0; kind < 3; kind++) {
@@ -1236,9 +1408,12 @@ static void test_softness(void) {
         settings.terms = kind == 1 ? SSDGS_DIFFUSE_TERM : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
         if (kind == 2) settings.asg = SSDGS_ASG_GEOMETRIC;
         CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 0, &model));
-        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer) && !ssdgs_trainer_run(trainer, NULL, NULL));
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer) &&
+              !ssdgs_trainer_run(trainer, NULL, NULL));
         for (k = 0; k < SSDGS_ASG_COUNT; k++)
-            for (i = 0; i < model->count; i++) moved += fabs((double)model->gaussians[(size_t)(SSDGS_ASG_WEIGHT + k) * model->capacity + (size_t)i]);
+            for (i = 0; i < model->count; i++)
+                moved += fabs(
+                    (double)model->gaussians[(size_t)(SSDGS_ASG_WEIGHT + k) * model->capacity + (size_t)i]);
         CHECK(kind ? moved <= 0 : moved > 0);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -1246,7 +1421,8 @@ static void test_softness(void) {
     }
 }
 
-/* A trainer whose model another one, or a sort, has rearranged refuses to go on; one that is made then does. */
+/* A trainer whose model another one, or a sort, has rearranged refuses to go on; one that is made then
+   does. */
 static void test_rearranged(void) {
     ssdgs_train_options grows = short_run(100), rests = short_run(100);
     ssdgs_context *context = NULL;
@@ -1256,18 +1432,22 @@ static void test_rearranged(void) {
     rests.densify_until = 0;
     grows.densify_from = grows.densify_every = 2;
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model));
-    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &rests, &a) && !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &rests, &a) &&
+          !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
     for (i = 0; i < 4; i++) {
         CHECK(!ssdgs_trainer_step(b, NULL));
-        CHECK(ssdgs_trainer_step(a, NULL) == (i ? SSDGS_ERR_ARGUMENT : SSDGS_OK)); /* the control is after the second */
+        CHECK(ssdgs_trainer_step(a, NULL) ==
+              (i ? SSDGS_ERR_ARGUMENT : SSDGS_OK)); /* the control is after the second */
     }
     CHECK(strstr(ssdgs_error_message(context), "has moved the Gaussians"));
-    CHECK(ssdgs_trainer_save(a, "build/t_train_moved.ckpt") == SSDGS_ERR_ARGUMENT && !ssdgs_trainer_save(b, "build/t_train_moved.ckpt"));
+    CHECK(ssdgs_trainer_save(a, "build/t_train_moved.ckpt") == SSDGS_ERR_ARGUMENT &&
+          !ssdgs_trainer_save(b, "build/t_train_moved.ckpt"));
     CHECK(ssdgs_trainer_load(a, "build/t_train_moved.ckpt") == SSDGS_ERR_ARGUMENT);
     CHECK(!ssdgs_model_sort(model) && ssdgs_trainer_step(b, NULL) == SSDGS_ERR_ARGUMENT);
     ssdgs_trainer_destroy(a);
     ssdgs_trainer_destroy(b);
-    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &grows, &a) && !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
+    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &grows, &a) &&
+          !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
     CHECK(!ssdgs_trainer_load(a, "build/t_train_moved.ckpt") && !ssdgs_trainer_step(a, NULL));
     CHECK(ssdgs_trainer_step(b, NULL) == SSDGS_ERR_ARGUMENT); /* the file's Gaussians have come in */
     ssdgs_trainer_destroy(a);
@@ -1300,12 +1480,14 @@ static void test_nothing_in_view(void) {
     ssdgs_context_destroy(context);
 }
 
-enum { COLUMN = 15 }; /* of the second photograph of outlined(), a little less than transparent; the third and more are opaque */
+enum {
+    COLUMN = 15
+}; /* of the second photograph of outlined(), a little less than transparent; the third and more are opaque */
 
 static int unseen; /* places that no photograph of outlined() has */
 
-/* Whether a place is transparent in more than a share of the photographs that have it, and more than one of eight, or none has it,
-   counted in double; the first camera stands aside. */
+/* Whether a place is transparent in more than a share of the photographs that have it, and more than one of
+   eight, or none has it, counted in double; the first camera stands aside. */
 static int outlined(const ssdgs_photo *shots, int count, double aside, const double x[3], double share) {
     int photo, c, seen = 0, outside = 0;
     for (photo = 0; photo < count; photo++) {
@@ -1314,7 +1496,8 @@ static int outlined(const ssdgs_photo *shots, int count, double aside, const dou
         int dx, dy, any = 0;
         for (c = 0; c < 3; c++) {
             t[c] = (double)k->view[4 * c + 3];
-            t[c] += (double)k->view[4 * c] * x[0] + (double)k->view[4 * c + 1] * x[1] + (double)k->view[4 * c + 2] * x[2];
+            t[c] += (double)k->view[4 * c] * x[0] + (double)k->view[4 * c + 1] * x[1] +
+                    (double)k->view[4 * c + 2] * x[2];
         }
         if (photo == 0) t[0] += aside;
         u = floor((double)k->fx * t[0] / t[2] + (double)k->cx);
@@ -1323,9 +1506,11 @@ static int outlined(const ssdgs_photo *shots, int count, double aside, const dou
         seen++;
         for (dy = -1; dy <= 1; dy++)
             for (dx = -1; dx <= 1; dx++) {
-                const double px = u + dx, py = v + dy, rx = (px + 0.5 - SIDE / 2) / (SIDE * 0.3), ry = (py + 0.5 - SIDE / 2) / (SIDE * 0.3);
+                const double px = u + dx, py = v + dy, rx = (px + 0.5 - SIDE / 2) / (SIDE * 0.3),
+                             ry = (py + 0.5 - SIDE / 2) / (SIDE * 0.3);
                 if ((dx && dy) || px < 0 || py < 0 || px >= SIDE || py >= SIDE) continue;
-                any |= photo == 2 || photo >= PHOTOS || rx * rx + ry * ry < 1 || (photo == 1 && (int)px == COLUMN);
+                any |= photo == 2 || photo >= PHOTOS || rx * rx + ry * ry < 1 ||
+                       (photo == 1 && (int)px == COLUMN);
             }
         outside += !any;
     }
@@ -1333,7 +1518,8 @@ static int outlined(const ssdgs_photo *shots, int count, double aside, const dou
     return share > 0 && (!seen || (outside > share * seen && (seen < 8 || outside > 1)));
 }
 
-/* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs in double says. */
+/* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs
+   in double says. */
 static void test_prune_outside(void) {
     enum { MANY = 400, MORE = PHOTOS + 3 };
     static unsigned char blank[SIDE * SIDE * 4];
@@ -1390,10 +1576,14 @@ static void test_prune_outside(void) {
             unlike += !stays[(int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i]];
         CHECK(unlike == 0);
         ssdgs_trainer_destroy(trainer);
-        for (left = rounds = 0; left <= MANY / 4 && rounds < 16; rounds++) /* the places that such a start draws */
+        for (left = rounds = 0; left <= MANY / 4 && rounds < 16;
+             rounds++) /* the places that such a start draws */
             for (i = left; i < MANY; i++) {
                 for (c = 0; c < 3; c++)
-                    starts[left][c] = centre[pass] + half[pass] * (2 * ssdgs__uniform(options.seed, (uint64_t)(3 * (rounds * MANY + i) + c)) - 1);
+                    starts[left][c] =
+                        centre[pass] +
+                        half[pass] *
+                            (2 * ssdgs__uniform(options.seed, (uint64_t)(3 * (rounds * MANY + i) + c)) - 1);
                 left += !outlined(shots, count, 0, starts[left], shares[pass]);
             }
         CHECK(pass == 0 || pass == 2 ? rounds == 1 : rounds > 1);
@@ -1404,17 +1594,21 @@ static void test_prune_outside(void) {
         }
         CHECK(!ssdgs_trainer_create(model, shots, count, &options, &trainer) && model->count == left);
         for (i = unlike = 0; i < left; i++) {
-            const ssdgs_real *const p = model->gaussians, expected = (ssdgs_real)(2 * half[pass] * pow(MANY * rounds, -1.0 / 3));
+            const ssdgs_real *const p = model->gaussians,
+                                    expected = (ssdgs_real)(2 * half[pass] * pow(MANY * rounds, -1.0 / 3));
             int j, found = 0;
             for (j = 0; j < model->count; j++) {
                 double d2 = 0;
                 for (c = 0; c < 3; c++) {
-                    const double d = (double)p[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)j] - starts[i][c];
+                    const double d =
+                        (double)p[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)j] - starts[i][c];
                     d2 += d * d;
                 }
                 found += d2 < 1e-10;
             }
-            unlike += found != 1 || fabs(exp((double)p[SSDGS_LOG_SCALE * model->capacity + (size_t)i]) / (double)expected - 0.71812) > 1e-4;
+            unlike += found != 1 ||
+                      fabs(exp((double)p[SSDGS_LOG_SCALE * model->capacity + (size_t)i]) / (double)expected -
+                           0.71812) > 1e-4;
         }
         CHECK(unlike == 0);
         ssdgs_trainer_destroy(trainer);
@@ -1428,25 +1622,30 @@ static void test_prune_outside(void) {
         CHECK(!heard[NO_POINT] && !heard[NO_OUTLINES]);
         clear[3] = 255; /* a corner */
         for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
-        for (c = 0; c < 3; c++) options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
+        for (c = 0; c < 3; c++)
+            options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
         CHECK(fabs(exp((double)model->gaussians[SSDGS_LOG_SCALE * model->capacity]) / size - 1) < 1e-4);
         CHECK(heard[NO_POINT] == 1 && !heard[NO_OUTLINES]);
         ssdgs_trainer_destroy(trainer);
         clear[3] = 0;
-        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && heard[NO_POINT] == 1 && !heard[NO_OUTLINES] && told == 6);
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && heard[NO_POINT] == 1 &&
+              !heard[NO_OUTLINES] && told == 6);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
     ssdgs_context_destroy(context);
 }
 
-/* Of eight photographs or more those whose mask or pose contradicts the others' lose their outlines, and nothing else is doubted. */
+/* Of eight photographs or more those whose mask or pose contradicts the others' lose their outlines, and
+   nothing else is doubted. */
 static void test_wrong_outlines(void) {
-    static const struct { int photographs, opaque, wrong, turned, doubted; } cases[] = {
-        {12, 0, 0, 0, 0}, {12, 0, 1, 0, 1}, {12, 0, 1, 1, 1}, {8, 0, 1, 0, 1}, {7, 0, 1, 0, 0}, {24, 0, 2, 0, 2}, {24, 0, 2, 1, 2}, {24, 0, 9, 0, 0},
-        {24, 4, 2, 1, 2}}; /* the last ones are opaque */
+    static const struct {
+        int photographs, opaque, wrong, turned, doubted;
+    } cases[] = {{12, 0, 0, 0, 0}, {12, 0, 1, 0, 1}, {12, 0, 1, 1, 1}, {8, 0, 1, 0, 1}, {7, 0, 1, 0, 0},
+                 {24, 0, 2, 0, 2}, {24, 0, 2, 1, 2}, {24, 0, 9, 0, 0}, {24, 4, 2, 1, 2}}; /* the last ones are
+                                                                                             opaque */
     static unsigned char speck[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
@@ -1480,9 +1679,11 @@ static void test_wrong_outlines(void) {
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         for (k = 0; k < cases[i].photographs; k++) {
             left_out += trainer->transparent[k] == 1;
-            CHECK(trainer->transparent[k] == (k >= cases[i].photographs - cases[i].opaque ? 0 : 2) || (k >= first && k < first + wrong));
+            CHECK(trainer->transparent[k] == (k >= cases[i].photographs - cases[i].opaque ? 0 : 2) ||
+                  (k >= first && k < first + wrong));
         }
-        if (!CHECK(left_out == cases[i].doubted && heard[WRONG] == (left_out > 0) && (!left_out || told == left_out)))
+        if (!CHECK(left_out == cases[i].doubted && heard[WRONG] == (left_out > 0) &&
+                   (!left_out || told == left_out)))
             printf("    case %d: %d of %d\n", (int)i, left_out, cases[i].doubted);
         CHECK((trainer->outlines == 0) == (heard[NO_POINT] > 0) && !heard[NO_POINT] == (i != 4 && i != 7));
         ssdgs_trainer_destroy(trainer);
@@ -1494,15 +1695,18 @@ static void test_wrong_outlines(void) {
 
 enum { SHOTS = 16, WIDE = 48 };
 
-/* A white ball of radius 0.4 as a camera and a light see it, (WIDE,WIDE,4), matt; `multiplied`: colours are times alpha. */
-static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, int multiplied, unsigned char *out) {
+/* A white ball of radius 0.4 as a camera and a light see it, (WIDE,WIDE,4), matt; `multiplied`: colours are
+   times alpha. */
+static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, int multiplied,
+                         unsigned char *out) {
     int x, y, sx, sy, c, l;
     for (y = 0; y < WIDE; y++)
         for (x = 0; x < WIDE; x++) {
             double sum = 0, hits = 0, alpha;
             for (sy = 0; sy < 4; sy++)
                 for (sx = 0; sx < 4; sx++) {
-                    double ray[3], eye[3] = {0, 0, 0}, d[3] = {0, 0, 0}, n[3], to_light[3], b = 0, e2 = 0, d2 = 0, t, cosine = 0, l2 = 0;
+                    double ray[3], eye[3] = {0, 0, 0}, d[3] = {0, 0, 0}, n[3], to_light[3], b = 0, e2 = 0,
+                                   d2 = 0, t, cosine = 0, l2 = 0;
                     ray[0] = (x + (sx + 0.5) / 4 - (double)camera->cx) / (double)camera->fx;
                     ray[1] = (y + (sy + 0.5) / 4 - (double)camera->cy) / (double)camera->fy;
                     ray[2] = 1;
@@ -1516,7 +1720,8 @@ static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, i
                     t = (-b - sqrt(b * b - d2 * (e2 - 0.16))) / d2;
                     for (c = 0; c < 3; c++) {
                         n[c] = (eye[c] + t * d[c]) / 0.4;
-                        to_light[c] = (double)light->position[c] - (light->kind == SSDGS_LIGHT_POINT ? eye[c] + t * d[c] : 0);
+                        to_light[c] = (double)light->position[c] -
+                                      (light->kind == SSDGS_LIGHT_POINT ? eye[c] + t * d[c] : 0);
                         l2 += to_light[c] * to_light[c];
                         cosine += n[c] * to_light[c];
                     }
@@ -1534,23 +1739,51 @@ static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, i
         }
 }
 
-/* What is told of lights: nothing where they are right, whether points or directions; where they stand inside of the object, in one
-   place, with the camera; where shading contradicts them, and how to read them then. And colours multiplied by alpha. */
+/* What is told of lights: nothing where they are right, whether points or directions; where they stand inside
+   of the object, in one place, with the camera; where shading contradicts them, and how to read them then.
+   And colours multiplied by alpha. */
 static void test_light_notes(void) {
-    static const struct { const char *name; int directional, above, multiplied, notes[2]; const char *reading; } cases[] = {
-        {"right", 0, 0, 0, {NOTES, NOTES}, NULL}, {"right", 1, 0, 0, {NOTES, NOTES}, NULL}, {"right", 0, 1, 0, {NOTES, NOTES}, NULL},
-        {"negative", 0, 0, 0, {CONTRADICTED, READ_AS}, "(-x, -y, -z) in the world's axes, the"},
-        {"negative", 1, 0, 0, {CONTRADICTED, READ_AS}, "(-x, -y, -z) in the world's axes, the"},
-        {"-y", 0, 0, 0, {CONTRADICTED, READ_AS}, "(x, -y, z) in the world's axes, the"},
-        {"yzx", 0, 0, 0, {CONTRADICTED, READ_AS}, "(z, x, y) in the world's axes, the"},
-        {"zyx", 0, 0, 0, {CONTRADICTED, READ_AS}, "(z, y, x) in the world's axes, the"},
-        {"camera axes", 0, 0, 0, {CONTRADICTED, READ_AS}, "(x, y, z) in each camera's (right, down, forward) axes, the"},
-        {"camera axes", 1, 0, 0, {CONTRADICTED, READ_AS}, "(x, y, z) in each camera's (right, down, forward) axes, the"},
-        {"from camera", 0, 0, 0, {LIT_BEHIND, READ_AS}, "(x, y, z) in the world's axes, from the camera, the"},
-        {"in camera", 0, 0, 0, {CONTRADICTED, READ_AS}, "(x, y, z) in each camera's (right, down, forward) axes, from the camera, the"},
-        {"one", 0, 0, 0, {ONE_LIGHT, NOTES}, NULL}, {"one", 1, 0, 0, {ONE_LIGHT, NOTES}, NULL},
-        {"flash", 0, 0, 0, {LIGHT_MOVES, NOTES}, NULL}, {"inside", 0, 0, 0, {LIT_WITHIN, NOTES}, NULL},
-        {"right", 0, 0, 1, {MULTIPLIED, NOTES}, NULL}};
+    static const struct {
+        const char *name;
+        int directional, above, multiplied, notes[2];
+        const char *reading;
+    } cases[] = {{"right", 0, 0, 0, {NOTES, NOTES}, NULL},
+                 {"right", 1, 0, 0, {NOTES, NOTES}, NULL},
+                 {"right", 0, 1, 0, {NOTES, NOTES}, NULL},
+                 {"negative", 0, 0, 0, {CONTRADICTED, READ_AS}, "(-x, -y, -z) in the world's axes, the"},
+                 {"negative", 1, 0, 0, {CONTRADICTED, READ_AS}, "(-x, -y, -z) in the world's axes, the"},
+                 {"-y", 0, 0, 0, {CONTRADICTED, READ_AS}, "(x, -y, z) in the world's axes, the"},
+                 {"yzx", 0, 0, 0, {CONTRADICTED, READ_AS}, "(z, x, y) in the world's axes, the"},
+                 {"zyx", 0, 0, 0, {CONTRADICTED, READ_AS}, "(z, y, x) in the world's axes, the"},
+                 {"camera axes",
+                  0,
+                  0,
+                  0,
+                  {CONTRADICTED, READ_AS},
+                  "(x, y, z) in each camera's (right, down, forward) axes, the"},
+                 {"camera axes",
+                  1,
+                  0,
+                  0,
+                  {CONTRADICTED, READ_AS},
+                  "(x, y, z) in each camera's (right, down, forward) axes, the"},
+                 {"from camera",
+                  0,
+                  0,
+                  0,
+                  {LIT_BEHIND, READ_AS},
+                  "(x, y, z) in the world's axes, from the camera, the"},
+                 {"in camera",
+                  0,
+                  0,
+                  0,
+                  {CONTRADICTED, READ_AS},
+                  "(x, y, z) in each camera's (right, down, forward) axes, from the camera, the"},
+                 {"one", 0, 0, 0, {ONE_LIGHT, NOTES}, NULL},
+                 {"one", 1, 0, 0, {ONE_LIGHT, NOTES}, NULL},
+                 {"flash", 0, 0, 0, {LIGHT_MOVES, NOTES}, NULL},
+                 {"inside", 0, 0, 0, {LIT_WITHIN, NOTES}, NULL},
+                 {"right", 0, 0, 1, {MULTIPLIED, NOTES}, NULL}};
     static unsigned char pictures[SHOTS][WIDE * WIDE * 4];
     const ssdgs_real centre[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_train_options options = short_run(60);
@@ -1567,10 +1800,13 @@ static void test_light_notes(void) {
         ssdgs_trainer *trainer = NULL;
         int k, c, l, total = 0;
         for (k = 0; k < SHOTS; k++) {
-            const double turn = 2.4 * k, rise = cases[i].above ? 0.95 : 1 - (2 * k + 1.0) / SHOTS, out = sqrt(1 - rise * rise);
-            const double light_turn = 1.7 * k + 1, light_rise = cases[i].above ? 0.5 : 0.9 * sin(2.9 * k), light_out = sqrt(1 - light_rise * light_rise);
+            const double turn = 2.4 * k, rise = cases[i].above ? 0.95 : 1 - (2 * k + 1.0) / SHOTS,
+                         out = sqrt(1 - rise * rise);
+            const double light_turn = 1.7 * k + 1, light_rise = cases[i].above ? 0.5 : 0.9 * sin(2.9 * k),
+                         light_out = sqrt(1 - light_rise * light_rise);
             const double away = cases[i].directional ? 1 : strcmp(name, "one") ? 2 + 0.2 * (k % 3) : 2;
-            const ssdgs_real eye[3] = {(ssdgs_real)(2 * out * cos(turn)), (ssdgs_real)(2 * out * sin(turn)), (ssdgs_real)(2 * rise)};
+            const ssdgs_real eye[3] = {(ssdgs_real)(2 * out * cos(turn)), (ssdgs_real)(2 * out * sin(turn)),
+                                       (ssdgs_real)(2 * rise)};
             ssdgs_light *light = &shots[k].light;
             ssdgs_real p[3], *to;
             shots[k].camera = ssdgs_camera_look_at(eye, centre, up, (ssdgs_real)0.6, WIDE, WIDE);
@@ -1582,7 +1818,9 @@ static void test_light_notes(void) {
             for (c = 0; c < 3; c++) { /* held by hand */
                 const double shake = (cases[i].directional ? 0.01 : 0.03) * sin(7.0 * k + 2 * c);
                 if (!strcmp(name, "flash")) light->position[c] = eye[c] + (ssdgs_real)shake;
-                if (!strcmp(name, "one")) light->position[c] = (ssdgs_real)((c == 2 ? 1 : 0) * away + (cases[i].directional ? 0 : shake));
+                if (!strcmp(name, "one"))
+                    light->position[c] =
+                        (ssdgs_real)((c == 2 ? 1 : 0) * away + (cases[i].directional ? 0 : shake));
             }
             ball_picture(&shots[k].camera, light, cases[i].multiplied, pictures[k]);
             shots[k].pixels = pictures[k];
@@ -1596,7 +1834,8 @@ static void test_light_notes(void) {
                 if (!strcmp(name, "from camera")) to[c] = p[c] - eye[c];
                 if (strstr(name, "camera axes") || !strcmp(name, "in camera"))
                     for (to[c] = 0, l = 0; l < 3; l++)
-                        to[c] += shots[k].camera.view[4 * c + l] * (p[l] - (strstr(name, "axes") ? 0 : eye[l]));
+                        to[c] +=
+                            shots[k].camera.view[4 * c + l] * (p[l] - (strstr(name, "axes") ? 0 : eye[l]));
             }
         }
         memset(heard, 0, sizeof heard);
@@ -1608,11 +1847,14 @@ static void test_light_notes(void) {
         total -= cases[i].notes[0] == LIT_WITHIN ? heard[CONTRADICTED] : 0;
         if (!CHECK(total == (cases[i].notes[0] < NOTES) + (cases[i].notes[1] < NOTES))) {
             printf("    %s, directional %d, above %d:\n", name, cases[i].directional, cases[i].above);
-            for (c = 0; c < NOTES; c++) if (heard[c]) printf("    \"%s\"\n", note_words[c]);
+            for (c = 0; c < NOTES; c++)
+                if (heard[c]) printf("    \"%s\"\n", note_words[c]);
         }
         for (c = 0; c < 2; c++)
-            if (!CHECK(cases[i].notes[c] == NOTES || heard[cases[i].notes[c]] == 1)) printf("    %s: not \"%s\"\n", name, note_words[cases[i].notes[c]]);
-        if (!CHECK(!cases[i].reading || strstr(reading, cases[i].reading))) printf("    %s: %s\n", name, reading);
+            if (!CHECK(cases[i].notes[c] == NOTES || heard[cases[i].notes[c]] == 1))
+                printf("    %s: not \"%s\"\n", name, note_words[cases[i].notes[c]]);
+        if (!CHECK(!cases[i].reading || strstr(reading, cases[i].reading)))
+            printf("    %s: %s\n", name, reading);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1622,10 +1864,14 @@ static void test_light_notes(void) {
 
 /* What opaque photographs show at their borders decides whether they have a background. */
 static void test_borders(void) {
-    static const struct { double border, noise, background; int backdrop, alike, bottom; } cases[] = { /* bottom: its last row is grey */
-        {1, 0, 0, 0, 1, 0}, {1, 0, 1, 1, 0, 0}, {0, 0, 0, 1, 0, 0}, {0.5, 0.1, 0, 0, 0, 0}, {0.5, 0.5, 0, 0, 0, 0},
-        {0.12, 0, 0, 0, 1, 0}, {8.0 / 255, 0, 0, 1, 0, 0}, {9.0 / 255, 0, 0, 0, 1, 0}, {1, 0, 1, 1, 0, 1}, {0.98, 0.02, 1, 1, 0, 0},
-        {0.5, 0, 0.5, 1, 0, 1}, {0.9, 0.1, 1, 0, 0, 0}};
+    static const struct {
+        double border, noise, background;
+        int backdrop, alike, bottom;
+    } cases[] = {/* bottom: its last row is grey */
+                 {1, 0, 0, 0, 1, 0},         {1, 0, 1, 1, 0, 0},         {0, 0, 0, 1, 0, 0},
+                 {0.5, 0.1, 0, 0, 0, 0},     {0.5, 0.5, 0, 0, 0, 0},     {0.12, 0, 0, 0, 1, 0},
+                 {8.0 / 255, 0, 0, 1, 0, 0}, {9.0 / 255, 0, 0, 0, 1, 0}, {1, 0, 1, 1, 0, 1},
+                 {0.98, 0.02, 1, 1, 0, 0},   {0.5, 0, 0.5, 1, 0, 1},     {0.9, 0.1, 1, 0, 0, 0}};
     static unsigned char opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
@@ -1643,7 +1889,11 @@ static void test_borders(void) {
             const size_t x = k / 4 % SIDE, y = k / 4 / SIDE;
             const int border = !x || !y || x == SIDE - 1 || y == SIDE - 1;
             const double value = cases[i].border + cases[i].noise * (2 * ssdgs__uniform(5, k) - 1);
-            opaque[k] = (unsigned char)(k % 4 == 3 ? 255 : cases[i].bottom && y == SIDE - 1 ? 128 : border ? 255 * value + 0.5 : k / 4 % 2 ? 255 : 0);
+            opaque[k] = (unsigned char)(k % 4 == 3                         ? 255
+                                        : cases[i].bottom && y == SIDE - 1 ? 128
+                                        : border                           ? 255 * value + 0.5
+                                        : k / 4 % 2                        ? 255
+                                                                           : 0);
         }
         for (k = 0; k < PHOTOS; k++) {
             shots[k] = photos[k];
@@ -1653,8 +1903,9 @@ static void test_borders(void) {
         memset(heard, 0, sizeof heard);
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
-        if (!CHECK(heard[BACKDROP] == cases[i].backdrop && heard[FILLED] == !cases[i].backdrop && heard[ALIKE] == cases[i].alike &&
-                   heard[NO_OUTLINES] == 1 && trainer->backdrop == cases[i].backdrop && trainer->filled == !cases[i].backdrop))
+        if (!CHECK(heard[BACKDROP] == cases[i].backdrop && heard[FILLED] == !cases[i].backdrop &&
+                   heard[ALIKE] == cases[i].alike && heard[NO_OUTLINES] == 1 &&
+                   trainer->backdrop == cases[i].backdrop && trainer->filled == !cases[i].backdrop))
             printf("    case %d\n", (int)i);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -1663,7 +1914,8 @@ static void test_borders(void) {
     memset(heard, 0, sizeof heard);
 }
 
-/* A model has no loss against its own photograph, however far its light lies beyond what that can hold; a value of 254 is no limit. */
+/* A model has no loss against its own photograph, however far its light lies beyond what that can hold; a
+   value of 254 is no limit. */
 static void test_clipped(void) {
     static ssdgs_real image[SIDE * SIDE * 3];
     static unsigned char bytes[SIDE * SIDE * 4];
@@ -1687,7 +1939,8 @@ static void test_clipped(void) {
         g = ssdgs_model_get(model).gaussians;
         for (i = 0; i < 40; i++) {
             for (c = 0; c < 3; c++) {
-                g[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] = (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(3 * i + c)) - 0.4);
+                g[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
+                    (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(3 * i + c)) - 0.4);
                 g[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = -2;
             }
             g[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 3;
@@ -1700,28 +1953,42 @@ static void test_clipped(void) {
             for (i = full = 0; i < SIDE * SIDE; i++) {
                 for (c = 0; c < 3; c++) {
                     const double straight = (double)image[3 * i + c] / fmax((double)alpha[i], 1e-4);
-                    const double stored = transfer == SSDGS_TRANSFER_SRGB ? (double)ssdgs_srgb_encode((ssdgs_real)straight) : straight;
+                    const double stored = transfer == SSDGS_TRANSFER_SRGB
+                                              ? (double)ssdgs_srgb_encode((ssdgs_real)straight)
+                                              : straight;
                     bytes[4 * i + c] = (unsigned char)(stored < 1 ? 255 * stored + 0.5 : 255 - dim);
                     full += stored > 1.2;
                 }
                 bytes[4 * i + 3] = (unsigned char)(255 * (double)alpha[i] + 0.5);
             }
             photo.pixels = bytes;
-            CHECK(!ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, black, SSDGS_DIFFUSE_TERM, frozen, (ssdgs_real)0.2, 0, &values));
+            CHECK(!ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, black,
+                                         SSDGS_DIFFUSE_TERM, frozen, (ssdgs_real)0.2, 0, &values));
             CHECK(full > SIDE);
-            if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01)) printf("    transfer %d, %d: loss %g\n", transfer, dim, values.loss);
+            if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01))
+                printf("    transfer %d, %d: loss %g\n", transfer, dim, values.loss);
         }
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
     }
 }
 
-/* Outlines are known where more than a fiftieth of the photographs, and more than one of eight or more, are transparent on a hundredth
-   of the picture, but not on all of it. */
+/* Outlines are known where more than a fiftieth of the photographs, and more than one of eight or more, are
+   transparent on a hundredth of the picture, but not on all of it. */
 static void test_outlines_known(void) {
-    static const struct { int photographs, outlined, clear, known; } cases[] = {
-        {1, 1, 0, 1}, {7, 1, 0, 1}, {7, 0, 0, 0}, {8, 1, 0, 0}, {8, 2, 0, 1}, {100, 2, 0, 0}, {100, 3, 0, 1}, /* clear 0: the ball's */
-        {7, 1, SIDE * SIDE / 100, 0}, {7, 1, SIDE * SIDE / 100 + 1, 1}, {7, 1, SIDE * SIDE - 1, 1}, {7, 7, SIDE * SIDE, 0}};
+    static const struct {
+        int photographs, outlined, clear, known;
+    } cases[] = {{1, 1, 0, 1},
+                 {7, 1, 0, 1},
+                 {7, 0, 0, 0},
+                 {8, 1, 0, 0},
+                 {8, 2, 0, 1},
+                 {100, 2, 0, 0},
+                 {100, 3, 0, 1}, /* clear 0: the ball's */
+                 {7, 1, SIDE * SIDE / 100, 0},
+                 {7, 1, SIDE * SIDE / 100 + 1, 1},
+                 {7, 1, SIDE * SIDE - 1, 1},
+                 {7, 7, SIDE * SIDE, 0}};
     static unsigned char opaque[SIDE * SIDE * 4], part[SIDE * SIDE * 4];
     const ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
@@ -1733,7 +2000,8 @@ static void test_outlines_known(void) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         int k;
-        for (k = 0; k < SIDE * SIDE; k++) part[4 * k + 3] = k < cases[i].clear ? 0 : 254; /* a veil alone is no outline */
+        for (k = 0; k < SIDE * SIDE; k++)
+            part[4 * k + 3] = k < cases[i].clear ? 0 : 254; /* a veil alone is no outline */
         for (k = 0; k < cases[i].photographs; k++) {
             shots[k] = photos[k % PHOTOS];
             if (k >= cases[i].outlined) shots[k].pixels = opaque;
@@ -1742,7 +2010,8 @@ static void test_outlines_known(void) {
         CHECK(!ssdgs_model_create(context, NULL, 1, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         CHECK(trainer->outlines == cases[i].known);
-        for (k = 0; k < cases[i].photographs; k++) CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
+        for (k = 0; k < cases[i].photographs; k++)
+            CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
         { /* where an object fills less than 0.15 of the picture, screen gradients count for more */
             const double shown = cases[i].clear < SIDE * SIDE ? SIDE * SIDE - cases[i].clear : SIDE * SIDE;
             CHECK(fabs((double)trainer->magnify[0] - fmax(1, sqrt(0.15 * SIDE * SIDE / shown))) < 1e-5);
@@ -1769,8 +2038,9 @@ static void test_outlines_known(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Where opaque photographs show the background the loss has opacity_fade x the sum of opacities / pixels, half of it half way to 30,000
-   of 60,000; not where outlines are known, nor where the photographs show other things up to their borders. */
+/* Where opaque photographs show the background the loss has opacity_fade x the sum of opacities / pixels,
+   half of it half way to 30,000 of 60,000; not where outlines are known, nor where the photographs show other
+   things up to their borders. */
 static void test_fade(void) {
     enum { MANY = 5 };
     const double fade = 3, step = 1e-3, area = 50;
@@ -1791,7 +2061,8 @@ static void test_fade(void) {
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         for (i = 0; i < MANY; i++) {
-            ssdgs_real gradient[MANY] = {1, 1, 1, 1, 1}, *opacity = model->gaussians + SSDGS_OPACITY * model->capacity;
+            ssdgs_real gradient[MANY] = {1, 1, 1, 1, 1},
+                       *opacity = model->gaussians + SSDGS_OPACITY * model->capacity;
             double sum[2] = {0, 0}, want;
             int j, side;
             for (j = 0; j < MANY; j++) opacity[j] = (ssdgs_real)(j - 1.7);
@@ -1804,19 +2075,22 @@ static void test_fade(void) {
             ssdgs__fade(trainer, 30e3, area, gradient);
             CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5);
         }
-        for (i = 0; i < 3; i++) model->gaussians[(size_t)(SSDGS_POSITION + i) * model->capacity] = 1000; /* no photograph has it */
+        for (i = 0; i < 3; i++)
+            model->gaussians[(size_t)(SSDGS_POSITION + i) * model->capacity] =
+                1000; /* no photograph has it */
         model->gaussians[SSDGS_OPACITY * model->capacity] = 2;
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         if (!CHECK((model->gaussians[SSDGS_OPACITY * model->capacity] < 2) == !known))
-            printf("    %d: %g %d %d\n", known, (double)model->gaussians[SSDGS_OPACITY * model->capacity], trainer->backdrop, trainer->filled);
+            printf("    %d: %g %d %d\n", known, (double)model->gaussians[SSDGS_OPACITY * model->capacity],
+                   trainer->backdrop, trainer->filled);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
     ssdgs_context_destroy(context);
 }
 
-/* What lies half in shadow is halved along its longest axis, so that centre, variance and, where they overlap, the light that
-   gets through stay. */
+/* What lies half in shadow is halved along its longest axis, so that centre, variance and, where they
+   overlap, the light that gets through stay. */
 static void test_half_shadow(void) {
     static const double turn[4] = {0.9, 0.1, -0.3, 0.3}, scale[3] = {0.02, 0.11, 0.05};
     ssdgs_train_options options = short_run(100);
@@ -1833,7 +2107,8 @@ static void test_half_shadow(void) {
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, NULL, 2, &model));
     p = model->gaussians;
-    for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * model->capacity + 1] = (ssdgs_real)turn[c];
+    for (c = 0; c < 4; c++)
+        raw[c] = p[(size_t)(SSDGS_ROTATION + c) * model->capacity + 1] = (ssdgs_real)turn[c];
     for (c = 0; c < 3; c++) {
         p[(size_t)c * model->capacity + 1] = (ssdgs_real)0.2;
         p[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + 1] = (ssdgs_real)log(scale[c]);
@@ -1844,7 +2119,9 @@ static void test_half_shadow(void) {
         trainer->screen_count[i] = 3;
         trainer->contribution[i] = 100;
         trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
-        for (c = 0; c < SSDGS_CHANNELS; c++) trainer->mean[(size_t)c * trainer->stride + (size_t)i] = trainer->square[(size_t)c * trainer->stride + (size_t)i] = 1;
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            trainer->mean[(size_t)c * trainer->stride + (size_t)i] =
+                trainer->square[(size_t)c * trainer->stride + (size_t)i] = 1;
     }
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 3);
@@ -1852,17 +2129,22 @@ static void test_half_shadow(void) {
     stride = model->capacity;
     ssdgs__rotation_scalar(raw, q, r);
     for (half = 0, i = 0; i < 3; i++) { /* the first is still the first; halves start without momentum */
-        for (c = 0; c < SSDGS_CHANNELS; c++) CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i && trainer->square[(size_t)c * stride + (size_t)i] == !i);
-        CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 && trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
+        for (c = 0; c < SSDGS_CHANNELS; c++)
+            CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i &&
+                  trainer->square[(size_t)c * stride + (size_t)i] == !i);
+        CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 &&
+              trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
         if (i == 0) continue;
         for (c = 0; c < 3; c++) {
             const double x = (double)p[(size_t)c * stride + (size_t)i];
             middle[c] = (half ? middle[c] : 0) + x / 2;
             apart[c] = half ? apart[c] - x : x;
-            CHECK(fabs(exp((double)p[(size_t)(SSDGS_LOG_SCALE + c) * stride + (size_t)i]) - (c == 1 ? 0.75 : 1) * scale[c]) < 1e-6);
+            CHECK(fabs(exp((double)p[(size_t)(SSDGS_LOG_SCALE + c) * stride + (size_t)i]) -
+                       (c == 1 ? 0.75 : 1) * scale[c]) < 1e-6);
         }
         { /* 1 - opacity to the power 2/3: 1 / (2 x 0.75) */
-            const double veil = pow(1 + exp(1.2), -2.0 / 3), opacity = 1 / (1 + exp(-(double)p[SSDGS_OPACITY * stride + (size_t)i]));
+            const double veil = pow(1 + exp(1.2), -2.0 / 3),
+                         opacity = 1 / (1 + exp(-(double)p[SSDGS_OPACITY * stride + (size_t)i]));
             CHECK(fabs(opacity - (1 - veil)) < 1e-6);
         }
         half++;
@@ -1870,12 +2152,14 @@ static void test_half_shadow(void) {
     for (c = 0; c < 3; c++) {
         CHECK(fabs(middle[c] - 0.2) < 1e-6);
         length += apart[c] * apart[c];
-        CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) < 1e-6);
+        CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) <
+              1e-6);
     }
     CHECK(fabs(length / 4 + 0.75 * 0.75 * scale[1] * scale[1] - scale[1] * scale[1]) < 1e-7);
     p[SSDGS_OPACITY * stride] = -6;
     ssdgs__reset_opacity(trainer); /* lowers what is above 0.01 */
-    CHECK(p[SSDGS_OPACITY * stride] == -6 && fabs((double)p[SSDGS_OPACITY * stride + 1] - log(0.01 / 0.99)) < 1e-6);
+    CHECK(p[SSDGS_OPACITY * stride] == -6 &&
+          fabs((double)p[SSDGS_OPACITY * stride + 1] - log(0.01 / 0.99)) < 1e-6);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     CHECK(!ssdgs_model_create(context, NULL, 200, &model)); /* of many, the few with the most */
@@ -1888,9 +2172,11 @@ static void test_half_shadow(void) {
     }
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 204);
-    for (i = 0, c = 0; i < 204; i++) c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
+    for (i = 0, c = 0; i < 204; i++)
+        c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
     CHECK(c == 8);
-    for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a pixel; two photographs */
+    for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a
+                                 pixel; two photographs */
         ssdgs_real splat[SSDGS__SPLAT] = {4, (ssdgs_real)1.5}, lit = (ssdgs_real)0.2;
         uint32_t first = 0;
         ssdgs_frame frame;
@@ -1903,12 +2189,15 @@ static void test_half_shadow(void) {
         frame.splat_gradient = splat;
         frame.visibility = &lit;
         splat[6] = (ssdgs_real)(i == 2 ? 0.9 : 11);
-        if (i < 3) trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] = trainer->screen_count[0] = 0;
+        if (i < 3)
+            trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] =
+                trainer->screen_count[0] = 0;
         ssdgs__gather_statistics(trainer, &frame, 1);
         if (i == 3) ssdgs__gather_statistics(trainer, &frame, 2);
         CHECK(fabs((double)trainer->half_shadow[0] - (i == 0 ? 6.4 : i == 3 ? 12.8 : 0)) < 1e-5);
         CHECK(fabs((double)trainer->contribution[0] - (i == 2 ? 0.9 : i == 3 ? 22.9 : 11)) < 1e-5);
-        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 20 : 5)) < 1e-5 && trainer->screen_count[0] == (i == 3 ? 3 : 1));
+        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 20 : 5)) < 1e-5 &&
+              trainer->screen_count[0] == (i == 3 ? 3 : 1));
     }
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);

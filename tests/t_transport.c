@@ -1,4 +1,5 @@
-/* True dipole transport: the tree against every pair, closed forms, conservation; built again in double (real64). */
+/* True dipole transport: the tree against every pair, closed forms, conservation; built again in double
+   (real64). */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -9,7 +10,8 @@ static ssdgs_context *context;
 static double draw(uint64_t counter) { return ssdgs__uniform(91, counter); }
 
 /* A frame through the light pass, with the networks' settings small and transport on. */
-static void begin_as(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lights, int light_count, int training) {
+static void begin_as(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lights, int light_count,
+                     int training) {
     static const ssdgs_real eye[3] = {0, -2, (ssdgs_real)0.5}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     static ssdgs_camera camera;
     camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
@@ -30,14 +32,17 @@ static ssdgs_model *make_model(int count, double size) {
     settings.scattering_width = 16;
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
     for (i = 0; i < count; i++)
-        for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)log(size);
+        for (c = 0; c < 3; c++)
+            model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] =
+                (ssdgs_real)log(size);
     return model;
 }
 
 static void on_sphere(ssdgs_model *model, int count) {
     int i, c;
     for (i = 0; i < count; i++) {
-        const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u), a = 6.2831853 * draw(9000 + (uint64_t)i);
+        const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u),
+                     a = 6.2831853 * draw(9000 + (uint64_t)i);
         const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
         for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
     }
@@ -54,7 +59,8 @@ static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_re
     free(job.sources);
 }
 
-/* 3,000 Gaussians on a sphere, as training orders them or without order, some dark, two lights: against the sum over all pairs. */
+/* 3,000 Gaussians on a sphere, as training orders them or without order, some dark, two lights: against the
+   sum over all pairs. */
 static void test_pairs(int sorted) {
     enum { COUNT = 3001 };
     static ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
@@ -68,9 +74,11 @@ static void test_pairs(int sorted) {
     on_sphere(model, COUNT);
     if (sorted) CHECK(!ssdgs_model_sort(model));
     begin(&frame, model, lights, 2);
-    for (i = 0; i < 2 * COUNT; i++) frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
+    for (i = 0; i < 2 * COUNT; i++)
+        frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
     for (s = 0; s < SSDGS__BLOCK; s++) {
-        for (c = 0; c < 3; c++) x[c * SSDGS__BLOCK + s] = model->gaussians[(size_t)c * model->capacity + 1000 + (size_t)s];
+        for (c = 0; c < 3; c++)
+            x[c * SSDGS__BLOCK + s] = model->gaussians[(size_t)c * model->capacity + 1000 + (size_t)s];
     }
     for (light = 0; light < 2; light++) {
         sums_at(&frame, light, x, sums);
@@ -80,7 +88,10 @@ static void test_pairs(int sorted) {
                 double sum = 0, error;
                 for (i = 0; i < COUNT; i++) {
                     double r = 0.01 * 0.01;
-                    for (c = 0; c < 3; c++) r += pow((double)(x[c * SSDGS__BLOCK + s] - model->gaussians[(size_t)c * model->capacity + (size_t)i]), 2);
+                    for (c = 0; c < 3; c++)
+                        r += pow((double)(x[c * SSDGS__BLOCK + s] -
+                                          model->gaussians[(size_t)c * model->capacity + (size_t)i]),
+                                 2);
                     r = sqrt(r);
                     sum += (double)frame.flux[light * COUNT + i] * exp(-r / l) / (6.283185307179586 * l * r);
                 }
@@ -121,13 +132,15 @@ static void test_plane(void) {
     sums_at(&frame, 0, x, sums);
     for (k = 0; k < 3; k++) /* longer lengths leave the plane */
         for (s = 0; s < SSDGS__BLOCK; s++) {
-            const double l = 0.5 * 0.04 * (1 << k), h = 0.002 * s, expected = exp(-sqrt(h * h + 0.01 * 0.01) / l);
+            const double l = 0.5 * 0.04 * (1 << k), h = 0.002 * s,
+                         expected = exp(-sqrt(h * h + 0.01 * 0.01) / l);
             CHECK(fabs((double)sums[k * SSDGS__BLOCK + s] - expected) < 0.02 * expected + 0.004);
         }
     ssdgs_model_destroy(model);
 }
 
-/* The scattering network's inputs, of the Gaussians that are seen, under two lights: sums over all pairs, by the irradiance each has. */
+/* The scattering network's inputs, of the Gaussians that are seen, under two lights: sums over all pairs, by
+   the irradiance each has. */
 static void test_inputs(void) {
     enum { COUNT = 2000 };
     ssdgs_model *model = make_model(COUNT, 0.02);
@@ -153,17 +166,25 @@ static void test_inputs(void) {
                 const size_t at = frame.shaded[j];
                 const double length = 0.5 * 0.04 * (1 << k);
                 double sum = 0, away = 0, error;
-                for (c = 0; c < 3; c++) away += pow((double)(lights[light].position[c] - model->gaussians[(size_t)c * model->capacity + at]), 2);
+                for (c = 0; c < 3; c++)
+                    away += pow((double)(lights[light].position[c] -
+                                         model->gaussians[(size_t)c * model->capacity + at]),
+                                2);
                 for (i = 0; i < COUNT; i++) {
                     double r = 0.01 * 0.01;
                     for (c = 0; c < 3; c++)
-                        r += pow((double)(model->gaussians[(size_t)c * model->capacity + at] - model->gaussians[(size_t)c * model->capacity + (size_t)i]), 2);
+                        r += pow((double)(model->gaussians[(size_t)c * model->capacity + at] -
+                                          model->gaussians[(size_t)c * model->capacity + (size_t)i]),
+                                 2);
                     r = sqrt(r);
-                    sum += (double)frame.flux[light * COUNT + i] * exp(-r / length) / (6.283185307179586 * length * r);
+                    sum += (double)frame.flux[light * COUNT + i] * exp(-r / length) /
+                           (6.283185307179586 * length * r);
                 }
                 sum *= away;
-                error = fabs((double)activations[l.size * (size_t)(j / SSDGS__BLOCK) + l.lights + l.light_size * (size_t)light +
-                                                 l.transport + (size_t)(k * SSDGS__BLOCK + j % SSDGS__BLOCK)] - sum);
+                error = fabs((double)activations[l.size * (size_t)(j / SSDGS__BLOCK) + l.lights +
+                                                 l.light_size * (size_t)light + l.transport +
+                                                 (size_t)(k * SSDGS__BLOCK + j % SSDGS__BLOCK)] -
+                             sum);
                 worst = error > worst ? error : worst;
                 most = sum > most ? sum : most;
                 dark = sum < dark ? sum : dark;
@@ -173,7 +194,8 @@ static void test_inputs(void) {
     ssdgs_model_destroy(model);
 }
 
-/* What a closed sheet of Gaussians takes up is what the light sends there, near, far and from infinity; the tree's root has it all. */
+/* What a closed sheet of Gaussians takes up is what the light sends there, near, far and from infinity; the
+   tree's root has it all. */
 static void test_flux(void) {
     enum { ROW = 60, COUNT = ROW * ROW };
     ssdgs_model *model = make_model(COUNT, 0.012);
@@ -195,7 +217,10 @@ static void test_flux(void) {
         light.position[2] = (ssdgs_real)(part == 2 ? 1 : height);
         begin(&frame, model, &light, 1);
         for (i = 0; i < COUNT; i++) sum += (double)frame.flux[i];
-        if (part == 0) expected = 4 * atan(half * half / (height * sqrt(height * height + 2 * half * half))); /* a square's solid angle */
+        if (part == 0)
+            expected =
+                4 * atan(half * half /
+                         (height * sqrt(height * height + 2 * half * half))); /* a square's solid angle */
         if (part == 1) expected /= height * height;
         printf("flux %g of %g\n", sum, expected);
         CHECK(fabs(sum / expected - 1) < 0.06);
@@ -203,7 +228,8 @@ static void test_flux(void) {
         CHECK(fabs((double)nodes[node_count - 1].flux / sum - 1) < 1e-4);
         for (i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
             const ssdgs__node *root = nodes + node_count - 1;
-            const double dx = (double)(model->gaussians[i] - root->x[0]), dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
+            const double dx = (double)(model->gaussians[i] - root->x[0]),
+                         dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
             CHECK(sqrt(dx * dx + dy * dy) <= (double)root->radius * 1.0001);
         }
     }
@@ -213,7 +239,8 @@ static void test_flux(void) {
 /* Same bits for any number of threads and for a light at rest; and the cues do reach the image. */
 static void test_bits(void) {
     enum { COUNT = 700 };
-    static const ssdgs_real eye[2][3] = {{0, -2, (ssdgs_real)0.5}, {1, -2, 0}}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    static const ssdgs_real eye[2][3] = {{0, -2, (ssdgs_real)0.5}, {1, -2, 0}}, target[3] = {0, 0, 0},
+                            up[3] = {0, 0, 1};
     static ssdgs_real color[6][SIDE * SIDE * 3];
     ssdgs_light light;
     ssdgs_image image;
@@ -221,7 +248,8 @@ static void test_bits(void) {
     memset(&light, 0, sizeof light);
     light.position[0] = light.position[2] = 2;
     for (c = 0; c < 3; c++) light.intensity[c] = 9;
-    /* one thread; three; its camera moved there; without transport's light; its light moved there; a Gaussian did */
+    /* one thread; three; its camera moved there; without transport's light; its light moved there; a Gaussian
+       did */
     for (part = 0; part < 6; part++) {
         ssdgs_context_desc desc;
         ssdgs_context *own = NULL, *shared = context;
@@ -234,7 +262,8 @@ static void test_bits(void) {
         context = shared;
         for (i = 0; i < COUNT; i++)
             for (c = 0; c < 3; c++) {
-                model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)(0.6 * draw(50000 + 3 * (uint64_t)i + (uint64_t)c) - 0.3);
+                model->gaussians[(size_t)c * model->capacity + (size_t)i] =
+                    (ssdgs_real)(0.6 * draw(50000 + 3 * (uint64_t)i + (uint64_t)c) - 0.3);
                 model->gaussians[(size_t)(SSDGS_SCATTERING + c) * model->capacity + (size_t)i] = 3;
             }
         if (part == 3) { /* the last SSDGS__LENGTHS inputs of the first layer */
@@ -250,7 +279,8 @@ static void test_bits(void) {
             const ssdgs_real x = (ssdgs_real)(0.6 * draw(50000) - 0.3);
             light.position[0] = part == 4 && !view ? -2 : 2;
             if (part == 5) *ssdgs_model_get(model).gaussians = view ? x : x + 1;
-            const ssdgs_camera camera = ssdgs_camera_look_at(eye[part > 3 ? 1 : view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
+            const ssdgs_camera camera =
+                ssdgs_camera_look_at(eye[part > 3 ? 1 : view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
             CHECK(!ssdgs_render(model, &camera, &light, 1, &image));
         }
         ssdgs_model_destroy(model);

@@ -1,5 +1,6 @@
-/* The tests' tools: checks that count, and the reader of .gold files. Each program closes with "N passed, N failed"; lines
-   "figure KEY VALUE" and "row ROW,ROW passed|failed NAME", of the stress catalogue, before that are for `make figures`. */
+/* The tests' tools: checks that count, and the reader of .gold files. Each program closes with "N passed, N
+   failed"; lines "figure KEY VALUE" and "row ROW,ROW passed|failed NAME", of the stress catalogue, before
+   that are for `make figures`. */
 #ifndef SSDGS_TEST_H
 #define SSDGS_TEST_H
 #include <math.h>
@@ -10,31 +11,27 @@
 
 static int test_passed, test_failed;
 
-static inline int test_check(int ok, const char *file, int line, const char *what)
-{
+static inline int test_check(int ok, const char *file, int line, const char *what) {
     if (ok) test_passed++;
     else test_failed++, printf("%s:%d: failed: %s\n", file, line, what);
     return ok;
 }
 
 /* By the bits: -ffast-math folds isfinite to a constant. */
-static inline int test_finite(double value)
-{
+static inline int test_finite(double value) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
 /* How far got is outside of absolute + relative * |want|: 1 is just inside. */
-static inline double test_error(double got, double want, double absolute, double relative)
-{
+static inline double test_error(double got, double want, double absolute, double relative) {
     return test_finite(got) ? fabs(got - want) / (absolute + relative * fabs(want) + 1e-300) : 1e300;
 }
 
 /* |got - want|^2 and |want|^2: is that within the bound? */
 static double test_worst_l2; /* relative, of all that were asked */
-static inline int test_l2(double error, double norm, double relative)
-{
+static inline int test_l2(double error, double norm, double relative) {
     const double e = norm > 0 ? sqrt(error / norm) : 0;
     if (!(e <= test_worst_l2)) test_worst_l2 = e;
     return error <= relative * relative * norm;
@@ -43,53 +40,52 @@ static inline int test_l2(double error, double norm, double relative)
 #define CHECK(condition) test_check(!!(condition), __FILE__, __LINE__, #condition)
 
 /* got, want: arrays of any number type. */
-#define CHECK_NEAR(got, want, count, absolute, relative, name)                                                         \
-    do {                                                                                                               \
-        size_t test_i, test_worst = 0, test_count = (size_t)(count);                                                   \
-        double test_e, test_max = 0;                                                                                   \
-        for (test_i = 0; test_i < test_count; test_i++) {                                                              \
-            test_e = test_error((double)(got)[test_i], (double)(want)[test_i], absolute, relative);                    \
-            if (test_e > test_max) test_max = test_e, test_worst = test_i;                                             \
-        }                                                                                                              \
-        if (!test_check(test_count > 0 && test_max <= 1, __FILE__, __LINE__, name) && test_count > 0)                  \
-            printf("    worst at %lu of %lu: got %.9g, want %.9g, %.3g times the tolerance\n",                         \
-                   (unsigned long)test_worst, (unsigned long)test_count, (double)(got)[test_worst],                    \
-                   (double)(want)[test_worst], test_max);                                                              \
+#define CHECK_NEAR(got, want, count, absolute, relative, name) \
+    do { \
+        size_t test_i, test_worst = 0, test_count = (size_t)(count); \
+        double test_e, test_max = 0; \
+        for (test_i = 0; test_i < test_count; test_i++) { \
+            test_e = test_error((double)(got)[test_i], (double)(want)[test_i], absolute, relative); \
+            if (test_e > test_max) test_max = test_e, test_worst = test_i; \
+        } \
+        if (!test_check(test_count > 0 && test_max <= 1, __FILE__, __LINE__, name) && test_count > 0) \
+            printf("    worst at %lu of %lu: got %.9g, want %.9g, %.3g times the tolerance\n", \
+                   (unsigned long)test_worst, (unsigned long)test_count, (double)(got)[test_worst], \
+                   (double)(want)[test_worst], test_max); \
     } while (0)
 
 /* |got - want| <= relative |want| in the 2-norm. */
-#define CHECK_L2(got, want, count, relative, name)                                                                     \
-    do {                                                                                                               \
-        size_t test_i, test_count = (size_t)(count);                                                                   \
-        double test_d, test_sum = 0, test_norm = 0;                                                                    \
-        for (test_i = 0; test_i < test_count; test_i++) {                                                              \
-            test_d = (double)(got)[test_i] - (double)(want)[test_i];                                                   \
-            test_sum += test_finite(test_d) ? test_d * test_d : 1e300;                                                 \
-            test_norm += (double)(want)[test_i] * (double)(want)[test_i];                                              \
-        }                                                                                                              \
-        if (!test_check(test_count > 0 && test_l2(test_sum, test_norm, relative), __FILE__, __LINE__, name))           \
-            printf("    relative error %.3g over %lu values, norm %.3g\n", sqrt(test_sum / (test_norm + 1e-300)),      \
-                   (unsigned long)test_count, sqrt(test_norm));                                                        \
+#define CHECK_L2(got, want, count, relative, name) \
+    do { \
+        size_t test_i, test_count = (size_t)(count); \
+        double test_d, test_sum = 0, test_norm = 0; \
+        for (test_i = 0; test_i < test_count; test_i++) { \
+            test_d = (double)(got)[test_i] - (double)(want)[test_i]; \
+            test_sum += test_finite(test_d) ? test_d * test_d : 1e300; \
+            test_norm += (double)(want)[test_i] * (double)(want)[test_i]; \
+        } \
+        if (!test_check(test_count > 0 && test_l2(test_sum, test_norm, relative), __FILE__, __LINE__, name)) \
+            printf("    relative error %.3g over %lu values, norm %.3g\n", \
+                   sqrt(test_sum / (test_norm + 1e-300)), (unsigned long)test_count, sqrt(test_norm)); \
     } while (0)
 
 /* How rows of the stress catalogue fared: their test's checks, those after test_failed was at before. */
-static inline void test_row(int before, const char *rows, const char *name)
-{
+static inline void test_row(int before, const char *rows, const char *name) {
     printf("row %s %s %s\n", rows, test_failed == before ? "passed" : "failed", name);
 }
 
 /* Runs their test. */
-#define TEST_ROW(rows, name, test)                                                                                     \
-    do {                                                                                                               \
-        const int test_before = test_failed;                                                                           \
-        test;                                                                                                          \
-        test_row(test_before, rows, name);                                                                             \
+#define TEST_ROW(rows, name, test) \
+    do { \
+        const int test_before = test_failed; \
+        test; \
+        test_row(test_before, rows, name); \
     } while (0)
 
-#define TEST_END()                                                                                                     \
-    do {                                                                                                               \
-        printf("%d passed, %d failed\n", test_passed, test_failed);                                                    \
-        return test_failed != 0;                                                                                       \
+#define TEST_END() \
+    do { \
+        printf("%d passed, %d failed\n", test_passed, test_failed); \
+        return test_failed != 0; \
     } while (0)
 
 /* ---- golden files ---- */
@@ -108,8 +104,7 @@ typedef struct gold_file {
 } gold_file;
 
 /* The array called name; none ends the program, which counts as failed for want of its closing line. */
-static inline gold_array *gold_find(gold_file *file, const char *name)
-{
+static inline gold_array *gold_find(gold_file *file, const char *name) {
     int i;
     for (i = 0; i < file->count; i++)
         if (!strcmp(file->array[i].name, name)) return &file->array[i];
@@ -118,28 +113,25 @@ static inline gold_array *gold_find(gold_file *file, const char *name)
     return NULL; /* for tcc */
 }
 
-static inline const double *gold(gold_file *file, const char *name, size_t *count)
-{
+static inline const double *gold(gold_file *file, const char *name, size_t *count) {
     gold_array *array = gold_find(file, name);
     if (count) *count = array->count;
     return array->data;
 }
 
-static inline void gold_close(gold_file *file)
-{
+static inline void gold_close(gold_file *file) {
     while (file->count > 0) free(file->array[--file->count].data);
 }
 
-static inline uint32_t gold_u32(FILE *stream)
-{
+static inline uint32_t gold_u32(FILE *stream) {
     unsigned char b[4] = {0, 0, 0, 0};
     if (fread(b, 1, 4, stream) != 4) return 0;
     return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
 }
 
-/* Reads name.gold of the folder $SSDGS_GOLDEN, else tests/golden. 0, and a failed check, when it cannot be read. */
-static inline int gold_open(gold_file *file, const char *name)
-{
+/* Reads name.gold of the folder $SSDGS_GOLDEN, else tests/golden. 0, and a failed check, when it cannot be
+   read. */
+static inline int gold_open(gold_file *file, const char *name) {
     const char *folder = getenv("SSDGS_GOLDEN");
     char magic[8];
     uint32_t i, k, count;
@@ -161,7 +153,8 @@ static inline int gold_open(gold_file *file, const char *name)
         array->data = (double *)malloc(array->count * sizeof(double) + 1);
         file->count++;
         ok = ok && array->data && fread(array->data, sizeof(double), array->count, stream) == array->count;
-        for (at = 0; ok && at < array->count; at++) { /* lowest byte first in the file, whatever the machine */
+        for (at = 0; ok && at < array->count;
+             at++) { /* lowest byte first in the file, whatever the machine */
             const unsigned char *bytes = (const unsigned char *)(array->data + at);
             uint64_t word = 0;
             for (k = 8; k-- > 0;) word = word << 8 | bytes[k];

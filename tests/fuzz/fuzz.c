@@ -1,7 +1,7 @@
-/* Everything that reads what others wrote, and every number a caller may set, under any bytes at all. Two ways to build it:
-     build/fuzz FILE...              runs each file once, as the target that its folder is named after: seeds and past findings
-     -DLIBFUZZER -fsanitize=fuzzer   libFuzzer, as the target that the program is named after (`make fuzz`)
-   A finding ends the program. */
+/* Everything that reads what others wrote, and every number a caller may set, under any bytes at all. Two
+   ways to build it: build/fuzz FILE...              runs each file once, as the target that its folder is
+   named after: seeds and past findings -DLIBFUZZER -fsanitize=fuzzer   libFuzzer, as the target that the
+   program is named after (`make fuzz`) A finding ends the program. */
 #define SSDGS_IMPLEMENTATION
 #include "../../ssdgs.h"
 #include "../../examples/olat.h"
@@ -32,7 +32,8 @@ static unsigned char *copy_of(const unsigned char *bytes, size_t size) {
     return copy;
 }
 
-/* ---- bytes to values: 0, and what lies beyond the end, leave the default, so that few bytes make a scene ---- */
+/* ---- bytes to values: 0, and what lies beyond the end, leave the default, so that few bytes make a scene
+   ---- */
 
 typedef struct input {
     const unsigned char *at, *end;
@@ -48,14 +49,16 @@ static input defaults_only(void) {
 static int draw(input *in) { return in->at < in->end ? *in->at++ : 0; }
 static int draw_below(input *in, int count) { return draw(in) % count; }
 
-/* Mostly within range of 0; some bytes stand for a number that has hurt others, one is followed by any 32 bits. */
+/* Mostly within range of 0; some bytes stand for a number that has hurt others, one is followed by any 32
+   bits. */
 static ssdgs_real draw_real(input *in, double otherwise, double range) {
     static const double edges[63] = {
-        0, -0.0, 1, -1, 0.5, 2, 1e-45, -1e-45, 1.2e-38, 1e-30, 1e-20, -1e-20, 1e-15, 1e-10, 1e-7, -1e-7, 1e-4, 1e-3, 0.01, -0.01,
-        4, 10, -10, 20, -20, 21, 50, -50, 88, -88, 89, -89, 100, -100, 104, 127, 128, 1e3, -1e3, 1e4, -1e4, 1e5, 1e6, -1e6,
-        16777216, 1e8, -1e8, 2147483648.0, 4294967296.0, 1e10, -1e10, 1e13, 1e15, -1e15, 1e18, 1e19, -1e19, 1e20, 1e25, 1e30,
-        -1e30, 3.4e38, -3.4e38
-    };
+        0,        -0.0,  1,     -1,           0.5,          2,     1e-45,  -1e-45, 1.2e-38, 1e-30, 1e-20,
+        -1e-20,   1e-15, 1e-10, 1e-7,         -1e-7,        1e-4,  1e-3,   0.01,   -0.01,   4,     10,
+        -10,      20,    -20,   21,           50,           -50,   88,     -88,    89,      -89,   100,
+        -100,     104,   127,   128,          1e3,          -1e3,  1e4,    -1e4,   1e5,     1e6,   -1e6,
+        16777216, 1e8,   -1e8,  2147483648.0, 4294967296.0, 1e10,  -1e10,  1e13,   1e15,    -1e15, 1e18,
+        1e19,     -1e19, 1e20,  1e25,         1e30,         -1e30, 3.4e38, -3.4e38};
     const int byte = draw(in);
     uint32_t bits = 0;
     float value;
@@ -158,7 +161,8 @@ static ssdgs_light draw_light(input *in) {
         light.intensity[i] = draw_real(in, 9, 10);
         length += (double)light.position[i] * (double)light.position[i];
     }
-    for (i = 0; kind == 1 && length > 0 && i < 3; i++) light.position[i] = (ssdgs_real)((double)light.position[i] / sqrt(length));
+    for (i = 0; kind == 1 && length > 0 && i < 3; i++)
+        light.position[i] = (ssdgs_real)((double)light.position[i] / sqrt(length));
     return light;
 }
 
@@ -179,11 +183,13 @@ static uint64_t model_hash(const ssdgs_model *model) {
     uint64_t hash = ssdgs__fold(1, model->globals, model->global_count * sizeof(ssdgs_real));
     int c;
     for (c = 0; c < SSDGS_CHANNELS; c++)
-        hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count * sizeof(ssdgs_real));
+        hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity,
+                           (size_t)model->count * sizeof(ssdgs_real));
     return hash;
 }
 
-/* ---- rendering: no NaN from tame numbers, coverage within 0 and 1, the same bits from a context that kept results ---- */
+/* ---- rendering: no NaN from tame numbers, coverage within 0 and 1, the same bits from a context that kept
+   results ---- */
 
 #define PLANES 8
 static const int plane_channels[PLANES] = {3, 1, 1, 3, 3, 3, 3, 1}; /* of ssdgs_image, in order */
@@ -226,7 +232,8 @@ static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
     ssdgs_image image;
     int i;
     for (i = 0; i < PLANES; i++)
-        p->planes[i] = p->wanted >> i & 1 ? (ssdgs_real *)calloc(plane_values(p, i), sizeof(ssdgs_real)) : NULL;
+        p->planes[i] =
+            p->wanted >> i & 1 ? (ssdgs_real *)calloc(plane_values(p, i), sizeof(ssdgs_real)) : NULL;
     image.stride = p->stride;
     image.color = p->planes[0];
     image.alpha = p->planes[1];
@@ -273,12 +280,14 @@ static void fuzz_render(const unsigned char *data, size_t size) {
             memset(&desc, 0, sizeof desc);
             desc.threads = 1;
             desc.isa = (ssdgs_isa)context->isa;
-            HOLDS(!ssdgs_context_create(&desc, &other) && !ssdgs_model_create(other, &model->settings, model->count, &twin));
+            HOLDS(!ssdgs_context_create(&desc, &other) &&
+                  !ssdgs_model_create(other, &model->settings, model->count, &twin));
             memcpy(twin->globals, model->globals, model->global_count * sizeof(ssdgs_real));
             memcpy(twin->gaussians, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof(ssdgs_real));
             HOLDS(!take_picture(twin, &again));
             for (i = 0; i < PLANES; i++)
-                if (p.planes[i]) HOLDS(!memcmp(p.planes[i], again.planes[i], plane_values(&p, i) * sizeof(ssdgs_real)));
+                if (p.planes[i])
+                    HOLDS(!memcmp(p.planes[i], again.planes[i], plane_values(&p, i) * sizeof(ssdgs_real)));
             drop_picture(&again);
             i = frames;
         }
@@ -323,8 +332,10 @@ static ssdgs_train_options draw_options(input *in) {
         o.bounds_min[i] = draw_real(in, -0.5, 1);
         o.bounds_max[i] = draw_real(in, 0.5, 1);
     }
-    rates[0] = &o.position, rates[1] = &o.opacity, rates[2] = &o.scale, rates[3] = &o.rotation, rates[4] = &o.color;
-    rates[5] = &o.asg, rates[6] = &o.frame, rates[7] = &o.material, rates[8] = &o.shadow, rates[9] = &o.scattering;
+    rates[0] = &o.position, rates[1] = &o.opacity, rates[2] = &o.scale, rates[3] = &o.rotation,
+    rates[4] = &o.color;
+    rates[5] = &o.asg, rates[6] = &o.frame, rates[7] = &o.material, rates[8] = &o.shadow,
+    rates[9] = &o.scattering;
     rates[10] = &o.camera_rate, rates[11] = &o.light_rate;
     for (i = 0; i < rate_count; i++) {
         rates[i]->start = draw_real(in, (double)rates[i]->start, 1);
@@ -343,7 +354,8 @@ static void draw_photo(input *in, ssdgs_photo *photo, uint16_t pixels[SIDE * SID
     photo->format = draw(in) & 1 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
     photo->pixels = pixels;
     for (i = 0; i < 4; i++) pattern[i] = (unsigned)draw(in);
-    size = (size_t)(photo->camera.width * photo->camera.height) * (photo->format == SSDGS_PIXELS_RGBA16 ? 8 : 4);
+    size =
+        (size_t)(photo->camera.width * photo->camera.height) * (photo->format == SSDGS_PIXELS_RGBA16 ? 8 : 4);
     for (i = 0; i < size; i++) bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
 }
 
@@ -378,7 +390,8 @@ static void fuzz_train(const unsigned char *data, size_t size) {
     ssdgs_context_destroy(context);
 }
 
-/* ---- checkpoints: one made here, then bytes of it changed (place, value: 3 + 1 bytes each), perhaps cut or lengthened ---- */
+/* ---- checkpoints: one made here, then bytes of it changed (place, value: 3 + 1 bytes each), perhaps cut or
+   lengthened ---- */
 
 static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     static uint16_t pixels[SIDE * SIDE * 4];
@@ -401,7 +414,8 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     options.initial_points = 3;
     options.densify_until = 0;
     draw_photo(&defaults, &photo, pixels);
-    HOLDS(!ssdgs_model_create(context, &settings, 0, &model) && !ssdgs_trainer_create(model, &photo, 1, &options, &trainer));
+    HOLDS(!ssdgs_model_create(context, &settings, 0, &model) &&
+          !ssdgs_trainer_create(model, &photo, 1, &options, &trainer));
     if (!saved) {
         unsigned char *read = NULL;
         HOLDS(!ssdgs_trainer_step(trainer, NULL));
@@ -413,7 +427,8 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     bytes = (unsigned char *)calloc(saved_size + 128, 1);
     HOLDS(bytes);
     memcpy(bytes, saved, saved_size);
-    length = cut < 128 ? saved_size - (flags & 2 ? (size_t)cut * saved_size / 128 : (size_t)cut) : saved_size + (size_t)cut - 128;
+    length = cut < 128 ? saved_size - (flags & 2 ? (size_t)cut * saved_size / 128 : (size_t)cut)
+                       : saved_size + (size_t)cut - 128;
     while (in.end - in.at >= 4) {
         size_t at = (size_t)draw(&in) << 16;
         at |= (size_t)draw(&in) << 8;
@@ -429,8 +444,9 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     free(bytes);
     before = model_hash(model);
     sound = !ssdgs_trainer_load(trainer, path);
-    HOLDS(sound ? same || !(flags & 1) : !same && model_hash(model) == before); /* refused: as if nothing had been */
-    for (i = 0; sound && i < 2; i++) ssdgs_trainer_step(trainer, NULL);         /* whatever it then computes */
+    HOLDS(sound ? same || !(flags & 1)
+                : !same && model_hash(model) == before);                /* refused: as if nothing had been */
+    for (i = 0; sound && i < 2; i++) ssdgs_trainer_step(trainer, NULL); /* whatever it then computes */
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
@@ -472,16 +488,19 @@ static void read_png(const unsigned char *bytes, size_t size) {
 static void fuzz_png(const unsigned char *data, size_t size) {
     unsigned char *copy = copy_of(data, size);
     size_t at = 8, length;
-    if (size > 24 && olat__be32(data + 16) > 2048) copy[16] = copy[17] = 0, copy[18] &= 7; /* a large image is slow to clear */
+    if (size > 24 && olat__be32(data + 16) > 2048)
+        copy[16] = copy[17] = 0, copy[18] &= 7; /* a large image is slow to clear */
     if (size > 24 && olat__be32(data + 20) > 2048) copy[20] = copy[21] = 0, copy[22] &= 7;
     read_png(copy, size);
-    for (; size >= 12 && at <= size - 12 && (length = olat__be32(copy + at)) <= size - at - 12; at += 12 + length)
+    for (; size >= 12 && at <= size - 12 && (length = olat__be32(copy + at)) <= size - at - 12;
+         at += 12 + length)
         olat__put_be32(copy + at + 8 + length, olat__crc32(copy + at + 4, length + 4));
     read_png(copy, size);
     free(copy);
 }
 
-/* The pixels behind the checksum of the compressed data: 13 bytes of header, a byte of palette size, palette, rows. */
+/* The pixels behind the checksum of the compressed data: 13 bytes of header, a byte of palette size, palette,
+   rows. */
 static void fuzz_unfilter(const unsigned char *data, size_t size) {
     olat__png png;
     unsigned char header[13] = {0}, palette[768] = {0};
@@ -498,7 +517,8 @@ static void fuzz_unfilter(const unsigned char *data, size_t size) {
     used = size - 14 < 3 * (size_t)colors ? size - 14 : 3 * (size_t)colors;
     memcpy(palette, data + 14, used);
     if (png.color == 3 && olat__png_palette(&png, palette, 3 * (size_t)colors)) return;
-    if (!(png.color & 4)) olat__png_transparency(&png, palette, png.color == 3 ? 1 : 2 * (size_t)png.channels);
+    if (!(png.color & 4))
+        olat__png_transparency(&png, palette, png.color == 3 ? 1 : 2 * (size_t)png.channels);
     for (pass = png.first_pass; pass < png.end_pass; pass++) {
         const size_t row = olat__png_pass(&png, pass, &width, &height);
         raw += (size_t)height * (row + 1);
@@ -568,7 +588,8 @@ static void fuzz_json(const unsigned char *data, size_t size) {
         int children = 0;
         HOLDS(node->type != OLAT__NUMBER || isfinite(node->number));
         HOLDS(node->type != OLAT__STRING || (node->text >= j.text && node->text + node->text_length < j.end));
-        for (child = node->child; child; child = j.nodes[child].next, children++, seen++) HOLDS(j.nodes[child].parent == i);
+        for (child = node->child; child; child = j.nodes[child].next, children++, seen++)
+            HOLDS(j.nodes[child].parent == i);
         HOLDS(children == node->size);
     }
     HOLDS(j.failed || seen == j.count);
@@ -643,7 +664,7 @@ static void parse_string(const char *text, size_t size, const unsigned char *wan
         const olat__node *value = j.nodes;
         long i, n;
         HOLDS(value->type == OLAT__STRING && value->text_length == (size_t)length &&
-            !memcmp(value->text, want, (size_t)length));
+              !memcmp(value->text, want, (size_t)length));
         for (i = 0; i < length; i += n) HOLDS((n = olat__utf8_length(value->text + i)) > 0);
         if (strlen(value->text) == (size_t)length) {
             w.size = 0;
@@ -668,16 +689,21 @@ static void fuzz_json_string(const unsigned char *data, size_t size) {
     text[0] = '"';
     if (size) memcpy(text + 1, data, size);
     text[1 + size] = '"';
-    parse_string(text, size + 2, want, string_value((unsigned char *)text, (unsigned char *)text + size + 2, want));
+    parse_string(text, size + 2, want,
+                 string_value((unsigned char *)text, (unsigned char *)text + size + 2, want));
     for (at = 0; at + 3 <= size; at += 3) {
         const unsigned bits = (unsigned)data[at] << 16 | (unsigned)data[at + 1] << 8 | data[at + 2],
-            code = bits & 0x1FFFFF;
-        if (!(bits >> 22) && code < 0x80 && code > 31 && code != '"' && code != '\\') text[used++] = (char)code;
+                       code = bits & 0x1FFFFF;
+        if (!(bits >> 22) && code < 0x80 && code > 31 && code != '"' && code != '\\')
+            text[used++] = (char)code;
         else if (!(bits >> 22) && code >= 0x80 && code < 0x800) { /* raw, whatever it is */
             text[used++] = (char)(unsigned char)(192 + code / 64);
             text[used++] = (char)(unsigned char)(128 + code % 64);
-        } else if (code < 0x10000) used += (size_t)sprintf(text + used, bits >> 23 ? "\\u%04X" : "\\u%04x", code);
-        else used += (size_t)sprintf(text + used, "\\u%04x\\u%04X", 0xD7C0 + code / 1024 % 0x440, 0xDC00 + code % 1024);
+        } else if (code < 0x10000)
+            used += (size_t)sprintf(text + used, bits >> 23 ? "\\u%04X" : "\\u%04x", code);
+        else
+            used += (size_t)sprintf(text + used, "\\u%04x\\u%04X", 0xD7C0 + code / 1024 % 0x440,
+                                    0xDC00 + code % 1024);
     }
     text[used++] = '"';
     parse_string(text, used, want, string_value((unsigned char *)text, (unsigned char *)text + used, want));
@@ -704,7 +730,8 @@ static void fuzz_dataset(const unsigned char *data, size_t size) {
         }
         HOLDS((photos = olat_photos(&set)) != NULL);
         for (i = 0; i < set.count; i++) {
-            HOLDS(!ssdgs__camera_check(context, &photos[i].camera) && !ssdgs__lights_check(context, &photos[i].light, 1));
+            HOLDS(!ssdgs__camera_check(context, &photos[i].camera) &&
+                  !ssdgs__lights_check(context, &photos[i].light, 1));
             HOLDS(!images || photos[i].pixels);
         }
         free(photos);
@@ -713,7 +740,8 @@ static void fuzz_dataset(const unsigned char *data, size_t size) {
     ssdgs_context_destroy(context);
 }
 
-/* ---- calls in any order and from anywhere: hooks, tasks, the allocator, the log, the progress callback ---- */
+/* ---- calls in any order and from anywhere: hooks, tasks, the allocator, the log, the progress callback
+   ---- */
 
 static struct {
     input *in;
@@ -726,7 +754,8 @@ static struct {
 
 static int play_progress(void *user, const ssdgs_train_stats *stats);
 
-/* One call, as a byte says. From within another it must be refused; from the progress callback it may be anything. */
+/* One call, as a byte says. From within another it must be refused; from the progress callback it may be
+   anything. */
 static void play_call(void) {
     static ssdgs_real color[64 * 3];
     const int what = draw_below(play.in, 14), within = play.depth > play.runs;
@@ -744,16 +773,38 @@ static void play_call(void) {
     options.densify_from = options.densify_every = 1;
     options.initial_points = 20;
     switch (what) {
-    case 0: case 1: if (play.model) result = ssdgs_render(play.model, &photo.camera, &photo.light, draw_below(play.in, 2), &image); break;
-    case 2: if (play.model) result = ssdgs_model_sort(play.model); break;
-    case 3: if (play.model) result = ssdgs_evaluate(play.model, &photo, background, NULL, &metrics); break;
-    case 4: if (play.model) result = ssdgs_refine_photo(play.model, &photo, background, 1); break;
-    case 5: if (play.context) result = ssdgs_compare(play.context, color, color, 8, 8, &metrics); break;
-    case 6: if (play.context) result = ssdgs_model_create(play.context, NULL, draw_below(play.in, 30), &model); break;
-    case 7: if (play.context) result = ssdgs_model_load_memory(play.context, "ply\nformat", 10, &model, NULL); break;
-    case 8: if (play.model) result = ssdgs_trainer_create(play.model, &photo, 1, &options, &trainer); break;
-    case 9: if (play.trainer) result = ssdgs_trainer_step(play.trainer, NULL); break;
-    case 10: if (play.trainer && play.runs < 3) result = ssdgs_trainer_run(play.trainer, play_progress, NULL); break;
+    case 0:
+    case 1:
+        if (play.model)
+            result = ssdgs_render(play.model, &photo.camera, &photo.light, draw_below(play.in, 2), &image);
+        break;
+    case 2:
+        if (play.model) result = ssdgs_model_sort(play.model);
+        break;
+    case 3:
+        if (play.model) result = ssdgs_evaluate(play.model, &photo, background, NULL, &metrics);
+        break;
+    case 4:
+        if (play.model) result = ssdgs_refine_photo(play.model, &photo, background, 1);
+        break;
+    case 5:
+        if (play.context) result = ssdgs_compare(play.context, color, color, 8, 8, &metrics);
+        break;
+    case 6:
+        if (play.context) result = ssdgs_model_create(play.context, NULL, draw_below(play.in, 30), &model);
+        break;
+    case 7:
+        if (play.context) result = ssdgs_model_load_memory(play.context, "ply\nformat", 10, &model, NULL);
+        break;
+    case 8:
+        if (play.model) result = ssdgs_trainer_create(play.model, &photo, 1, &options, &trainer);
+        break;
+    case 9:
+        if (play.trainer) result = ssdgs_trainer_step(play.trainer, NULL);
+        break;
+    case 10:
+        if (play.trainer && play.runs < 3) result = ssdgs_trainer_run(play.trainer, play_progress, NULL);
+        break;
     case 11:
         if (play.runs && !within) break; /* the run's own, which is refused and stays */
         ssdgs_trainer_destroy(play.trainer);
@@ -796,10 +847,21 @@ static int play_progress(void *user, const ssdgs_train_stats *stats) {
     return play.trainer && !(draw(play.in) & 2);
 }
 
-#define PLAY_STAGE(name) static ssdgs_result play_##name(void *user, ssdgs_frame *frame) { \
-    (void)user; play_within(); return ssdgs_stage_cpu(frame, SSDGS_STAGE_##name); }
-PLAY_STAGE(PROJECT) PLAY_STAGE(SORT) PLAY_STAGE(BIN) PLAY_STAGE(WALK) PLAY_STAGE(SHADE) PLAY_STAGE(COMPOSITE)
-PLAY_STAGE(COMPOSITE_BACKWARD) PLAY_STAGE(SHADE_BACKWARD) PLAY_STAGE(PROJECT_BACKWARD)
+#define PLAY_STAGE(name) \
+    static ssdgs_result play_##name(void *user, ssdgs_frame *frame) { \
+        (void)user; \
+        play_within(); \
+        return ssdgs_stage_cpu(frame, SSDGS_STAGE_##name); \
+    }
+PLAY_STAGE(PROJECT)
+PLAY_STAGE(SORT)
+PLAY_STAGE(BIN)
+PLAY_STAGE(WALK)
+PLAY_STAGE(SHADE)
+PLAY_STAGE(COMPOSITE)
+PLAY_STAGE(COMPOSITE_BACKWARD)
+PLAY_STAGE(SHADE_BACKWARD)
+PLAY_STAGE(PROJECT_BACKWARD)
 
 static void play_run(void *user, int count, void (*task)(void *data, int index), void *data) {
     int i;
@@ -829,9 +891,15 @@ static void play_hear(void *user, ssdgs_result code, const char *message) {
 }
 
 static void fuzz_hooks(const unsigned char *data, size_t size) {
-    static ssdgs_result (*const stages[SSDGS_STAGE_COUNT])(void *, ssdgs_frame *) = {
-        play_PROJECT, play_SORT, play_BIN, play_WALK, play_SHADE, play_COMPOSITE, play_COMPOSITE_BACKWARD, play_SHADE_BACKWARD,
-        play_PROJECT_BACKWARD};
+    static ssdgs_result (*const stages[SSDGS_STAGE_COUNT])(void *, ssdgs_frame *) = {play_PROJECT,
+                                                                                     play_SORT,
+                                                                                     play_BIN,
+                                                                                     play_WALK,
+                                                                                     play_SHADE,
+                                                                                     play_COMPOSITE,
+                                                                                     play_COMPOSITE_BACKWARD,
+                                                                                     play_SHADE_BACKWARD,
+                                                                                     play_PROJECT_BACKWARD};
     static unsigned char pixels[64 * 4];
     input in = {data, data + size, 1}, defaults = defaults_only();
     ssdgs_context_desc desc;
@@ -866,9 +934,17 @@ typedef struct target {
     const char *name;
     void (*run)(const unsigned char *data, size_t size);
 } target;
-static const target targets[] = {{"png", fuzz_png}, {"unfilter", fuzz_unfilter}, {"inflate", fuzz_inflate}, {"json", fuzz_json},
-                                 {"json_string", fuzz_json_string}, {"dataset", fuzz_dataset}, {"ply", fuzz_ply},
-                                 {"checkpoint", fuzz_checkpoint}, {"render", fuzz_render}, {"train", fuzz_train}, {"hooks", fuzz_hooks}};
+static const target targets[] = {{"png", fuzz_png},
+                                 {"unfilter", fuzz_unfilter},
+                                 {"inflate", fuzz_inflate},
+                                 {"json", fuzz_json},
+                                 {"json_string", fuzz_json_string},
+                                 {"dataset", fuzz_dataset},
+                                 {"ply", fuzz_ply},
+                                 {"checkpoint", fuzz_checkpoint},
+                                 {"render", fuzz_render},
+                                 {"train", fuzz_train},
+                                 {"hooks", fuzz_hooks}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
@@ -877,7 +953,8 @@ static const target *find_target(const char *path) {
     while (*path) {
         length = strcspn(path, "/\\");
         for (i = 0; i < sizeof targets / sizeof *targets; i++)
-            if (strlen(targets[i].name) == length && !memcmp(path, targets[i].name, length)) found = targets + i;
+            if (strlen(targets[i].name) == length && !memcmp(path, targets[i].name, length))
+                found = targets + i;
         path += length + (path[length] != 0);
     }
     return found;
