@@ -91,6 +91,11 @@ test-c99: ## tests with -std=c99
 test-matrix: ## tests with every compiler and machine at hand (hours); others are named
 	sh tests/matrix.sh $(BUILD)
 
+hashes: tests/hashes.c $(HEADERS) | $(BUILD) ## bits of training and renders: the same before and after code is moved
+	$(COMPILE) $< -o $(BUILD)/hashes $(LDLIBS)
+	$(COMPILE) -DSSDGS_REAL64 $< -o $(BUILD)/hashes_64 $(LDLIBS)
+	@$(BUILD)/hashes; $(BUILD)/hashes_64
+
 size: ## what including ssdgs.h costs: seconds of compiling and bytes of code
 	bash tests/size.sh $(BUILD)
 
@@ -150,5 +155,5 @@ $(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
 	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
 	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo bench size experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo bench size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help
