@@ -11,7 +11,7 @@ SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) $(if $(findstring ++,$(CC)),,-Wstrict-prototypes -Wmissing-prototypes)
-COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT))
+COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT)) -DSSDGS_SCALAR # tests try the scalar kernels too
 
 HEADERS = ssdgs.h examples/olat.h tests/test.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench

@@ -156,6 +156,7 @@ OPTIONS, macros defined before the header; those with * the same way in every fi
                                       backward stages: half of the code and of the time to compile
   SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
   SSDGS_NO_SIMD          not set      the scalar kernels alone
+  SSDGS_SCALAR           not set      the scalar kernels too, where every CPU has SSE2 or NEON
   SSDGS_NO_AVX2          not set      no AVX2 and no AVX-512 kernels
   SSDGS_NO_AVX512        not set      no AVX-512 kernels
   SSDGS_REAL64 *         not set      ssdgs_real is double, see DOUBLE
@@ -427,12 +428,7 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
 
 /* ---- the model ---- */
 
-typedef enum ssdgs_dipole {
-    SSDGS_DIPOLE_JENSEN = 0,
-    SSDGS_DIPOLE_PRINTED,
-    SSDGS_DIPOLE_RELEASED,
-    SSDGS_DIPOLE_BURLEY
-} ssdgs_dipole;
+typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED } ssdgs_dipole;
 /* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form; so is S. Deferred: one
    term per pixel and light, from what the pixel's Gaussians blend to, so that their normals agree, highlights
    carry over to other views and shadows have edges: S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5)
@@ -445,7 +441,7 @@ typedef enum ssdgs_dipole {
    it falls below 0.9, 0.5 and 0.1 (a veil that leaves more casts no shadow), v_g the Gaussians', over alpha
    as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes out beside where it went
    in */
-typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_ANGULAR, SSDGS_ASG_DEFERRED } ssdgs_asg;
+typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_DEFERRED = 2 } ssdgs_asg;
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 /* variance added to a splat's, or a floor of it with opacity compensation */
 typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
@@ -622,10 +618,8 @@ typedef struct ssdgs_image {
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
-    int version; /* stamped by ssdgs_render_options_default */
-    int terms;   /* of the model's terms, those to render */
-    int bf16; /* 1: networks in bfloat16 where the CPU can; about 1e-3 of the colour. Leaves no dead neurons
-                 out: slower than 0 on Intel's CPUs, see `make bench` on others */
+    int version;                /* stamped by ssdgs_render_options_default */
+    int terms;                  /* of the model's terms, those to render */
     int antialias;              /* 1: opacity compensated for pixel_variance (Mip-Splatting) */
     ssdgs_real background[3];   /* linear; transfer none: stored values */
     ssdgs_real stop;            /* a pixel is done when its transmittance falls below; 0 = never */
@@ -1039,6 +1033,19 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__TRAINING
 #endif
 
+/* Code that takes no time of a frame or a training step is compiled to be small: SSDGS__SMALL_BEGIN ..
+   _END. */
+#if defined(__clang__)
+#define SSDGS__SMALL_BEGIN _Pragma("clang attribute push(__attribute__((minsize)), apply_to = function)")
+#define SSDGS__SMALL_END _Pragma("clang attribute pop")
+#elif defined(__GNUC__) && __GNUC__ >= 8 && !defined(__TINYC__) && defined(__OPTIMIZE__)
+#define SSDGS__SMALL_BEGIN _Pragma("GCC push_options") _Pragma("GCC optimize(\"Os\")")
+#define SSDGS__SMALL_END _Pragma("GCC pop_options")
+#else
+#define SSDGS__SMALL_BEGIN
+#define SSDGS__SMALL_END
+#endif
+
 #define SSDGS__ISA_SCALAR 1
 #define SSDGS__ISA_SSE2 2
 #define SSDGS__ISA_AVX2 3
@@ -1064,14 +1071,13 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #ifndef SSDGS__X86
 #define SSDGS__X86 0
 #endif
-#if SSDGS__X86 >= 3 && ((defined(__clang__) && __clang_major__ >= 9) || \
-                        (!defined(__clang__) && defined(__GNUC__) && __GNUC__ >= 10))
-#define SSDGS__BF16 1
-#else
-#define SSDGS__BF16 0
-#endif
 #ifndef SSDGS__NEON
 #define SSDGS__NEON 0
+#endif
+#if defined(SSDGS_SCALAR) || !(SSDGS__NEON || (SSDGS__X86 && (defined(__x86_64__) || defined(_M_X64))))
+#define SSDGS__SCALAR 1
+#else
+#define SSDGS__SCALAR 0 /* every CPU that this is compiled for has SSE2 or NEON */
 #endif
 
 #if SSDGS__X86
@@ -1204,7 +1210,7 @@ typedef struct ssdgs__product {
 
 typedef struct ssdgs__lighting {
     ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
-    int directional, angular, dipole, diffuse, specular, shadow, scattering;
+    int directional, printed_dipole, diffuse, specular, shadow, scattering;
     int residual_shadow, refined_shadow, per_channel_optics, shadow_on_scattering, deferred;
     ssdgs_real view[12], inverse_fx, inverse_fy, cx,
         cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
@@ -1230,15 +1236,12 @@ typedef struct ssdgs__kernels {
     void (*dense)(const ssdgs__product *);
     int (*live_rows)(const ssdgs_real *, int, uint16_t *);
     void (*transpose)(const ssdgs_real *, int, size_t, size_t, ssdgs_real *);
-    void (*dense_bf16)(const ssdgs__product *, const uint32_t *, uint32_t *); /* NULL where there is none */
     void (*row_sums)(ssdgs_real *, size_t, const ssdgs_real *, const uint16_t *, int);
     void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
     void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
     void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
                              ssdgs_real *);
-    void (*dipole_profile)(int, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real,
-                           ssdgs_real *, ssdgs_real *, size_t);
     void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
                    const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
     void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *,
@@ -1439,7 +1442,7 @@ struct ssdgs_context {
     const ssdgs__kernels *k;
     struct ssdgs__pool *pool;
     struct ssdgs__frame_memory *frame; /* reused by every render on this context */
-    int isa, threads, bf16;
+    int isa, threads;
     int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
                           frees it */
     volatile int busy; /* 1 while a call is at work */
@@ -1904,27 +1907,14 @@ static int ssdgs__x86_level(void) {
 }
 #endif
 
-/* Whether the AVX-512 table may use its bf16 products. */
-static int ssdgs__has_bf16(int isa) {
-#if SSDGS__BF16
-    unsigned a[4];
-    if (isa != SSDGS_ISA_AVX512) return 0;
-    ssdgs__cpuid(7, 0, a);
-    if (a[0] < 1) return 0; /* no second part of this leaf */
-    ssdgs__cpuid(7, 1, a);
-    return (int)(a[0] >> 5 & 1);
-#else
-    (void)isa;
-    return 0;
-#endif
-}
-
 static const ssdgs__kernels *ssdgs__table(int isa) {
 #if SSDGS__X86
     const int level = ssdgs__x86_level();
 #endif
     switch (isa) {
+#if SSDGS__SCALAR
     case SSDGS_ISA_SCALAR: return &ssdgs__kernels_scalar;
+#endif
 #if SSDGS__X86 >= 1
     case SSDGS_ISA_SSE2: return level >= 1 ? &ssdgs__kernels_sse2 : NULL;
 #endif
@@ -1981,7 +1971,6 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     for (isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) context->isa = isa;
     context->k = ssdgs__table(context->isa);
-    context->bf16 = ssdgs__has_bf16(context->isa);
     context->references = 1;
     context->parallel = zero.parallel;
     context->threads = 1;
@@ -2177,7 +2166,14 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
     SSDGS__RANGE(baked, 0, 1);
     SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
-    SSDGS__RANGE(dipole, 0, SSDGS_DIPOLE_BURLEY);
+    if (s->dipole == 2 || s->dipole == 3)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "settings: dipole = %d, %s, was never better and is gone; train with 0 or 1",
+                           s->dipole, s->dipole == 2 ? "the released form" : "Burley's profile");
+    SSDGS__RANGE(dipole, 0, SSDGS_DIPOLE_PRINTED);
+    if (s->asg == 1)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "settings: asg = 1, the released angular form, is gone; train with 0 or 2");
     SSDGS__RANGE(asg, 0, SSDGS_ASG_DEFERRED);
     SSDGS__RANGE(per_channel_optics, 0, 1);
     SSDGS__RANGE(depth_cue, 0, 1);
@@ -2235,9 +2231,7 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
         q[0] = (ssdgs_real)cos(pi * j / (2 * SSDGS_ASG_COUNT));
         q[1] = q[2] = 0;
         q[3] = (ssdgs_real)sin(pi * j / (2 * SSDGS_ASG_COUNT)); /* a turn about the normal */
-        sharpness[0] = model->settings.asg == SSDGS_ASG_ANGULAR
-                           ? 0
-                           : (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
+        sharpness[0] = (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
         sharpness[1] = model->settings.asg == SSDGS_ASG_DEFERRED ? 0 : sharpness[0];
     }
     for (net = 0; net < 2; net++) {
@@ -2525,8 +2519,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels,
         transmittance;
-    ssdgs__buffer flux, nodes, sources, lightings, packed, activations, scratch, slots, lane_slots,
-        view_slots;
+    ssdgs__buffer flux, nodes, sources, lightings, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known, transport,
@@ -2934,7 +2927,7 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
                 known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
     }
     kept->lights_ready = known;
-    kept->shadows_ready = kept->shadows_ready && known && now->bf16 == old->bf16;
+    kept->shadows_ready = kept->shadows_ready && known;
     kept->transport_ready = kept->transport_ready && known;
     kept->camera = *a;
     kept->options = *now;
@@ -3798,7 +3791,7 @@ typedef struct ssdgs__block_layout {
         widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                                    /* within the block */
-    size_t inputs, pairs, outs, lobe; /* scratch of both directions */
+    size_t inputs, outs, lobe; /* scratch of both directions */
     size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility,
         scratch; /* and of the backward */
 } ssdgs__block_layout;
@@ -3833,8 +3826,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.lights = b * SSDGS_CHANNELS;
     l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count
                                                                 : 1); /* only the backward asks again */
-    l.pairs = b * (size_t)(l.widest + 1);
-    l.outs = l.pairs + b * (size_t)((l.widest + 1) / 2);
+    l.outs = b * (size_t)(l.widest + 1);
     l.lobe = l.outs + b * SSDGS__OUTS;
     l.dgauss = l.lobe + b * SSDGS__LOBE;
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
@@ -3849,8 +3841,8 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     return l;
 }
 
-/* Raw parameters of the angular form and deferred weights, within what neither over- nor underflows. */
-static ssdgs_real ssdgs__angular_raw(ssdgs_real raw) {
+/* Raw weights of deferred lobes, within what neither over- nor underflows. */
+static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
     return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
 }
 
@@ -3868,8 +3860,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
     k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
     k.directional = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL;
-    k.angular = s->asg == SSDGS_ASG_ANGULAR;
-    k.dipole = s->dipole;
+    k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
     k.diffuse = (frame->terms & SSDGS_DIFFUSE_TERM) != 0;
     k.specular = (frame->terms & SSDGS_SPECULAR_TERM) != 0;
     k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
@@ -3889,17 +3880,11 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
         ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
         ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
         for (i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
-        if (k.angular) {
-            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
-            for (i = 0; i < 2; i++)
-                b[9 + i] = (ssdgs_real)0.1 / ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
-            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j])) *
-                    ssdgs__softplus_scalar(step);
-        } else if (k.deferred) {
+        if (k.deferred) {
             b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
             b[9] = ssdgs__exp_scalar(sharpness[0]);
-            b[10] = ssdgs__softplus_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
-            b[11] = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
+            b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
         } else {
             for (i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
         }
@@ -3928,42 +3913,8 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
         ssdgs_real *out = frame->global_gradient + first[SSDGS__ASG_SHARPNESS] + 2 * j;
         for (i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
         ssdgs__rotation_backward_scalar(frame->global_gradient + 4 * j, q, inverse, dr);
-        for (i = 0; i < 2; i++) {
-            const ssdgs_real s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(sharpness[i]));
-            /* angular: 1 / (10 s), d = -(1 - s) / (10 s) */
-            out[i] = frame->settings.asg == SSDGS_ASG_ANGULAR ? -d[9 + i] * (1 - s) * (ssdgs_real)0.1 / s
-                                                              : d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
-        }
-        if (frame->settings.asg == SSDGS_ASG_ANGULAR) {
-            const ssdgs_real step = (ssdgs_real)(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1)),
-                             s = ssdgs__sigmoid_scalar(ssdgs__angular_raw(frame->gaussians.asg_sigma[j]));
-            frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] =
-                d[11] * s * (1 - s) * ssdgs__softplus_scalar(step);
-        }
+        for (i = 0; i < 2; i++) out[i] = d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
     }
-}
-
-/* A network's weights in bf16 pairs along the inputs, layer after layer; returns where the next network's
-   go. */
-static uint32_t *ssdgs__pack_weights(const int *sizes, int layers, const ssdgs_real *weights,
-                                     uint32_t *packed) {
-    int layer, row, i, half;
-    for (layer = 0; layer < layers; layer++) {
-        for (row = 0; row < sizes[layer + 1]; row++)
-            for (i = 0; i < sizes[layer]; i += 2) {
-                uint32_t pair = 0;
-                for (half = 0; half < 2 && i + half < sizes[layer]; half++) {
-                    const float w = (float)weights[(size_t)row * (size_t)sizes[layer] + (size_t)(i + half)];
-                    uint32_t bits;
-                    memcpy(&bits, &w, 4);
-                    bits = (bits + 0x7FFFu + (bits >> 16 & 1u)) >> 16;
-                    pair |= bits << 16 * half;
-                }
-                *packed++ = pair;
-            }
-        weights += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
-    }
-    return packed;
 }
 
 /* Lists of rows for dense products: all of them, and those that live. */
@@ -3981,11 +3932,10 @@ static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
 }
 
 /* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that
-   are 0 in the whole block are left out of the sums, which changes no bit. With packed weights the products
-   run in bf16; pairs is their working memory. */
+   are 0 in the whole block are left out of the sums, which changes no bit. */
 static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers,
-                                   const ssdgs_real *weights, const uint32_t *packed, uint32_t *pairs,
-                                   ssdgs__row_lists *lists, const ssdgs_real *inputs, ssdgs_real *outputs) {
+                                   const ssdgs_real *weights, ssdgs__row_lists *lists,
+                                   const ssdgs_real *inputs, ssdgs_real *outputs) {
     ssdgs__product p;
     int layer;
     memset(&p, 0, sizeof p);
@@ -4006,16 +3956,11 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
         p.depth = sizes[layer];
         p.depth_list = lists->all;
         p.relu = layer < layers - 1;
-        if (packed) {
-            k->dense_bf16(&p, packed, pairs);
-            packed += out * ((in + 1) / 2);
-        } else {
-            if (layer) {
-                p.depth = k->live_rows(p.b, sizes[layer], lists->in);
-                p.depth_list = lists->in;
-            }
-            k->dense(&p);
+        if (layer) {
+            p.depth = k->live_rows(p.b, sizes[layer], lists->in);
+            p.depth_list = lists->in;
         }
+        k->dense(&p);
         lists->multiplied += (uint64_t)p.depth * out;
         lists->multipliable += (uint64_t)in * out;
         weights += (in + 1) * out;
@@ -4215,7 +4160,6 @@ typedef struct ssdgs__shade_job {
     unsigned char *shadow_known; /* (lights, n) which of them */
     uint64_t *counts;            /* per slot: multiplications done, those of all neurons, shadows kept */
     const ssdgs_real *transport; /* of ssdgs__transport_job, or NULL */
-    uint32_t *packed[2];         /* bf16 weights of the scattering and the shadow network, or NULL */
     ssdgs_real *activations, *scratch, *slots, *lane_slots;
 } ssdgs__shade_job;
 
@@ -4268,7 +4212,6 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     const ssdgs__kernels *k = frame->context->k;
     const size_t n = (size_t)frame->gaussians.count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
-    uint32_t *pairs = (uint32_t *)(void *)(scratch + l->pairs);
     const int rest = frame->shaded_count - block * SSDGS__BLOCK,
               live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
@@ -4302,15 +4245,15 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             shadow = part + l->scattering_at - SSDGS__BLOCK;
             if (!ssdgs__shadow_recall(job, light, at, shadow)) {
                 ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow,
-                                       job->packed[1], pairs, lists, inputs, part + l->shadow_at);
+                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, lists, inputs,
+                                       part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
             } else lists->shadows_kept += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering,
-                                   job->packed[0], pairs, lists, inputs, part + l->scattering_at);
+            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, lists,
+                                   inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
@@ -4426,13 +4369,6 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     {
         const ssdgs_result result = ssdgs__lightings(frame, &job->lightings);
         if (result) return result;
-    }
-    if (frame->options.bf16 && context->bf16 && !frame->training) {
-        SSDGS__RESERVE(frame->memory->packed, job->packed[0], uint32_t, frame->model->global_count);
-        job->packed[1] = ssdgs__pack_weights(job->layout.scattering, job->layout.scattering_layers,
-                                             frame->gaussians.scattering, job->packed[0]);
-        ssdgs__pack_weights(job->layout.shadow, job->layout.shadow_layers, frame->gaussians.shadow,
-                            job->packed[1]);
     }
     return SSDGS_OK;
 }
@@ -4904,11 +4840,13 @@ static void ssdgs__composite_backward_task(void *data, int index) {
                               job->highlight_sums +
                                   (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
         if (!light) continue;
-        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++)
-            color[layer] = ssdgs__layer(frame, first - 1 + layer);
-        ssdgs__gradient_product(pixels + lit, gradient + lit, SSDGS__PER_LIGHT, 0);
-        k->composite_backward(&tile, SSDGS__PER_LIGHT, color, gradient + lit, pixels + lit, sums, job->stride,
-                              first);
+        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++) { /* training has one light: these may take long */
+            const int at = lit + layer * SSDGS__TILE_LAYER;
+            *color = ssdgs__layer(frame, first - 1 + layer);
+            ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
+            k->composite_backward(&tile, 1, color, gradient + at, pixels + at, sums, job->stride,
+                                  first + layer);
+        }
     }
     for (layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
@@ -5730,6 +5668,8 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 #endif /* SSDGS_NO_TRAINER */
 
 /* ==== >>ply  model files, files at large ==== */
+
+SSDGS__SMALL_BEGIN
 
 /* A model is one PLY file: element vertex with the Gaussians, then the settings, the ASG bases and the
    weights. One table of properties drives both ways. Reading: the header is matched against the table, a
@@ -6844,7 +6784,10 @@ SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *pa
 }
 #endif /* SSDGS_NO_STDIO */
 
+SSDGS__SMALL_END
+
 #ifndef SSDGS_NO_TRAINER
+
 /* ==== >>trainer  schedule, one photograph forward and backward, Adam ==== */
 
 static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {
@@ -7794,6 +7737,8 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 }
 
 /* ==== >>steps  the trainer's public functions ==== */
+
+SSDGS__SMALL_BEGIN
 
 /* The bounds' longest side. */
 static double ssdgs__bounds_side(const ssdgs_train_options *o) {
@@ -9285,6 +9230,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
     return ssdgs__leave(context, result);
 }
 #endif /* SSDGS_NO_STDIO */
+SSDGS__SMALL_END
 #endif /* SSDGS_NO_TRAINER */
 
 #if defined(__clang__)
@@ -9558,7 +9504,6 @@ SSDGS__FI void F(sincos)(V x, V *s, V *c) {
     *s = sin(x);
     *c = cos(x);
 }
-SSDGS__FI V F(atan2_upper)(V y, V x) { return atan2(y, x); }
 SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
 /* 2^x for x < 126, saturating below -126: degree 5 on [-1/2, 1/2], 2.2e-7 relative. */
@@ -9641,21 +9586,6 @@ SSDGS__FI void F(sincos)(V x, V *s, V *c) {
     *s = VSEL(negative_s, VNEG(*s), *s);
     *c = VSEL(negative_c, VNEG(*c), *c);
 }
-
-/* atan2(y, x) for y >= 0. */
-SSDGS__FI V F(atan2_upper)(V y, V x) {
-    V ax = VABS(x), high = VMAX(VMAX(ax, y), VSET(1e-30)), t = VDIV(VMIN(ax, y), high), t2, p, base;
-    VM steep = VLT(VSET(0.41421356), t);
-    base = VSEL(steep, VSET(0.78539816339), VSET(0));
-    t = VSEL(steep, VDIV(VSUB(t, VSET(1)), VADD(t, VSET(1))), t);
-    t2 = VMUL(t, t);
-    p = VFMA(t2, VSET(8.05374449538e-2), VSET(-1.38776856032e-1));
-    p = VFMA(p, t2, VSET(1.99777106478e-1));
-    p = VFMA(p, t2, VSET(-3.33329491539e-1));
-    p = VADD(base, VFMA(VMUL(p, t2), t, t));
-    p = VSEL(VLT(ax, y), VSUB(VSET(1.57079632679), p), p);
-    return VSEL(VLT(x, VSET(0)), VSUB(VSET(3.14159265359), p), p);
-}
 #endif
 
 #define VEXP(x) F(exp)(x)
@@ -9703,6 +9633,31 @@ SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V 
     radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
     for (i = 0; i < 4; i++) draw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
 }
+
+/* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
+SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i += SSDGS__VW) {
+        const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
+        const VM linear = VLT(x, VSET(0.0031308));
+        const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
+        VSTORE(out + i, VSEL(linear, VMUL(x, VSET(12.92)), VSUB(power, VSET(0.055))));
+        if (slope) VSTORE(slope + i, VSEL(linear, VSET(12.92), VDIV(power, VMUL(safe, VSET(2.4)))));
+    }
+}
+
+SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i += SSDGS__VW) {
+        const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
+        const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
+        VSTORE(out + i, VSEL(VLT(x, VSET(0.04045)), VMUL(x, VSET(1 / 12.92)), power));
+    }
+}
+
+/* The host calls the scalar forms of the above. The kernels that follow have one only where it is asked
+   for. */
+#if SSDGS__ISA != SSDGS__ISA_SCALAR || SSDGS__SCALAR
 
 /* ==== >>project_kernel  eq. 1: EWA projection of Gaussians begin .. end ==== */
 
@@ -10062,8 +10017,8 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
 /* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it, and with max_error >
    0 whether it must be shaded. A pixel passes over small weights as long as their sum stays within max_error,
    so what no pixel needs adds up to no more than that in any. */
-SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed,
-                                    const int thrifty) {
+SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed) {
+    const int thrifty = needed != NULL;
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     const V budget = VSET(tile->max_error), slight = VSET(tile->max_error * SSDGS__SHARE);
     R transmittance[16][16], passed_over[16][16];
@@ -10122,21 +10077,16 @@ SSDGS__FI void F(walk_camera_lanes)(const ssdgs__tile *tile, uint16_t *blends, u
     }
 }
 
-SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed) {
-    if (needed) F(walk_camera_lanes)(tile, blends, needed, 1);
-    else F(walk_camera_lanes)(tile, blends, needed, 0);
-}
-
 /* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho
    x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
    in the transmittance, and takes part in it once its own distance is reached: two batches run along the
    list, the nearer one leaves what it has met after each of its entries for the other to pick from. */
-SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int cue, const int flux) {
+SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     R transmittance[16][16], met[16][16],
         next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
     unsigned char fallen[16][16];
-    const int all = flux || tile->falls;
+    const int all = tile->flux || tile->falls, cue = tile->cue || tile->flux;
     F(batch) applied, sampled;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
@@ -10179,7 +10129,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         F(batch_transpose)(&sampled, samples);
         for (i = 0; i < samples; i++)
             for (v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
-        for (i = 0; flux && i < applies; i++)
+        for (i = 0; cue && i < applies; i++)
             for (v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
         for (micro = 0; micro < 16; micro++) {
             const uint64_t entries = applied.entries[micro];
@@ -10188,7 +10138,7 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
             if (!(entries | sampled.entries[micro])) continue;
             F(pixel_centres)(tile, micro, px, py);
             VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                if (flux) {
+                if (cue) {
                     V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
                     w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
                     cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
@@ -10206,12 +10156,10 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                 const V distance = VSET(applied.record[index][6]);
                 VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     const V before = t[v];
-                    V dx, dy, raw, alpha, w;
+                    V dx, dy, raw, alpha;
                     VM drawn;
                     unsigned fell;
                     alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    if (cue || flux) w = VMUL(alpha, before);
-                    if (flux) energy[index][v] = VFMA(omega[v], w, energy[index][v]);
                     t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
                     fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
@@ -10221,9 +10169,12 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
                         ssdgs__falls_note(tile, micro, fell, from, history[0][index + 1],
                                           applied.record[index][6], next[micro], fallen[micro]);
                     }
-                    if (!cue) continue;
-                    b[v] = VFMA(w, distance, b[v]);
-                    VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
+                    if (cue) {
+                        const V w = VMUL(alpha, before);
+                        energy[index][v] = VFMA(omega[v], w, energy[index][v]);
+                        b[v] = VFMA(w, distance, b[v]);
+                        VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
+                    }
                 }
             }
             for (left = sampled.entries[micro]; left; left &= left - 1) {
@@ -10255,15 +10206,9 @@ SSDGS__FI void F(walk_light_lanes)(const ssdgs__tile *tile, R *sums, const int c
         }
         for (i = 0; i < samples; i++)
             F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
-        for (i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
+        for (i = 0; cue && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
     if (tile->falls) ssdgs__falls_end(tile, fallen[0], transmittance[0]);
-}
-
-SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
-    if (tile->flux) F(walk_light_lanes)(tile, sums, 1, 1);
-    else if (tile->cue) F(walk_light_lanes)(tile, sums, 1, 0);
-    else F(walk_light_lanes)(tile, sums, 0, 0);
 }
 
 /* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ====
@@ -10331,16 +10276,20 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
 }
 
 SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const *color, R *pixels) {
+#if SSDGS__NV > 1
+    F(composite_layers)(layers, tile, color, pixels);
+#else /* sums in registers: their number is a constant */
     if (layers == 1) F(composite_layers)(1, tile, color, pixels);
     else if (layers == SSDGS__PER_LIGHT) F(composite_layers)(SSDGS__PER_LIGHT, tile, color, pixels);
     else F(composite_layers)(SSDGS__LAYERS, tile, color, pixels);
+#endif
 }
 
 /* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the
    pixel][16 lanes]; scratch: room for as many. Per entry adds to sums (n, stride) of g = dL/d(ln alpha): g, g
    dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w of slot 0, 0; from 8 + 4 slot on w dC of each layer,
-   three and one without meaning. Walks front to back again: what lies behind an entry is the final pixel less
-   what has been passed, so alpha and T are the forward's, bit for bit. */
+   three and one without meaning. layers: all of them, or 1. Walks front to back again: what lies behind an
+   entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color,
                                             const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
@@ -10383,7 +10332,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             for (used = 0; left; left &= left - 1, used++) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
                 R *out = sums + (size_t)batch.place[index] * stride;
-                V sum[8 + 4 * SSDGS__PER_LIGHT][SSDGS__NV];
+                V sum[12][SSDGS__NV];
                 VUNROLL for (v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, alpha, w, part[4], shade, behind, g, gx, gy, before_it = t[v];
                     VM drawn;
@@ -10411,21 +10360,16 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     sum[5][v] = VMUL(gy, dy);
                     sum[6][v] = slot ? zero : w;
                     sum[7][v] = zero;
-                    if (wide) VSTORE(weight[used] + v * SSDGS__VW, w);
-                    else {
-                        VUNROLL for (layer = 0; layer < layers; layer++) {
-                            VUNROLL for (i = 0; i < 3; i++) sum[8 + 4 * layer + i][v] =
-                                VMUL(w, dc[layer][i][v]);
-                            sum[11 + 4 * layer][v] = zero;
-                        }
+                    if (wide) {
+                        VSTORE(weight[used] + v * SSDGS__VW, w);
+                    } else {
+                        VUNROLL for (i = 0; i < 3; i++) sum[8 + i][v] = VMUL(w, dc[0][i][v]);
+                        sum[11][v] = zero;
                     }
                 }
                 F(sum4)(out, sum[0], sum[1], sum[2], sum[3]);
                 F(sum4)(out + 4, sum[4], sum[5], sum[6], sum[7]);
-                if (wide) continue;
-                VUNROLL for (layer = 0; layer < layers; layer++)
-                    F(sum4)(out + 8 + 4 * (slot + layer), sum[8 + 4 * layer], sum[9 + 4 * layer],
-                            sum[10 + 4 * layer], sum[11 + 4 * layer]);
+                if (!wide) F(sum4)(out + 8 + 4 * slot, sum[8], sum[9], sum[10], sum[11]);
             }
             for (n = 0; wide && n < used; n++) {
                 R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
@@ -10450,8 +10394,6 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color,
                                      const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
     if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, scratch, sums, stride, slot);
-    else if (layers == SSDGS__PER_LIGHT)
-        F(composite_layers_backward)(SSDGS__PER_LIGHT, tile, color, pixels, scratch, sums, stride, slot);
     else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, scratch, sums, stride, slot);
 }
 
@@ -10556,19 +10498,16 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * dept
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
     F(offsets) depth[1024];
-    int left = (p->columns / SSDGS__VW + SSDGS__TV - 1) / SSDGS__TV, column = 0, k;
+    int column = 0, k;
     for (k = 0; k < p->depth; k++) {
         depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);
         depth[k].b = (uint32_t)(p->depth_list[k] * p->b_stride);
     }
-    for (; left; left--) { /* tiles of about equal width */
-        const int vectors = ((p->columns - column) / SSDGS__VW + left - 1) / left;
-        if (vectors == SSDGS__TV) F(dense_columns)(p, depth, SSDGS__TV, column);
-        else if (SSDGS__TV > 3 && vectors == 3) F(dense_columns)(p, depth, 3, column);
-        else if (SSDGS__TV > 2 && vectors == 2) F(dense_columns)(p, depth, 2, column);
-        else F(dense_columns)(p, depth, 1, column);
-        column += vectors * SSDGS__VW;
-    }
+    for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW)
+        F(dense_columns)(p, depth, SSDGS__TV, column);
+    for (; SSDGS__TV > 2 && column + 2 * SSDGS__VW <= p->columns; column += 2 * SSDGS__VW)
+        F(dense_columns)(p, depth, 2, column);
+    for (; SSDGS__VW > 8 && column < p->columns; column += SSDGS__VW) F(dense_columns)(p, depth, 1, column);
 }
 
 /* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns
@@ -10600,54 +10539,6 @@ SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stri
             F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
     }
 }
-
-#if SSDGS__ISA == SSDGS__ISA_AVX512 && SSDGS__BF16
-#define SSDGS__BF16_FN static SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
-#define SSDGS__BF16_FI static SSDGS__INLINE SSDGS__ATTRIBUTE("avx512f,avx512bw,avx512bf16")
-
-SSDGS__BF16_FI void F(dense_bf16_tile)(const int rows, const ssdgs__product *p, const uint32_t *a,
-                                       const uint32_t *b, int row) {
-    __m512 sum[6][4];
-    const int pairs = (p->depth + 1) / 2;
-    int i, v, k;
-    VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < 4; v++) sum[i][v] = VSET(p->bias[row + i]);
-    for (k = 0; k < pairs; k++, b += SSDGS__BLOCK) {
-        __m512i lanes[4];
-        VUNROLL for (v = 0; v < 4; v++) lanes[v] = _mm512_loadu_si512(b + 16 * v);
-        VUNROLL for (i = 0; i < rows; i++) {
-            const __m512i weight = _mm512_set1_epi32((int)a[(row + i) * pairs + k]);
-            VUNROLL for (v = 0; v < 4; v++) sum[i][v] =
-                _mm512_dpbf16_ps(sum[i][v], (__m512bh)weight, (__m512bh)lanes[v]);
-        }
-    }
-    VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < 4; v++) VSTORE(
-        p->out + (size_t)(row + i) * p->out_stride + 16 * v, p->relu ? VMAX(sum[i][v], VSET(0)) : sum[i][v]);
-}
-
-static const uint16_t ssdgs__interleaved[32] = {0, 16, 1, 17, 2,  18, 3,  19, 4,  20, 5,  21, 6,  22, 7,  23,
-                                                8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31};
-
-/* A layer's forward in bf16 with sums in float: twice the throughput. weights: (rows, pairs) from
-   pack_weights; pairs: room for the packed inputs. */
-SSDGS__BF16_FN void F(dense_bf16)(const ssdgs__product *p, const uint32_t *weights, uint32_t *pairs) {
-    int k, v, row, rows, left;
-    const __m512i order = _mm512_loadu_si512(ssdgs__interleaved);
-    for (k = 0; k < p->depth; k += 2)
-        for (v = 0; v < SSDGS__BLOCK; v += 16) {
-            const V even = VLOAD(p->b + k * SSDGS__BLOCK + v);
-            const V odd = k + 1 < p->depth ? VLOAD(p->b + (k + 1) * SSDGS__BLOCK + v) : VSET(0);
-            _mm512_storeu_si512(pairs + k / 2 * SSDGS__BLOCK + v,
-                                _mm512_permutexvar_epi16(order, (__m512i)_mm512_cvtne2ps_pbh(odd, even)));
-        }
-    for (left = (p->rows + 5) / 6, row = 0; left; left--, row += rows) {
-        rows = (p->rows - row + left - 1) / left;
-        SSDGS__BY_HEIGHT(rows, F(dense_bf16_tile), p, weights, pairs, row);
-    }
-}
-#define SSDGS__DENSE_BF16 F(dense_bf16)
-#else
-#define SSDGS__DENSE_BF16 NULL
-#endif
 
 /* sums (16 of every stride, per row) += each listed row of rows (., SSDGS__BLOCK) by sixteenths. */
 SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t *list, int count) {
@@ -10751,51 +10642,22 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, cons
     g->fresnel = VFMA(VSET(1 - SSDGS__F0), fifth, VSET(SSDGS__F0));
 }
 
-/* One basis at the local half vector h. basis: x, y, z axes (9), then lambda, mu (eq. 12) or 1/l, 1/u, sigma
-   (angular). With de NULL only the value; else also the exponent's derivatives: to h (3), and to the basis
-   row (12). */
-SSDGS__FI V F(asg)(const int angular, const R *b, const V h[3], V *dh, V *db) {
+/* One basis at the local half vector h (eq. 12). b: x, y, z axes (9), lambda, mu. With dh NULL only the
+   value; else also the exponent's derivatives: to h (3), and to the basis row (11). */
+SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
     const V x = VDOT3(VSET(b[0]), VSET(b[1]), VSET(b[2]), h[0], h[1], h[2]);
     const V y = VDOT3(VSET(b[3]), VSET(b[4]), VSET(b[5]), h[0], h[1], h[2]);
-    V value, dx, dy, dz = VSET(0);
-    int i;
-    if (!angular) {
-        value = VEXP(VNEG(VFMA(VMUL(VSET(b[9]), x), x, VMUL(VMUL(VSET(b[10]), y), y))));
-        if (!dh) return value;
-        dx = VMUL(VSET(-2 * b[9]), x);
-        dy = VMUL(VSET(-2 * b[10]), y);
+    const V value = VEXP(VNEG(VFMA(VMUL(VSET(b[9]), x), x, VMUL(VMUL(VSET(b[10]), y), y))));
+    if (dh) {
+        const V dx = VMUL(VSET(-2 * b[9]), x), dy = VMUL(VSET(-2 * b[10]), y);
+        for (int i = 0; i < 3; i++) {
+            dh[i] = VFMA(dx, VSET(b[i]), VMUL(dy, VSET(b[3 + i])));
+            db[i] = VMUL(dx, h[i]);
+            db[3 + i] = VMUL(dy, h[i]);
+            db[6 + i] = VSET(0);
+        }
         db[9] = VNEG(VMUL(x, x));
         db[10] = VNEG(VMUL(y, y));
-        db[11] = VSET(0);
-    } else {
-        /* (theta q)^2 = (theta / s)^2 ((x/l)^2 + (y/u)^2) with s = |(x, y)|: no acos, no root, smooth at the
-           pole */
-        const V z = VDOT3(VSET(b[6]), VSET(b[7]), VSET(b[8]), h[0], h[1], h[2]);
-        const V s2 = VFMA(x, x, VMUL(y, y)), s = VSQRT(VMAX(s2, VSET(1e-16)));
-        const V theta = F(atan2_upper)(s, z), turn = VDIV(theta, s);
-        const VM pole = VAND(VLT(s2, VSET(1e-8)), VLT(VSET(0), z));
-        const V ratio = VSEL(pole, VFMA(s2, VSET(1.0 / 3), VSET(1)), VMUL(turn, turn));
-        const V xl = VMUL(x, VSET(b[9])), yu = VMUL(y, VSET(b[10])), inverse_sigma = VSET(1 / b[11]);
-        const V q = VFMA(xl, xl, VMUL(yu, yu)), k = VMUL(VSET(-0.5), VMUL(inverse_sigma, inverse_sigma));
-        const V scale = VMUL(inverse_sigma, VSET(0.32964899322074326)); /* 1 / (sqrt 2 pi^(2/3)) */
-        V exponent = VMUL(k, VMUL(ratio, q)), slope;
-        value = VMUL(scale, VEXP(exponent));
-        if (!dh) return value;
-        /* on the unit sphere z^2 + s^2 = 1: d theta = (z ds - s dz); the pole's limit of d(ratio)/d(s2) is
-           1/3 */
-        slope = VSEL(pole, VSET(1.0 / 3), VDIV(VMUL(turn, VSUB(z, turn)), VMAX(s2, VSET(1e-16))));
-        dx = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), x, VMUL(ratio, VMUL(xl, VSET(b[9])))));
-        dy = VMUL(VMUL(VSET(2), k), VFMA(VMUL(q, slope), y, VMUL(ratio, VMUL(yu, VSET(b[10])))));
-        dz = VSEL(pole, VSET(0), VMUL(VMUL(VSET(-2), k), VMUL(q, turn)));
-        db[9] = VMUL(VMUL(VSET(2), k), VMUL(ratio, VMUL(xl, x)));
-        db[10] = VMUL(VMUL(VSET(2), k), VMUL(ratio, VMUL(yu, y)));
-        db[11] = VMUL(VNEG(inverse_sigma), VFMA(VSET(2), exponent, VSET(1)));
-    }
-    for (i = 0; i < 3; i++) {
-        dh[i] = VFMA(dx, VSET(b[i]), VFMA(dy, VSET(b[3 + i]), VMUL(dz, VSET(b[6 + i]))));
-        db[i] = VMUL(dx, h[i]);
-        db[3 + i] = VMUL(dy, h[i]);
-        db[6 + i] = VMUL(dz, h[i]);
     }
     return value;
 }
@@ -10818,8 +10680,7 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
         if (k->specular && !k->deferred)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
-                V lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, NULL, NULL)
-                                    : F(asg)(0, k->basis + 12 * j, g.local, NULL, NULL);
+                V lobe = F(asg)(k->basis + 12 * j, g.local, NULL, NULL);
                 d = VFMA(weight, lobe, d);
             }
         VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s,
@@ -10848,15 +10709,14 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         if (k->specular && !k->deferred)
             for (j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
-                  de[3], db[12], lobe, push;
+                  de[3], db[11], lobe, push;
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-                lobe = k->angular ? F(asg)(1, k->basis + 12 * j, g.local, de, db)
-                                  : F(asg)(0, k->basis + 12 * j, g.local, de, db);
+                lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
                 d = VFMA(weight, lobe, d);
                 VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
                 push = VMUL(VMUL(dlobe, weight), lobe);
                 for (i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
-                for (i = 0; i < 12; i++) {
+                for (i = 0; i < 11; i++) {
                     R *sum = lane_sums + (6 + 12 * j + i) * 16 + s % 16;
                     VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
                 }
@@ -11245,94 +11105,45 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
     }
 }
 
-/* ==== >>dipole_kernel  eq. 5 and its relatives ==== */
+/* ==== >>dipole_kernel  eq. 5 ==== */
 
-/* f_sss of (sigma_s, sigma_a, r); with d, also its three derivatives. virtual_depth = 1 + 4A/3. */
-SSDGS__FI V F(dipole)(const int form, V ss, V sa, V r, R virtual_depth, V *d) {
+/* f_sss of (sigma_s, sigma_a, r); with d, also its three derivatives. virtual_depth = 1 + 4A/3. Jensen's
+   form: z (s d + 1) e^(-s d) / d^3 of the real and the virtual source, s = sqrt(3 sigma_a sigma_t). As
+   printed, s is sigma_t, the virtual source's factor zr zv, and its bracket has the real source's
+   distance. */
+SSDGS__FI V F(dipole)(const int printed, V ss, V sa, V r, R virtual_depth, V *d) {
     const V one = VSET(1), st = VADD(ss, sa), inverse_st = VDIV(one, st), albedo = VMUL(ss, inverse_st);
-    if (form == SSDGS_DIPOLE_BURLEY) {
-        const V w = VMAX(VMUL(sa, inverse_st), VSET(1e-12)), q = VSQRT(w);
-        /* A = (1 - q)(1 - 0.107 q) / (1 + 1.91 q), with 1 - q = albedo / (1 + q): no cancellation in the
-           dark */
-        const V top = VMUL(VDIV(albedo, VADD(one, q)), VFNMA(VSET(0.107), q, one)),
-                bottom = VFMA(VSET(1.91), q, one);
-        const V a = VDIV(top, bottom), off = VSUB(a, VSET(0.8)), off2 = VMUL(off, VABS(off));
-        const V s = VFMA(VMUL(VSET(7), VABS(off)), VMUL(off, off), VSUB(VSET(1.85), a));
-        const V x = VMUL(VMUL(s, r), st), u = VEXP(VMUL(x, VSET(-1.0 / 3))), u3 = VMUL(VMUL(u, u), u),
-                inverse_r = VDIV(one, r);
-        const V p = VMUL(VMUL(VMUL(a, s), st), VMUL(inverse_r, VSET(0.039788735772973836))),
-                sum = VADD(u3, u); /* 1 / (8 pi) */
-        if (d) {
-            const V slope = VNEG(VFMA(u, VSET(1.0 / 3), u3)), shared = VMUL(p, VFMA(slope, x, sum));
-            const V ds = VDIV(shared, s),
-                    da = VFMA(ds, VFMA(VSET(21), off2, VSET(-1)), VMUL(VMUL(p, sum), VDIV(one, a)));
-            const V dq =
-                VMUL(da, VDIV(VFNMA(VSET(1.91), top, VMUL(VFMA(VSET(0.214), q, VSET(-1.107)), bottom)),
-                              VMUL(bottom, bottom)));
-            const V dw = VMUL(dq, VDIV(VSET(0.5), q)), dst = VMUL(shared, inverse_st);
-            d[0] = VFNMA(dw, VMUL(VMUL(sa, inverse_st), inverse_st), dst);
-            d[1] = VFMA(dw, VMUL(albedo, inverse_st), dst);
-            d[2] = VMUL(VMUL(p, inverse_r), VFMA(slope, x, VNEG(sum)));
+    const V str = VSQRT(VMUL(VMUL(VSET(3), sa), st)), s = printed ? st : str;
+    const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)), factor = printed ? VMUL(zr, zv) : zv;
+    const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))), q = printed ? dr : dv;
+    const V ir = VDIV(one, dr), iv = VDIV(one, dv);
+    const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir)));
+    const V ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
+    const V br = VFMA(s, dr, one), bv = VFMA(s, q, one);
+    const V scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
+    const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
+    if (d) {
+        const V ddr = VNEG(VMUL(VMUL(zr, er), VFMA(VMUL(s, dr), s, VMUL(VSET(3), VADD(s, ir)))));
+        const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s)));
+        const V dq = VMUL(VMUL(factor, ev), s);
+        const V to_dr = printed ? VADD(ddr, dq) : ddr, to_dv = printed ? ddv : VADD(ddv, dq);
+        const V ds = VFNMA(VMUL(zr, er), VMUL(s, VMUL(dr, dr)), VMUL(VMUL(factor, ev), VFNMA(dv, bv, q)));
+        const V dfactor = printed ? VMUL(VMUL(VSET(2), second), zv) : VMUL(second, VSET(virtual_depth));
+        const V dzv = VMUL(VMUL(to_dv, VMUL(zv, iv)), VSET(virtual_depth));
+        const V dz = VADD(VADD(first, dfactor), VFMA(to_dr, VMUL(zr, ir), dzv));
+        V dst = VNEG(VMUL(dz, VMUL(zr, zr))), dsa = VSET(0);
+        if (printed) {
+            dst = VADD(dst, ds);
+        } else { /* str^2 = 3 sa st */
+            const V k = VMUL(VMUL(ds, VSET(1.5)), VDIV(one, VMAX(str, VMUL(VSET(1e-7), st))));
+            dst = VFMA(k, sa, dst);
+            dsa = VMUL(k, st);
         }
-        return VMUL(p, sum);
-    } else {
-        const int printed = form == SSDGS_DIPOLE_PRINTED;
-        const V str = VSQRT(VMUL(VMUL(VSET(3), sa), st)), s = printed ? st : str;
-        const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)),
-                factor = form == SSDGS_DIPOLE_JENSEN ? zv : VMUL(zr, zv);
-        const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))),
-                q = printed ? dr : dv;
-        const V ir = VDIV(one, dr), iv = VDIV(one, dv);
-        const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir))),
-                ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
-        const V br = VFMA(s, dr, one), bv = VFMA(s, q, one),
-                scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
-        const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
-        if (d) {
-            /* real source: z (s d + 1) e^(-s d) / d^3; virtual source: factor (s q + 1) e^(-s dv) / dv^3 */
-            const V ddr = VNEG(VMUL(VMUL(zr, er), VFMA(VMUL(s, dr), s, VMUL(VSET(3), VADD(s, ir)))));
-            const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s))),
-                    dq = VMUL(VMUL(factor, ev), s);
-            const V to_dr = printed ? VADD(ddr, dq) : ddr, to_dv = printed ? ddv : VADD(ddv, dq);
-            const V ds = VFNMA(VMUL(zr, er), VMUL(s, VMUL(dr, dr)), VMUL(VMUL(factor, ev), VFNMA(dv, bv, q)));
-            const V dfactor = form == SSDGS_DIPOLE_JENSEN ? VMUL(second, VSET(virtual_depth))
-                                                          : VMUL(VMUL(VSET(2), second), zv);
-            const V dzv = VMUL(VMUL(to_dv, VMUL(zv, iv)), VSET(virtual_depth));
-            const V dz = VADD(VADD(first, dfactor), VFMA(to_dr, VMUL(zr, ir), dzv));
-            V dst = VNEG(VMUL(dz, VMUL(zr, zr))), dsa = VSET(0);
-            if (printed) {
-                dst = VADD(dst, ds);
-            } else { /* str^2 = 3 sa st */
-                const V k = VMUL(VMUL(ds, VSET(1.5)), VDIV(one, VMAX(str, VMUL(VSET(1e-7), st))));
-                dst = VFMA(k, sa, dst);
-                dsa = VMUL(k, st);
-            }
-            d[0] = VMUL(scale, VFMA(VDIV(f, ss), VMUL(sa, inverse_st), dst));
-            d[1] = VMUL(scale, VFNMA(f, inverse_st, VADD(dst, dsa)));
-            d[2] = VMUL(VMUL(scale, r), VFMA(to_dr, ir, VMUL(to_dv, iv)));
-        }
-        return VMUL(scale, f);
+        d[0] = VMUL(scale, VFMA(VDIV(f, ss), VMUL(sa, inverse_st), dst));
+        d[1] = VMUL(scale, VFNMA(f, inverse_st, VADD(dst, dsa)));
+        d[2] = VMUL(VMUL(scale, r), VFMA(to_dr, ir, VMUL(to_dv, iv)));
     }
-}
-
-SSDGS__FI V F(dipole_any)(int form, V ss, V sa, V r, R virtual_depth, V *d) {
-    if (form == SSDGS_DIPOLE_JENSEN) return F(dipole)(SSDGS_DIPOLE_JENSEN, ss, sa, r, virtual_depth, d);
-    if (form == SSDGS_DIPOLE_BURLEY) return F(dipole)(SSDGS_DIPOLE_BURLEY, ss, sa, r, virtual_depth, d);
-    if (form == SSDGS_DIPOLE_PRINTED) return F(dipole)(SSDGS_DIPOLE_PRINTED, ss, sa, r, virtual_depth, d);
-    return F(dipole)(SSDGS_DIPOLE_RELEASED, ss, sa, r, virtual_depth, d);
-}
-
-/* n values, a multiple of the lanes: f, and with derivatives (3, n) those too. For tests and tools. */
-SSDGS__FN void F(dipole_profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f,
-                                 R *derivatives, size_t n) {
-    size_t i;
-    for (i = 0; i < n; i += SSDGS__VW) {
-        V d[3];
-        VSTORE(f + i, F(dipole_any)(form, VLOAD(ss + i), VLOAD(sa + i), VLOAD(r + i), virtual_depth, d));
-        VSTORE(derivatives + i, d[0]);
-        VSTORE(derivatives + n + i, d[1]);
-        VSTORE(derivatives + 2 * n + i, d[2]);
-    }
+    return VMUL(scale, f);
 }
 
 /* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light
@@ -11374,9 +11185,9 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
                 const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) {
                     F(optics)(k, optics, c, s, unit);
-                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
-                                            VFMA(unit[1], VSET(2), VSET(0.05)),
-                                            VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, NULL);
+                    profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
+                                        VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
+                                        k->virtual_depth, NULL);
                 }
                 VSTORE(o + (6 + c) * SSDGS__BLOCK,
                        VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power,
@@ -11435,9 +11246,9 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 V dprofile;
                 if (c == 0 || k->per_channel_optics) {
                     F(optics)(k, optics, c, s, unit);
-                    profile = F(dipole_any)(k->dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
-                                            VFMA(unit[1], VSET(2), VSET(0.05)),
-                                            VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth, d);
+                    profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
+                                        VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
+                                        k->virtual_depth, d);
                 }
                 VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
                 dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
@@ -11471,28 +11282,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
     }
 }
 
-/* ==== >>image_kernels  transfer curve, SSIM, Adam ==== */
-
-/* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
-SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
-    size_t i;
-    for (i = 0; i < n; i += SSDGS__VW) {
-        const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
-        const VM linear = VLT(x, VSET(0.0031308));
-        const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
-        VSTORE(out + i, VSEL(linear, VMUL(x, VSET(12.92)), VSUB(power, VSET(0.055))));
-        if (slope) VSTORE(slope + i, VSEL(linear, VSET(12.92), VDIV(power, VMUL(safe, VSET(2.4)))));
-    }
-}
-
-SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
-    size_t i;
-    for (i = 0; i < n; i += SSDGS__VW) {
-        const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
-        const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
-        VSTORE(out + i, VSEL(VLT(x, VSET(0.04045)), VMUL(x, VSET(1 / 12.92)), power));
-    }
-}
+/* ==== >>image_kernels  SSIM, normals from depths, Adam ==== */
 
 /* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of
    "black"; values are stored less 1/2, which leaves variances as they are and keeps them from cancelling.
@@ -11666,8 +11456,10 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
                        R correct_square, R epsilon) {
     R tail[4][SSDGS__VW];
     size_t i, l;
-    for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW) F(adam_lanes)
-    (parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
+    for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW) {
+        F(adam_lanes)
+        (parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
+    }
     if (i == n) return;
     for (l = 0; l < SSDGS__VW; l++) {
         tail[0][l] = i + l < n ? parameter[i + l] : 0;
@@ -11698,13 +11490,11 @@ static const ssdgs__kernels F(kernels) = {F(project),
                                           F(dense),
                                           F(live_rows),
                                           SSDGS__TRAINS(F(transpose)),
-                                          SSDGS__DENSE_BF16,
                                           SSDGS__TRAINS(F(row_sums)),
                                           F(encode),
                                           SSDGS__TRAINS(F(encode_backward)),
                                           F(reflect),
                                           SSDGS__TRAINS(F(reflect_backward)),
-                                          SSDGS__TRAINS(F(dipole_profile)),
                                           F(colour),
                                           SSDGS__TRAINS(F(colour_backward)),
                                           SSDGS__TRAINS(F(depth_normals)),
@@ -11714,6 +11504,8 @@ static const ssdgs__kernels F(kernels) = {F(project),
                                           SSDGS__TRAINS(F(ssim_backward_row)),
                                           F(finite),
                                           SSDGS__TRAINS(F(adam))};
+
+#endif /* SSDGS__SCALAR */
 
 #undef SSDGS__NAME
 #undef SSDGS__TR
@@ -11751,7 +11543,6 @@ static const ssdgs__kernels F(kernels) = {F(project),
 #undef VDOT3
 #undef F
 #undef SSDGS__BY_HEIGHT
-#undef SSDGS__DENSE_BF16
 #undef SSDGS__FN
 #undef SSDGS__TRAINS
 #undef SSDGS__FI

@@ -214,14 +214,9 @@ PEAK(peak_avx2, SSDGS__ATTRIBUTE("avx2,fma"), __m256, _mm256_loadu_ps, _mm256_fm
 #if SSDGS__X86 >= 3
 PEAK(peak_avx512, SSDGS__ATTRIBUTE("avx512f"), __m512, _mm512_loadu_ps, _mm512_fmadd_ps(sum[i], x, x))
 #endif
-#if SSDGS__BF16
-PEAK(peak_bf16, SSDGS__ATTRIBUTE("avx512f,avx512bf16"), __m512, _mm512_loadu_ps,
-     _mm512_dpbf16_ps(sum[i], (__m512bh)_mm512_castps_si512(x), (__m512bh)_mm512_castps_si512(x)))
-#endif
 #if SSDGS__NEON
 PEAK(peak_neon, , float32x4_t, vld1q_f32, vfmaq_f32(x, sum[i], x))
 #endif
-enum { BF16 = SSDGS_ISA_COUNT };
 static const struct {
     int isa;
     float (*work)(long);
@@ -236,9 +231,6 @@ static const struct {
 #if SSDGS__X86 >= 3
              {SSDGS_ISA_AVX512, peak_avx512, 12 * 16 * 2},
 #endif
-#if SSDGS__BF16
-             {BF16, peak_bf16, 12 * 16 * 4},
-#endif
 #if SSDGS__NEON
              {SSDGS_ISA_NEON, peak_neon, 12 * 4 * 2},
 #endif
@@ -249,7 +241,6 @@ static const struct {
 typedef struct network {
     int sizes[SSDGS_MAX_LAYERS + 1], layers;
     ssdgs_real *weights, *gradient, *inputs, *outputs, *output_gradient, *d, *spare, *transposed;
-    uint32_t *packed, *pairs;
     ssdgs__row_lists *lists;
     double operations; /* of a block's forward; the backward's are twice as many */
 } network;
@@ -288,9 +279,6 @@ static network make_network(ssdgs_model *model) {
     n.inputs = n.transposed + widest * SSDGS__BLOCK;
     n.outputs = n.inputs + widest * SSDGS__BLOCK;
     n.gradient = take(model->context, ssdgs__slot_gradient_size(n.sizes, n.layers));
-    n.packed =
-        (uint32_t *)make(ssdgs__network_count(&model->settings, 0) + widest * SSDGS__BLOCK, sizeof(uint32_t));
-    n.pairs = ssdgs__pack_weights(n.sizes, n.layers, n.weights, n.packed);
     for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
         n.inputs[i] = (ssdgs_real)(2 * ssdgs__uniform(1, i) - 1);
     for (i = 0; i < (size_t)n.sizes[n.layers] * SSDGS__BLOCK; i++)
@@ -299,7 +287,7 @@ static network make_network(ssdgs_model *model) {
 }
 
 /* Work that is repeated until a clock can time it, on each of the context's threads. */
-typedef enum kind { PEAK_RATE, READ, FORWARD, FORWARD_BF16, BACKWARD } kind;
+typedef enum kind { PEAK_RATE, READ, FORWARD, BACKWARD } kind;
 typedef struct kernel {
     kind work;
     ssdgs_context *context;
@@ -323,10 +311,7 @@ static void kernel_task(void *data, int task) {
     else
         for (r = 0; r < job->repeat; r++) switch (job->work) {
             case FORWARD:
-            case FORWARD_BF16:
-                ssdgs__network_forward(k, n->sizes, n->layers, n->weights,
-                                       job->work == FORWARD ? NULL : n->packed, n->pairs, n->lists, n->inputs,
-                                       n->outputs);
+                ssdgs__network_forward(k, n->sizes, n->layers, n->weights, n->lists, n->inputs, n->outputs);
                 break;
             case BACKWARD:
                 memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
@@ -603,7 +588,7 @@ static const char *name_of(char text[48], const session *s,
 
 /* Peaks of the chip and its memory. */
 static void measure_machine(bench *b) {
-    table *t = new_table(b, "machine", "fma_gflops bf16_gflops read_gb_per_s");
+    table *t = new_table(b, "machine", "fma_gflops read_gb_per_s");
     const size_t words = (size_t)1 << (b->quick ? 25 : 27); /* 256 MiB, 1 GiB: far beyond the caches */
     uint64_t *memory = (uint64_t *)make(words, sizeof *memory);
     char name[48];
@@ -611,19 +596,17 @@ static void measure_machine(bench *b) {
     memset(memory, 1, words * sizeof *memory); /* else all its pages are one of zeros */
     for (i = 0; i < b->isa_count * b->thread_count; i++) {
         const int isa = b->isas[i / b->thread_count];
-        kernel kernels[3];
+        kernel kernels[2];
         session s;
         open_session(b, &s, isa, b->threads[i % b->thread_count], 0, NULL);
-        kernels[0] = kernels[2] = make_kernel(PEAK_RATE, s.context, isa, NULL);
-        kernels[1] = make_kernel(PEAK_RATE, s.context, s.context->bf16 ? BF16 : isa, NULL);
-        kernels[2].work = READ;
-        kernels[2].words = memory;
-        kernels[2].share = words / (size_t)s.context->threads / 8 * 8;
-        kernels[2].operations = 8.0 * (double)kernels[2].share * s.context->threads;
-        n = isa == b->best_isa ? 3 : 2;
+        kernels[0] = kernels[1] = make_kernel(PEAK_RATE, s.context, isa, NULL);
+        kernels[1].work = READ;
+        kernels[1].words = memory;
+        kernels[1].share = words / (size_t)s.context->threads / 8 * 8;
+        kernels[1].operations = 8.0 * (double)kernels[1].share * s.context->threads;
+        n = isa == b->best_isa ? 2 : 1;
         time_kernels(kernels, n, b->quick ? 0.1 : 0.5);
-        add_row(t, name_of(name, &s, NULL), kernels[0].best, s.context->bf16 ? kernels[1].best : none,
-                n > 2 ? kernels[2].best : none);
+        add_row(t, name_of(name, &s, NULL), kernels[0].best, n > 1 ? kernels[1].best : none);
         close_session(&s);
     }
     n = t->row_count -
@@ -637,36 +620,30 @@ static void measure_machine(bench *b) {
 /* The scattering network's layers on one thread, against that thread's peak in the same seconds. */
 static void measure_layers(bench *b) {
     table *t = new_table(b, "layers",
-                         "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak "
-                         "bf16_peak bf16_gflops bf16_of_peak");
-    int i, bf16;
+                         "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak");
+    int i;
     for (i = 0; i < b->isa_count; i++) {
-        kernel k[5];
+        kernel k[3];
         const double *v;
         session s;
         network n;
         open_session(b, &s, b->isas[i], 1, 0, NULL);
-        bf16 = s.context->bf16;
         n = make_network(s.model);
         k[0] = make_kernel(PEAK_RATE, s.context, b->isas[i], NULL);
         k[1] = make_kernel(FORWARD, s.context, b->isas[i], &n);
         k[2] = make_kernel(BACKWARD, s.context, b->isas[i], &n);
-        k[3] = make_kernel(PEAK_RATE, s.context, bf16 ? BF16 : b->isas[i], NULL);
-        k[4] = make_kernel(FORWARD_BF16, s.context, b->isas[i], &n);
-        time_kernels(k, bf16 ? 5 : 3, b->quick ? 0.5 : 2);
+        time_kernels(k, 3, b->quick ? 0.5 : 2);
         v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best,
                     k[1].best / k[0].best, k[2].best / k[0].best,
-                    3 / (1 / k[1].best + 2 / k[2].best) / k[0].best, bf16 ? k[3].best : none,
-                    bf16 ? k[4].best : none, bf16 ? k[4].best / k[3].best : none);
+                    3 / (1 / k[1].best + 2 / k[2].best) / k[0].best);
         if (b->isas[i] == b->best_isa) /* of one thread, all of them */
             add_facts(b,
                       "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
                       "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak",
-                      v[0], v[5], v[3], v[4], v[8]);
+                      v[0], v[5], v[3], v[4], none); /* the library has no bf16 networks any more */
         ssdgs__release(s.context, n.weights);
         ssdgs__release(s.context, n.output_gradient);
         ssdgs__release(s.context, n.gradient);
-        free(n.packed);
         free(n.lists);
         close_session(&s);
     }
@@ -741,7 +718,6 @@ static const struct {
     double values[6];
 } knobs[] = {{"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}},
              {"light_detail", {0.8, 0.6, 0.5, 0.35}},
-             {"bf16", {1}},
              {"stop", {1e-3, 4e-3, 0.01, 0.03}},
              {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}};
 enum { KNOBS = sizeof knobs / sizeof *knobs };
@@ -761,11 +737,10 @@ static void measure_sweep(bench *b) {
     for (k = 0; k < KNOBS; k++)
         for (i = 0; knobs[k].values[i] > 0; i++, count++) {
             ssdgs_render_options *o = options + count;
-            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, NULL, &o->stop,
+            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, &o->stop,
                                                &o->alpha_threshold};
             *o = preset(EXACT);
-            if (fields[k]) *fields[k] = (ssdgs_real)knobs[k].values[i];
-            else o->bf16 = 1;
+            *fields[k] = (ssdgs_real)knobs[k].values[i];
             snprintf(names[count], sizeof *names, "%s %g", knobs[k].name, knobs[k].values[i]);
         }
     open_session(b, &s, b->best_isa, 0, 0, NULL);
@@ -1010,7 +985,6 @@ static const struct {
 } looks[KNOBS] = {/* inks that read on white and on black */
                   {"#d1495b", "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"},
                   {"#3d85c6", "m-3.5 -3.5h7v7h-7z"},
-                  {"#8e6bbf", "m0 -5l5 5l-5 5l-5 -5z"},
                   {"#2a9d6f", "m0 -5l5 9h-10z"},
                   {"#d98a1f", "m0 5l5 -9h-10z"}};
 enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };

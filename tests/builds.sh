@@ -15,6 +15,8 @@ for option in STATIC NO_STDIO NO_THREADS NO_TRAINER NO_SIMD NO_AVX2 NO_AVX512 RE
     check "SSDGS_$option" "$output"
     [ $option != STATIC ] || check "exported with SSDGS_STATIC" "$(exported "$build/option.o")"
 done
+output=$("$@" -USSDGS_SCALAR -c tests/multi_a.c -o "$build/option.o" 2>&1) && output= || output=${output:-no message}
+check "without SSDGS_SCALAR" "$output"
 output=$("$@" -Dnear= -Dfar= -DNEAR= -DFAR= -DIN= -DOUT= -DOPTIONAL= -DPLANES=14 -DERROR=0 -Dsmall=char -Dinterface=struct \
     -c tests/multi_a.c -o "$build/option.o" 2>&1) && output= || output=${output:-no message}
 check "a name that Windows' headers take" "$output"

@@ -177,8 +177,6 @@ dipoles() {
     head_line 'form' paper
     row 'Jensen et al. 2001' '' default
     row 'eq. 5 as printed' '' printed --set dipole=1
-    row 'as released' '' released --set dipole=2
-    row "Burley's profile" '' burley --set dipole=3
 }
 
 changes() {

@@ -65,7 +65,7 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
     part golden 'Golden values and gradients, float' "$build/t_golden"
     part golden_64 'The same sources in double' "$build/t_golden_64"
     part accuracy 'Elementary functions' "$build/t_accuracy" full
-    part shading 'atan2, encoding, dipole, ASG, Fresnel' "$build/t_accuracy" shading
+    part shading 'encoding, dipole, ASG, Fresnel' "$build/t_accuracy" shading
     part brute 'Both passes against brute force' "$build/t_brute" full
     part gradient 'The whole backward pass against central differences, in double' "$build/t_gradient"
     part stress 'Stress: geometry, rasteriser, light, shading' "$build/t_stress"

@@ -327,21 +327,8 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
             double r[9], p[3];
             rotation((double)q[0], (double)q[1], (double)q[2], (double)q[3], r);
             for (i = 0; i < 3; i++) p[i] = r[i] * local[0] + r[3 + i] * local[1] + r[6 + i] * local[2];
-            if (s.settings.asg == SSDGS_ASG_GEOMETRIC) {
-                d += g->weight[j] *
-                     exp(-exp((double)sharp[0]) * p[0] * p[0] - exp((double)sharp[1]) * p[1] * p[1]);
-            } else {
-                const double theta = acos(p[2] < -1  ? -1
-                                          : p[2] > 1 ? 1
-                                                     : p[2]),
-                             in_plane = sqrt(p[0] * p[0] + p[1] * p[1]);
-                const double x = p[0] / in_plane / (10 * sigmoid((double)sharp[0]));
-                const double y = p[1] / in_plane / (10 * sigmoid((double)sharp[1]));
-                const double width =
-                    sigmoid((double)s.sigma[j]) * softplus(-2 + 2.0 * j / (SSDGS_ASG_COUNT - 1));
-                d += g->weight[j] * exp(-0.5 * pow(theta / width, 2) * (x * x + y * y)) /
-                     (sqrt(2.0) * pow(PI, 2.0 / 3) * width);
-            }
+            d += g->weight[j] *
+                 exp(-exp((double)sharp[0]) * p[0] * p[0] - exp((double)sharp[1]) * p[1] * p[1]);
         }
         fresnel = 0.04 + 0.96 * pow(1 - dot(wo, h), 5);
         diffuse = dot(n, wi) > 0 ? dot(n, wi) / PI : 0;
@@ -554,7 +541,7 @@ static void camera_scene(int index) {
         s.camera.cy += (ssdgs_real)uniform(-30, 30);
     }
     if (index % 4 == 3) s.camera.near_plane = (ssdgs_real)uniform(0.5, 2.5); /* through the scene */
-    s.settings.asg = index % 3;
+    s.settings.asg = index % 3 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC;
     if (index % 5 == 1) s.options.antialias = 1;
     if (index % 7 == 1) s.options.alpha_threshold = 0;
     if (index % 11 == 1) s.options.stop = 0;

@@ -240,7 +240,7 @@ static void test_walk(void) {
             case 11: options.stop = PICK(2) ? 0 : value / 50; break;
             case 12: options.antialias = PICK(2); break;
             case 13: options.background[PICK(3)] = value; break;
-            case 14: options.bf16 = PICK(2); break;
+            case 14: options.terms = SSDGS_ALL_TERMS; break;
             case 15:
                 for (i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light);
                 break;
@@ -449,7 +449,7 @@ static void test_dead_neurons(void) {
             if (part) k.live_rows = all_rows;
             ssdgs__row_lists_fill(&lists);
             memset(gradient[part], 0, sizeof gradient[part]);
-            ssdgs__network_forward(&k, sizes, 3, weights, NULL, NULL, &lists, inputs, outputs[part]);
+            ssdgs__network_forward(&k, sizes, 3, weights, &lists, inputs, outputs[part]);
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
             for (i = 0; i < OUTS * SSDGS__BLOCK; i++)
                 d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);

@@ -272,7 +272,7 @@ static ssdgs_result frame(int large) { /* the large one asks for more of everyth
     int i;
     for (i = 0; i < 3; i++) lights[i] = photos[i].light;
     if (!large) camera.width = camera.height = SIDE / 2; /* a corner */
-    o.antialias = o.bf16 = large;
+    o.antialias = large;
     memset(&image, 0, sizeof image);
     memset(planes, 0, sizeof planes);
     image.color = planes[0];

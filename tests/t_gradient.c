@@ -578,8 +578,7 @@ int main(void) {
     s = base, s.name = "geometric ASG, shadow on scattering", s.settings.asg = SSDGS_ASG_GEOMETRIC,
     s.settings.shadow_on_scattering = 1;
     run(&s);
-    s = base, s.name = "angular ASG, Burley, early stop", s.settings.asg = SSDGS_ASG_ANGULAR,
-    s.settings.dipole = SSDGS_DIPOLE_BURLEY;
+    s = base, s.name = "geometric ASG, early stop", s.settings.asg = SSDGS_ASG_GEOMETRIC;
     s.options.stop = 0.4;
     run(&s);
     s = base, s.name = "printed dipole, scalar optics, plain shadow network",
@@ -587,8 +586,7 @@ int main(void) {
     s.settings.per_channel_optics = s.settings.residual_shadow = s.settings.depth_cue = 0,
     s.settings.shadow_on_scattering = 1;
     run(&s);
-    s = base, s.name = "released dipole, shadow on scattering, no shadow network, a wall",
-    s.settings.dipole = SSDGS_DIPOLE_RELEASED, s.wall = 1;
+    s = base, s.name = "shadow on scattering, no shadow network, a wall", s.wall = 1;
     s.settings.shadow_on_scattering = 1, s.settings.shadow_layers = 0;
     run(&s);
     s = base, s.name = "shadow network of one layer", s.settings.shadow_layers = 1;

@@ -63,7 +63,7 @@ static ssdgs_model *make_model(int count) {
     settings.scattering_width = 2;
     settings.shadow_width = 3;
     settings.view_octaves = settings.light_octaves = 4; /* as before there were such settings */
-    settings.dipole = SSDGS_DIPOLE_BURLEY;
+    settings.dipole = SSDGS_DIPOLE_PRINTED;
     settings.centre[1] = (ssdgs_real)(float)-0.3;
     settings.eta = (ssdgs_real)(float)1.3;
     settings.pixel_variance = (ssdgs_real)(float)0.7;

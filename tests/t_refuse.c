@@ -21,7 +21,7 @@ static const field settings_fields[] = {
     I(terms, 0, 15),
     I(baked, 0, 1),
     I(transfer, 0, 1),
-    I(dipole, 0, 3),
+    I(dipole, 0, 1),
     I(asg, 0, 2),
     I(per_channel_optics, 0, 1),
     I(depth_cue, 0, 1),

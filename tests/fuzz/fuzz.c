@@ -95,8 +95,8 @@ static ssdgs_settings draw_settings(input *in) {
     s.residual_shadow ^= flags >> 4 & 1;
     s.shadow_on_scattering ^= flags >> 5 & 1;
     s.light_blur ^= flags >> 6 & 1;
-    s.dipole = draw_below(in, 4);
-    s.asg = draw_below(in, 3);
+    s.dipole = draw_below(in, 2);
+    s.asg = draw_below(in, 2) ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC;
     s.scattering_layers = 2 + draw_below(in, 3);
     s.scattering_width = 1 + draw_below(in, 20);
     s.shadow_layers = draw_below(in, 4);
@@ -218,7 +218,6 @@ static void draw_picture(input *in, picture *p) {
     *o = draw(in) & 1 ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     o->terms ^= draw_below(in, 16);
     o->antialias = draw(in) & 1;
-    o->bf16 = draw(in) & 1;
     o->stop = draw_real(in, (double)o->stop, 1);
     o->alpha_threshold = draw_real(in, (double)o->alpha_threshold, 1);
     o->max_error = draw_real(in, (double)o->max_error, 1);
