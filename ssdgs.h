@@ -640,13 +640,13 @@ typedef struct ssdgs_render_stats {
     int gaussians;       /* in the model */
     int visible;         /* inside the camera's frustum */
     int shaded;          /* contributing to a pixel; 1 at least where any is glimpsed */
-    int glimpsed;        /* contributing, but left unshaded within max_error */
+    int skipped;         /* contributing, but left unshaded within max_error */
     int rejected;        /* never drawn: position or rotation is not finite, scale or opacity is NaN */
     int blackened;       /* drawn black: the colour is not finite */
     int light_views;     /* light maps in use */
-    int camera_kept;     /* 1: projection, order, tiles and what the camera sees are the last frame's */
-    int lights_kept;     /* 1: so is the light pass */
-    int shadows_kept;    /* Gaussians x lights whose shadow network did not run again */
+    int camera_cached;   /* 1: projection, order, tiles and what the camera sees are the last frame's */
+    int lights_cached;   /* 1: so is the light pass */
+    int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done, neurons dead in a block left out */
     size_t instances;    /* (tile, splat) pairs of the camera */
 } ssdgs_render_stats;
@@ -855,7 +855,7 @@ typedef struct ssdgs_instances {
     uint32_t first, count;
 } ssdgs_instances;
 
-enum { SSDGS_SEEN = 1, SSDGS_GLIMPSED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
+enum { SSDGS_SEEN = 1, SSDGS_SKIPPED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
 typedef struct ssdgs_splat_view {
@@ -865,7 +865,7 @@ typedef struct ssdgs_splat_view {
     int orthographic;
     ssdgs_real distance; /* of a point light seen as a parallel one, else 1 */
     int by_distance;     /* order by distance, not by depth */
-    int kept;            /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
+    int cached;          /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
     int compensate;      /* opacity compensated for the blur */
     int blur;            /* ssdgs_blur */
     ssdgs_real variance; /* px^2, of the blur */
@@ -891,10 +891,10 @@ typedef struct ssdgs_splat_view {
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
     ssdgs_real *tile_sums; /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
     ssdgs_real
-        *falls; /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each the
-                   distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5, 0.1,
-                   or 1e30; what is left after the first two falls, what there was before the last two, and
-                   what is left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
+        *light_map; /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each
+                   the distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5,
+                   0.1, or 1e30; what is left after the first two falls, what there was before the last two,
+                   and what is left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -913,7 +913,7 @@ typedef struct ssdgs_frame {
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
-    unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_GLIMPSED or 0 */
+    unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
     ssdgs_real *visibility; /* (lights, n) eq. 7 */
     ssdgs_real *depth_cue;  /* (lights, n) world units */
     ssdgs_real
@@ -1145,13 +1145,13 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__MAX_SIDE (1 << 15) /* px of an image */
 #define SSDGS__MOST_LIGHT 1e30    /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
-#define SSDGS__FALLS 3 /* levels of transmittance below which a light's map says where it falls */
+#define SSDGS__MAP_STEPS 3 /* levels of transmittance below which a light's map says where it falls */
 enum { /* a map's pixel: distances of the falls, what is left after the first of them, what there was before
           the others, and behind all */
-       SSDGS__LEFT = SSDGS__FALLS,
-       SSDGS__BEFORE = 2 * SSDGS__FALLS - 1,
-       SSDGS__BEHIND = 3 * SSDGS__FALLS - 2,
-       SSDGS__FALL_VALUES
+       SSDGS__LEFT = SSDGS__MAP_STEPS,
+       SSDGS__BEFORE = 2 * SSDGS__MAP_STEPS - 1,
+       SSDGS__BEHIND = 3 * SSDGS__MAP_STEPS - 2,
+       SSDGS__MAP_VALUES
 };
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
@@ -1196,7 +1196,7 @@ typedef struct ssdgs__tile {
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
     int cue, flux, orthographic; /* whether the light pass finds them */
-    ssdgs_real *falls;           /* of the tile in a light's map, or NULL */
+    ssdgs_real *light_map;       /* of the tile in a light's map, or NULL */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -1275,7 +1275,8 @@ static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5,  4.5,  4.
 #if SSDGS__NEON
 static const uint32_t ssdgs__lane_bits[4] = {1, 2, 4, 8};
 #endif
-static const ssdgs_real ssdgs__fall[SSDGS__FALLS] = {(ssdgs_real)0.9, (ssdgs_real)0.5, (ssdgs_real)0.1};
+static const ssdgs_real ssdgs__map_level[SSDGS__MAP_STEPS] = {(ssdgs_real)0.9, (ssdgs_real)0.5,
+                                                              (ssdgs_real)0.1};
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {
     (ssdgs_real)0.00102838008447911,  (ssdgs_real)0.007598758135239185, (ssdgs_real)0.03600077212843083,
@@ -1313,33 +1314,33 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 
 /* ---- a light's map of where transmittance falls ---- */
 
-/* At a distance, the transmittances of the lanes in `bits` have fallen below their next level or several,
+/* At a distance, the transmittances of the lanes in `bits` have steps below their next level or several,
    from t to `left`. */
-static void ssdgs__falls_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t,
-                              const ssdgs_real *left, ssdgs_real distance, ssdgs_real *next,
-                              unsigned char *level) {
+static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t,
+                                  const ssdgs_real *left, ssdgs_real distance, ssdgs_real *next,
+                                  unsigned char *level) {
     for (; bits; bits &= bits - 1) {
         const int lane = ssdgs__lowest_bit(bits);
-        ssdgs_real *at = tile->falls + (16 * micro + lane) * SSDGS__FALL_VALUES;
+        ssdgs_real *at = tile->light_map + (16 * micro + lane) * SSDGS__MAP_VALUES;
         int l = level[lane];
-        for (; l < SSDGS__FALLS && left[lane] < ssdgs__fall[l]; l++) {
+        for (; l < SSDGS__MAP_STEPS && left[lane] < ssdgs__map_level[l]; l++) {
             at[l] = distance;
-            if (l < SSDGS__FALLS - 1) at[SSDGS__LEFT + l] = left[lane];
+            if (l < SSDGS__MAP_STEPS - 1) at[SSDGS__LEFT + l] = left[lane];
             if (l) at[SSDGS__BEFORE + l - 1] = t[lane];
         }
         level[lane] = (unsigned char)l;
-        next[lane] = l < SSDGS__FALLS ? ssdgs__fall[l] : -1;
+        next[lane] = l < SSDGS__MAP_STEPS ? ssdgs__map_level[l] : -1;
     }
 }
 
 /* Closes the list of each pixel, of `levels` so far. */
-static void ssdgs__falls_end(const ssdgs__tile *tile, const unsigned char *levels,
-                             const ssdgs_real *transmittance) {
+static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *levels,
+                                 const ssdgs_real *transmittance) {
     int i;
     for (i = 0; i < 256; i++) {
-        ssdgs_real *at = tile->falls + i * SSDGS__FALL_VALUES;
+        ssdgs_real *at = tile->light_map + i * SSDGS__MAP_VALUES;
         int l;
-        for (l = levels[i]; l < SSDGS__FALLS; l++) at[l] = SSDGS__NEVER;
+        for (l = levels[i]; l < SSDGS__MAP_STEPS; l++) at[l] = SSDGS__NEVER;
         at[SSDGS__BEHIND] = transmittance[i];
     }
 }
@@ -2496,20 +2497,20 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
 
 typedef struct ssdgs__view_memory {
     ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
-        sums, falls;
+        sums, light_map;
     ssdgs__buffer histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
 /* What the last frame was of: as long as that stays, what was found for it does. */
-typedef struct ssdgs__kept {
+typedef struct ssdgs__cache {
     uint64_t revision; /* of the model; 0 = nothing is kept */
     ssdgs_camera camera;
     ssdgs_render_options options;
     int terms, light_count;
     int camera_ready, lights_ready, shadows_ready, transport_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
-} ssdgs__kept;
+} ssdgs__cache;
 
 typedef struct ssdgs__bounds { /* what the light's map must cover, and how finely */
     double low[3], high[3], log_scale;
@@ -2522,10 +2523,10 @@ typedef struct ssdgs__frame_memory {
     ssdgs__buffer flux, nodes, sources, lightings, activations, scratch, slots, lane_slots, view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target, normals, kept_lights, shadow_logit, shadow_known, transport,
+    ssdgs__buffer bounds, image, target, normals, cached_lights, shadow_logit, shadow_known, transport,
         transport_known;
     int view_room;
-    ssdgs__kept kept;
+    ssdgs__cache cache;
     ssdgs__bounds scene;
 } ssdgs__frame_memory;
 
@@ -2899,26 +2900,26 @@ static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
 
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
    time, and what hooks leave is theirs. */
-static void ssdgs__compare_kept(ssdgs_frame *frame) {
-    ssdgs__kept *kept = &frame->memory->kept;
-    const ssdgs_render_options *now = &frame->options, *old = &kept->options;
-    const ssdgs_light *lights = (const ssdgs_light *)frame->memory->kept_lights.memory;
-    const ssdgs_camera *a = &frame->camera, *b = &kept->camera;
-    int known = !frame->training && kept->revision == frame->model->revision, i, j;
+static void ssdgs__compare_cache(ssdgs_frame *frame) {
+    ssdgs__cache *cache = &frame->memory->cache;
+    const ssdgs_render_options *now = &frame->options, *old = &cache->options;
+    const ssdgs_light *lights = (const ssdgs_light *)frame->memory->cached_lights.memory;
+    const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
+    int known = !frame->training && cache->revision == frame->model->revision, i, j;
     for (i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
-    kept->revision = frame->training ? 0 : frame->model->revision;
+    cache->revision = frame->training ? 0 : frame->model->revision;
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
-    kept->bounds_ready = kept->bounds_ready && known;
-    kept->camera_ready = kept->camera_ready && known && a->width == b->width && a->height == b->height &&
-                         now->antialias == old->antialias &&
-                         !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
-                         !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
-                         !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
-    known = known && kept->lights_ready && frame->light_count == kept->light_count &&
+    cache->bounds_ready = cache->bounds_ready && known;
+    cache->camera_ready = cache->camera_ready && known && a->width == b->width && a->height == b->height &&
+                          now->antialias == old->antialias &&
+                          !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
+                          !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
+                          !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+    known = known && cache->lights_ready && frame->light_count == cache->light_count &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
-            ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, kept->terms) &&
-            !(frame->terms & ~kept->terms &
+            ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
+            !(frame->terms & ~cache->terms &
               (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
     for (i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
@@ -2926,13 +2927,13 @@ static void ssdgs__compare_kept(ssdgs_frame *frame) {
             known =
                 known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
     }
-    kept->lights_ready = known;
-    kept->shadows_ready = kept->shadows_ready && known;
-    kept->transport_ready = kept->transport_ready && known;
-    kept->camera = *a;
-    kept->options = *now;
-    kept->terms = frame->terms;
-    kept->light_count = frame->light_count;
+    cache->lights_ready = known;
+    cache->shadows_ready = cache->shadows_ready && known;
+    cache->transport_ready = cache->transport_ready && known;
+    cache->camera = *a;
+    cache->options = *now;
+    cache->terms = frame->terms;
+    cache->light_count = frame->light_count;
 }
 
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
@@ -2941,7 +2942,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
                                        const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
-    ssdgs_light *kept_lights;
+    ssdgs_light *cached_lights;
     ssdgs_result result;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
     size_t pixels;
@@ -2958,7 +2959,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     for (i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
-    if (m->kept.revision != model->revision) {
+    if (m->cache.revision != model->revision) {
         result = ssdgs__globals_check(model);
         if (result) return result;
     }
@@ -2977,14 +2978,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
     needs_light = ssdgs__needs_light(frame, frame->terms);
-    ssdgs__compare_kept(frame);
+    ssdgs__compare_cache(frame);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
-        if (!m->kept.bounds_ready) {
+        if (!m->cache.bounds_ready) {
             result =
                 ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
             if (result) return result;
-            m->kept.bounds_ready = m->kept.revision != 0;
+            m->cache.bounds_ready = m->cache.revision != 0;
         }
         for (i = 0; i < frame->light_count; i++)
             frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i,
@@ -2994,9 +2995,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (result) return result;
     if (m->views.bytes <
         (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
-        m->kept.camera_ready = m->kept.lights_ready = m->kept.shadows_ready = m->kept.transport_ready = 0;
+        m->cache.camera_ready = m->cache.lights_ready = m->cache.shadows_ready =
+            m->cache.transport_ready = 0;
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    if (!m->kept.camera_ready) {
+    if (!m->cache.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
         frame->views[0].light = -1;
         frame->views[0].width = camera->width;
@@ -3013,14 +3015,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
-    for (i = 0, j = 1; needs_light && i < frame->light_count && !m->kept.lights_ready; i++)
+    for (i = 0, j = 1; needs_light && i < frame->light_count && !m->cache.lights_ready; i++)
         j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
                                 i, frame->views + j);
-    frame->views[0].kept = m->kept.camera_ready;
-    for (i = 1; i < frame->view_count; i++) frame->views[i].kept = m->kept.lights_ready;
-    m->kept.camera_ready = m->kept.lights_ready = 0; /* again once the walks are done */
-    SSDGS__RESERVE(m->kept_lights, kept_lights, ssdgs_light, frame->light_count + 1);
-    for (i = 0; i < frame->light_count; i++) kept_lights[i] = lights[i];
+    frame->views[0].cached = m->cache.camera_ready;
+    for (i = 1; i < frame->view_count; i++) frame->views[i].cached = m->cache.lights_ready;
+    m->cache.camera_ready = m->cache.lights_ready = 0; /* again once the walks are done */
+    SSDGS__RESERVE(m->cached_lights, cached_lights, ssdgs_light, frame->light_count + 1);
+    for (i = 0; i < frame->light_count; i++) cached_lights[i] = lights[i];
     pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -3102,7 +3104,7 @@ static void ssdgs__project_task(void *data, int index) {
     const ssdgs__projection p = ssdgs__projection_of(frame, v);
     const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
                  end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
-    if (v->kept) return;
+    if (v->cached) return;
     frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record,
                                v->depth);
 }
@@ -3134,7 +3136,7 @@ static void ssdgs__sort_task(void *data, int index) {
              *to = from + n, *swap;
     uint32_t *histogram = (uint32_t *)(to + n);
     int i, pass, visible = 0;
-    if (v->kept) return;
+    if (v->cached) return;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
     for (i = 0; i < n; i++) {
         const float depth = (float)v->depth[i];
@@ -3206,7 +3208,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     uint64_t room = 0;
     int begin, end, g;
-    if (v->kept) return;
+    if (v->cached) return;
     ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
     for (g = begin; g < end; g++) {
         uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
@@ -3227,7 +3229,7 @@ static void ssdgs__bin_task(void *data, int index) {
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     int begin, end;
-    if (frame->views[view].kept) return;
+    if (frame->views[view].cached) return;
     ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
     frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
                            begin, end, (uint32_t)m->chunk_room[chunk]);
@@ -3249,7 +3251,7 @@ static void ssdgs__bin_count_task(void *data, int index) {
     ssdgs_instances *of_rank = (ssdgs_instances *)m->of_rank.memory;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk), i;
     int begin, end, rank, ahead;
-    if (v->kept) return;
+    if (v->cached) return;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
     ssdgs__bin_range(v->visible, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
@@ -3269,7 +3271,7 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
     const int tiles = v->tiles_x * v->tiles_y;
     uint32_t sum = 0;
     int tile, chunk;
-    if (v->kept) return;
+    if (v->cached) return;
     for (tile = 0; tile < tiles; tile++) {
         v->tile_start[tile] = sum;
         for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
@@ -3291,7 +3293,7 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_splat_view *v = frame->views + view;
     uint32_t *place = ssdgs__histogram(frame, view, chunk), i;
     int begin, end, rank;
-    if (v->kept) return;
+    if (v->cached) return;
     ssdgs__bin_range(v->visible, chunk, &begin, &end);
     for (rank = begin; rank < end; rank++) {
         const ssdgs_instances of = of_rank[rank];
@@ -3324,7 +3326,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
         ssdgs_instances *of_rank;
         uint32_t *histogram;
         uint64_t room = 0, chunk_room;
-        if (v->kept) continue;
+        if (v->cached) continue;
         for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first number */
             chunk_room = m->chunk_room[chunk];
             m->chunk_room[chunk] = room;
@@ -3381,7 +3383,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
-    t.falls = v->falls ? v->falls + (size_t)index * 256 * SSDGS__FALL_VALUES : NULL;
+    t.light_map = v->light_map ? v->light_map + (size_t)index * 256 * SSDGS__MAP_VALUES : NULL;
     return t;
 }
 
@@ -3389,7 +3391,8 @@ static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
     ssdgs__tile tile;
-    for (; v->kept || index >= v->tiles_x * v->tiles_y; v++) index -= v->kept ? 0 : v->tiles_x * v->tiles_y;
+    for (; v->cached || index >= v->tiles_x * v->tiles_y; v++)
+        index -= v->cached ? 0 : v->tiles_x * v->tiles_y;
     tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
     if (v->light < 0)
@@ -3441,7 +3444,7 @@ static void ssdgs__gather_camera_task(void *data, int index) {
             seen |= v->tile_seen[place];
             needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
         }
-        frame->seen[g] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_GLIMPSED : 0);
+        frame->seen[g] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_SKIPPED : 0);
     }
 }
 
@@ -3452,7 +3455,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     for (i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
-        if (v->kept) continue;
+        if (v->cached) continue;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
             SSDGS__RESERVE(m->seen, v->tile_seen, uint16_t, v->instances + 1);
@@ -3461,25 +3464,25 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
                 SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
         } else {
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
-            v->falls = NULL;
+            v->light_map = NULL;
             if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
-                SSDGS__RESERVE(m->falls, v->falls, ssdgs_real,
-                               (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__FALL_VALUES);
+                SSDGS__RESERVE(m->light_map, v->light_map, ssdgs_real,
+                               (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__MAP_VALUES);
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
-    if (!frame->views->kept) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
+    if (!frame->views->cached) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
     job.frame = frame;
     job.end_view = 1;
     for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count &&
-                        !frame->views[job.end_view].kept;
+                        !frame->views[job.end_view].cached;
          job.light++) {
         job.first_view = job.end_view;
         while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light)
             job.end_view++;
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
     }
-    frame->memory->kept.camera_ready = frame->memory->kept.lights_ready = 1;
+    frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
     return SSDGS_OK;
 }
 
@@ -3757,7 +3760,7 @@ static void ssdgs__transport_task(void *data, int slot) {
 /* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
 static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
     ssdgs_context *context = frame->context;
-    ssdgs__kept *kept = &frame->memory->kept;
+    ssdgs__cache *cache = &frame->memory->cache;
     ssdgs__transport_job job;
     size_t blocks, first[SSDGS__LEVELS + 1];
     job.frame = frame;
@@ -3770,12 +3773,12 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
     job.nodes = (const ssdgs__node *)frame->memory->nodes.memory;
     job.node_count = first[ssdgs__levels((size_t)frame->gaussians.count, first)];
-    if (!kept->transport_ready) {
+    if (!cache->transport_ready) {
         const ssdgs_result result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
         if (result) return result;
         memset(job.known, 0, blocks);
     }
-    kept->transport_ready = 1;
+    cache->transport_ready = 1;
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
     return SSDGS_OK;
@@ -3921,14 +3924,14 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
 typedef struct ssdgs__row_lists {
     uint16_t all[1024], in[1024], out[1024];
     uint64_t multiplied, multipliable; /* per Gaussian of a block: done, and of all neurons */
-    int shadows_kept;
+    int shadows_cached;
 } ssdgs__row_lists;
 
 static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     int i;
     for (i = 0; i < 1024; i++) lists->all[i] = (uint16_t)i;
     lists->multiplied = lists->multipliable = 0;
-    lists->shadows_kept = 0;
+    lists->shadows_cached = 0;
 }
 
 /* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that
@@ -4248,7 +4251,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
                 ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, lists, inputs,
                                        part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
-            } else lists->shadows_kept += SSDGS__BLOCK;
+            } else lists->shadows_cached += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
@@ -4321,7 +4324,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
 
 /* Gaussians within max_error take the colour of the one shaded before them: a neighbour, as training leaves
    them. */
-static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
+static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int slot) {
     const ssdgs_frame *frame = job->frame;
     ssdgs_real *const planes[6] = {frame->color,      frame->diffuse, frame->specular,
                                    frame->scattering, frame->normal,  frame->shadow};
@@ -4334,7 +4337,7 @@ static void ssdgs__shade_glimpsed(const ssdgs__shade_job *job, int slot) {
     from = frame->shaded[begin * SSDGS__BLOCK];
     for (g = begin ? from : 0; g < last; g++) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
-        if (frame->seen[g] != SSDGS_GLIMPSED) continue;
+        if (frame->seen[g] != SSDGS_SKIPPED) continue;
         for (p = 0; p < (frame->diffuse ? 6 : 1); p++)
             memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
         for (p = 0; p < frame->layer_count; p++)
@@ -4353,10 +4356,10 @@ static void ssdgs__shade_task(void *data, int slot) {
                            job->activations +
                                job->layout.size * (size_t)(job->frame->training ? block : slot),
                            job->scratch + job->layout.scratch * (size_t)slot);
-    if (job->frame->options.max_error > 0) ssdgs__shade_glimpsed(job, slot);
+    if (job->frame->options.max_error > 0) ssdgs__shade_skipped(job, slot);
     job->counts[3 * slot] = lists.multiplied;
     job->counts[3 * slot + 1] = lists.multipliable;
-    job->counts[3 * slot + 2] = (uint64_t)lists.shadows_kept;
+    job->counts[3 * slot + 2] = (uint64_t)lists.shadows_cached;
 }
 
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
@@ -4375,16 +4378,16 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
 
 static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    ssdgs__kept *kept = &frame->memory->kept;
+    ssdgs__cache *cache = &frame->memory->cache;
     ssdgs__shade_job job;
     ssdgs_result result;
-    int glimpses = 0, i;
+    int skips = 0, i;
     frame->shaded_count = 0;
     for (i = 0; i < frame->gaussians.count; i++) {
         if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
-        else glimpses |= frame->seen[i];
+        else skips |= frame->seen[i];
     }
-    if (!frame->shaded_count && glimpses) { /* some colour is needed: the first's */
+    if (!frame->shaded_count && skips) { /* some colour is needed: the first's */
         for (i = 0; !frame->seen[i]; i++) {}
         frame->seen[i] = SSDGS_SEEN;
         frame->shaded[frame->shaded_count++] = (uint32_t)i;
@@ -4396,14 +4399,14 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     if (job.layout.shadow_layers &&
         !frame->training) { /* room from the first frame on, use from the second */
         const size_t pairs = (size_t)frame->gaussians.count * (size_t)frame->light_count;
-        const int lights_kept = frame->view_count > 1 && frame->views[1].kept;
+        const int lights_cached = frame->view_count > 1 && frame->views[1].cached;
         SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
         SSDGS__RESERVE(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
-        if (lights_kept && !kept->shadows_ready) memset(job.shadow_known, 0, pairs);
-        if (!lights_kept) job.shadow_known = NULL;
-        kept->shadows_ready = lights_kept;
+        if (lights_cached && !cache->shadows_ready) memset(job.shadow_known, 0, pairs);
+        if (!lights_cached) job.shadow_known = NULL;
+        cache->shadows_ready = lights_cached;
     }
-    job.counts = kept->counts;
+    job.counts = cache->counts;
     if (frame->flux && frame->settings.transport && frame->light_count) {
         result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
@@ -4640,19 +4643,19 @@ typedef struct ssdgs__composite_job {
 static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
                                               ssdgs_real thick) {
     const int tile = (y >> 4) * map->tiles_x + (x >> 4);
-    const ssdgs_real *falls =
-        map->falls + ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3))) *
-                         SSDGS__FALL_VALUES;
+    const ssdgs_real *steps = map->light_map + ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 |
+                                                                              (y & 3) << 2 | (x & 3))) *
+                                                   SSDGS__MAP_VALUES;
     ssdgs_real left, begin;
     int level = 0, i;
     if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
-    for (i = 0; i < SSDGS__FALLS; i++) level += distance > falls[i];
+    for (i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > steps[i];
     if (!level) return 1;
-    if (level == SSDGS__FALLS) return falls[SSDGS__BEHIND];
-    left = falls[SSDGS__LEFT + level - 1];
-    begin = falls[level] - thick > falls[level - 1] ? falls[level] - thick : falls[level - 1];
+    if (level == SSDGS__MAP_STEPS) return steps[SSDGS__BEHIND];
+    left = steps[SSDGS__LEFT + level - 1];
+    begin = steps[level] - thick > steps[level - 1] ? steps[level] - thick : steps[level - 1];
     if (distance <= begin) return left;
-    return left + (falls[SSDGS__BEFORE + level - 1] - left) * (distance - begin) / (falls[level] - begin);
+    return left + (steps[SSDGS__BEFORE + level - 1] - left) * (distance - begin) / (steps[level] - begin);
 }
 
 /* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
@@ -4686,7 +4689,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 /* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at
    their depth. Where no map knows it, that of their Gaussians. */
 static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
-                                    const ssdgs__tile *tile, const ssdgs_real *layers, ssdgs_real *sight) {
+                                    const ssdgs__tile *tile, const ssdgs_real *layers,
+                                    ssdgs_real *visibility) {
     const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
     const ssdgs_real bias = (frame->settings.light_bias + rounding) * frame->settings.length_unit;
     int first = 1, i, c, view; /* views are in the order of lights */
@@ -4696,7 +4700,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3));
         ssdgs_real y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2)), at[3], z, passed = -1;
-        sight[lane] = 1;
+        visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
         z = depth[0] / depth[32];
         x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
@@ -4705,10 +4709,10 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
             at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
         for (view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
              view++)
-            if (frame->views[view].falls) passed = ssdgs__passed_to(frame->views + view, at, bias);
-        sight[lane] = passed < 0
-                          ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
-                          : passed;
+            if (frame->views[view].light_map) passed = ssdgs__passed_to(frame->views + view, at, bias);
+        visibility[lane] = passed < 0
+                               ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
+                               : passed;
     }
 }
 
@@ -4722,7 +4726,7 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER],
         *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
-    ssdgs_real sight[SSDGS__TILE_LAYER];
+    ssdgs_real visibility[SSDGS__TILE_LAYER];
     int layer, light;
     for (layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
@@ -4738,18 +4742,19 @@ static void ssdgs__composite_task(void *data, int index) {
             for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
                 color[layer] = ssdgs__layer(frame, first - 1 + layer);
             if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
-            if (frame->visibility_given) ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, sight);
-            else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, sight);
-        } else memset(sight, 0, sizeof sight);
+            if (frame->visibility_given)
+                ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, visibility);
+            else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, visibility);
+        } else memset(visibility, 0, sizeof visibility);
         for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
             ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
-        if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, sight);
+        if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, visibility);
         if (frame->pixel_shadow) {
             const int given = frame->visibility_given != 0;
             ssdgs_real *planes[2];
             planes[0] = frame->pixel_visibility + plane;
             planes[1] = frame->pixel_shadow + plane;
-            ssdgs__tile_store(&tile, sight + 16 * given, 2 - given, planes + given);
+            ssdgs__tile_store(&tile, visibility + 16 * given, 2 - given, planes + given);
         }
     }
     ssdgs__tile_store(&tile, pixels, 4, job->planes);
@@ -4812,7 +4817,7 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     const int lit = SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER],
-        sight[SSDGS__TILE_LAYER];
+        visibility[SSDGS__TILE_LAYER];
     ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
     int layer, light, c;
     if (!tile.count) return;
@@ -4835,8 +4840,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
             for (c = 0; c < 3; c++)
                 ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c,
                                  pixels + lit + layer * SSDGS__TILE_LAYER);
-        ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, sight);
-        k->highlight_backward(job->lightings + light, &tile, pixels, sight, gradient,
+        ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
+        k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient,
                               job->highlight_sums +
                                   (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
         if (!light) continue;
@@ -5124,14 +5129,14 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
         stats->visible = frame.views[0].visible;
         stats->shaded = frame.shaded_count;
         stats->light_views = frame.view_count - 1;
-        stats->camera_kept = frame.views[0].kept;
-        stats->lights_kept = frame.view_count > 1 && frame.views[1].kept;
-        for (i = 0; i < (size_t)model->count; i++) stats->glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+        stats->camera_cached = frame.views[0].cached;
+        stats->lights_cached = frame.view_count > 1 && frame.views[1].cached;
+        for (i = 0; i < (size_t)model->count; i++) stats->skipped += frame.seen[i] == SSDGS_SKIPPED;
         for (c = 0; c < SSDGS__SLOTS; c++) {
-            const uint64_t *counts = frame.memory->kept.counts + 3 * c;
+            const uint64_t *counts = frame.memory->cache.counts + 3 * c;
             done += (double)counts[0];
             all += (double)counts[1];
-            stats->shadows_kept += (int)counts[2];
+            stats->shadows_cached += (int)counts[2];
         }
         stats->network_work = all > 0 ? done / all : 0;
         stats->instances = frame.views[0].instances;
@@ -8827,8 +8832,7 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     /* a light's map inside of the scene: the more Gaussians the smaller they are */
     map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
     if (settings->light_map_size) map = settings->light_map_size;
-    if (layers > 1)
-        fixed += 6 * SSDGS__FALL_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
+    if (layers > 1) fixed += 6 * SSDGS__MAP_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
@@ -10085,8 +10089,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     R transmittance[16][16], met[16][16],
         next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
-    unsigned char fallen[16][16];
-    const int all = tile->flux || tile->falls, cue = tile->cue || tile->flux;
+    unsigned char steps[16][16];
+    const int all = tile->flux || tile->light_map, cue = tile->cue || tile->flux;
     F(batch) applied, sampled;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
@@ -10096,9 +10100,9 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         for (v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
             met[micro][v] = 0;
-            next[micro][v] = tile->falls ? ssdgs__fall[0] : -1;
+            next[micro][v] = tile->light_map ? ssdgs__map_level[0] : -1;
         }
-    memset(fallen, 0, sizeof fallen);
+    memset(steps, 0, sizeof steps);
     while (sampling < tile->count || (all && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
         V lanes[SSDGS__BATCH][3][SSDGS__NV],
@@ -10166,8 +10170,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                     if (fell) {
                         R from[16];
                         VSTORE(from + v * SSDGS__VW, before);
-                        ssdgs__falls_note(tile, micro, fell, from, history[0][index + 1],
-                                          applied.record[index][6], next[micro], fallen[micro]);
+                        ssdgs__light_map_note(tile, micro, fell, from, history[0][index + 1],
+                                              applied.record[index][6], next[micro], steps[micro]);
                     }
                     if (cue) {
                         const V w = VMUL(alpha, before);
@@ -10208,7 +10212,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
         for (i = 0; cue && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
-    if (tile->falls) ssdgs__falls_end(tile, fallen[0], transmittance[0]);
+    if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
 
 /* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ====
@@ -10766,7 +10770,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
    blend to ==== Q = layers 1, 2 / A, depth and F0 = layer 3 / A with A, the sum of the weights, its third;
    the normal is layer 4's direction, M = layer 5. */
 
-typedef struct F(glint) {
+typedef struct F(highlight_geometry) {
     V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing,
         fifth, fresnel;
     V n[3], inverse_n, along, p[2][3], row[2][3],
@@ -10775,9 +10779,10 @@ typedef struct F(glint) {
         microfacet; /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
     V to_camera[2]; /* the camera's ray (x, y, 1) */
     VM half;
-} F(glint);
+} F(highlight_geometry);
 
-SSDGS__FI void F(glint_lanes)(F(glint) * g, const ssdgs__lighting *k, const V pixel[2], const R *layers) {
+SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdgs__lighting *k,
+                                           const V pixel[2], const R *layers) {
     const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
             *normal = more + SSDGS__TILE_LAYER;
     V at[3], d2;
@@ -10895,18 +10900,18 @@ SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, 
     return VFMA(dresidual, a->residual, VFMA(dgauss, a->gauss, VMUL(dsoft, a->soft)));
 }
 
-/* Adds the light's diffuse and specular terms to layer 0. sight: visibility, in; S, out. */
-SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers, R *sight) {
+/* Adds the light's diffuse and specular terms to layer 0. visibility: visibility, in; S, out. */
+SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers, R *visibility) {
     int micro, v, c;
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
-          *s = sight + micro * 64;
+          *s = visibility + micro * 64;
         F(pixel_centres)(tile, micro, px, py);
         for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            F(glint) g;
+            F(highlight_geometry) g;
             V value, factor;
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
             factor = arrival.factor;
@@ -10914,7 +10919,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
             for (c = 0; c < 3; c++)
                 VSTORE(at + 16 * c, VFMA(factor, VLOAD(m + SSDGS__TILE_LAYER + 16 * c), VLOAD(at + 16 * c)));
             if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
-            F(glint_lanes)(&g, k, pixel, at);
+            F(highlight_geometry_lanes)(&g, k, pixel, at);
             value = VMUL(factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0)));
             for (c = 0; c < 3; c++) VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
         }
@@ -10924,7 +10929,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
 /* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7; adds to sums
    (SSDGS__HIGHLIGHT_SUMS). */
 SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers,
-                                     const R *sight, R *gradient, R *sums) {
+                                     const R *visibility, R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
     int micro, v, i, j;
     for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
@@ -10932,19 +10937,19 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
     for (micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
-                *s = sight + micro * 64;
+                *s = visibility + micro * 64;
         R *d = gradient + micro * 64, *dm = d + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
         F(pixel_centres)(tile, micro, px, py);
         for (v = 0; v < SSDGS__NV;
              v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            F(glint) g;
+            F(highlight_geometry) g;
             V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum,
                            radial, along, ddepth, dat[3], dray, dcover, to, dfactor = VSET(0);
             R *dlayer = d + SSDGS__TILE_LAYER;
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
-            F(glint_lanes)(&g, k, pixel, at);
+            F(highlight_geometry_lanes)(&g, k, pixel, at);
             glow = F(glow)(k, g.q);
             value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
             for (i = 0; i < 3; i++) {
@@ -11231,10 +11236,10 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             if (k->specular) { /* c_s f_s S */
                 const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
                 const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                        glint = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
+                        lobe_lit = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
                 R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
-                VSTORE(out, VFMA(VMUL(glint, gloss), F(sigmoid)(raw), VLOAD(out)));
-                dgloss = VFMA(glint, ks, dgloss);
+                VSTORE(out, VFMA(VMUL(lobe_lit, gloss), F(sigmoid)(raw), VLOAD(out)));
+                dgloss = VFMA(lobe_lit, ks, dgloss);
                 dirradiance = VFMA(VMUL(push, direct), shine, dirradiance);
                 ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
             }

@@ -766,7 +766,7 @@ static void measure_skipping(bench *b) {
                  {"light fixed", 0, 1, 0, 0},
                  {"camera fixed", 0, 0, 1, 0},
                  {"light and camera fixed", 0, 1, 1, 0},
-                 {"out of sight", 0, 0, 0, 1},
+                 {"out of visibility", 0, 0, 0, 1},
                  {"opaque: no scattering", SSDGS_SCATTERING_TERM, 0, 0, 0},
                  {"no shadow", SSDGS_SHADOW_TERM, 0, 0, 0},
                  {"matt: no specular", SSDGS_SPECULAR_TERM, 0, 0, 0},

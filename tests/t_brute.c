@@ -1123,7 +1123,7 @@ static void test_no_map(void) {
     model = make_model(best());
     CHECK(!ssdgs__frame_begin(&frame, model, &s.camera, s.lights, 1, &s.options, 1, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
-    for (i = 1; i < frame.view_count; i++) frame.views[i].falls = NULL;
+    for (i = 1; i < frame.view_count; i++) frame.views[i].light_map = NULL;
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
     for (i = 0; i < 60 * 40; i++) {
         const ssdgs_real *of_gaussians = ssdgs__layer_plane(&frame, SSDGS__LIGHT_LAYER + 2, 1) + i;

@@ -66,16 +66,16 @@ static void render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
 
 /* The frame from a context that has kept frames has the bits of one that has not. */
 static void check_same(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
-                       const ssdgs_render_options *options, int camera_kept, int lights_kept,
+                       const ssdgs_render_options *options, int camera_cached, int lights_cached,
                        const char *name) {
     ssdgs_render_stats stats;
     render(model, camera, lights, count, options, image[0], &stats);
-    if (!test_check(stats.camera_kept == camera_kept && stats.lights_kept == lights_kept, __FILE__, __LINE__,
-                    name))
-        printf("    camera kept %d, lights kept %d\n", stats.camera_kept, stats.lights_kept);
+    if (!test_check(stats.camera_cached == camera_cached && stats.lights_cached == lights_cached, __FILE__,
+                    __LINE__, name))
+        printf("    camera kept %d, lights kept %d\n", stats.camera_cached, stats.lights_cached);
     (void)ssdgs_model_get(model); /* forget */
     render(model, camera, lights, count, options, image[1], &stats);
-    CHECK(!stats.camera_kept && !stats.lights_kept && stats.shadows_kept == 0);
+    CHECK(!stats.camera_cached && !stats.lights_cached && stats.shadows_cached == 0);
     test_check(!memcmp(image[0], image[1], sizeof image[0]), __FILE__, __LINE__, name);
 }
 
@@ -113,7 +113,7 @@ static void test_kept(void) {
     FIRST(); /* the shadow network's outputs are kept from here on */
     render(model, &b, lights, 2, &options, image[0], NULL);
     render(model, &b, lights, 2, &options, image[0], &stats);
-    CHECK(stats.shadows_kept >= 2 * stats.shaded); /* whole blocks */
+    CHECK(stats.shadows_cached >= 2 * stats.shaded); /* whole blocks */
     check_same(model, &a, lights, 2, &options, 0, 1, "kept shadows, back again");
     FIRST();
     options.max_error = 0;
@@ -202,7 +202,7 @@ static void test_walk(void) {
     ssdgs_light lights[LIGHTS];
     ssdgs_render_options options = ssdgs_render_options_default();
     int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0,
-                             lights_kept = 0, failures = 0;
+                             lights_cached = 0, failures = 0;
     uint64_t at = 7000000;
 #define PICK(n) ((int)(draw(at++) * (n)))
     memset(&desc, 0, sizeof desc);
@@ -276,19 +276,19 @@ static void test_walk(void) {
             for (i = 0; i < PLANE_COUNT; i++)
                 if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering)))
                     *plane[i] = planes[k] + PIXELS * first[i];
-            if (k && context[k]->frame) memset(&context[k]->frame->kept, 0, sizeof context[k]->frame->kept);
+            if (k && context[k]->frame) memset(&context[k]->frame->cache, 0, sizeof context[k]->frame->cache);
             CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out,
                                    stats + k));
         }
-        cameras_kept += stats[0].camera_kept;
-        lights_kept += stats[0].lights_kept;
-        CHECK(!stats[1].camera_kept && !stats[1].lights_kept);
-        CHECK(stats[0].shaded == stats[1].shaded && stats[0].glimpsed == stats[1].glimpsed &&
+        cameras_kept += stats[0].camera_cached;
+        lights_cached += stats[0].lights_cached;
+        CHECK(!stats[1].camera_cached && !stats[1].lights_cached);
+        CHECK(stats[0].shaded == stats[1].shaded && stats[0].skipped == stats[1].skipped &&
               stats[0].instances == stats[1].instances && stats[0].light_views == stats[1].light_views);
         if (!CHECK(!memcmp(planes[0], planes[1], sizeof planes[0]))) printf("    frame %d\n", frame);
     }
 #undef PICK
-    CHECK(failures > 5 && cameras_kept > FRAMES / 4 && lights_kept > FRAMES / 16);
+    CHECK(failures > 5 && cameras_kept > FRAMES / 4 && lights_cached > FRAMES / 16);
     for (k = 0; k < 2; k++) {
         for (i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
         ssdgs_context_destroy(context[k]);
@@ -321,8 +321,8 @@ static void test_max_error(void) {
             CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0));
             CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
             for (i = 0; i < COUNT; i++) {
-                frame.color[4 * i] = frame.seen[i] == SSDGS_GLIMPSED;
-                glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+                frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
+                glimpsed += frame.seen[i] == SSDGS_SKIPPED;
             }
             frame.layer_count = 0; /* the weights alone */
             CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
@@ -362,8 +362,8 @@ static void test_spent_budget(void) {
     CHECK(!ssdgs__frame_begin(&frame, model, &camera, NULL, 0, &options, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
     for (i = 0; i < LAYERS; i++) {
-        frame.color[4 * i] = frame.seen[i] == SSDGS_GLIMPSED;
-        glimpsed += frame.seen[i] == SSDGS_GLIMPSED;
+        frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
+        glimpsed += frame.seen[i] == SSDGS_SKIPPED;
     }
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
     for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
@@ -400,8 +400,8 @@ static void test_presets(void) {
         CHECK(stats[o].gaussians == COUNT && stats[o].light_views == 1 && stats[o].rejected == 0);
         CHECK(stats[o].network_work > 0.3 && stats[o].network_work <= 1);
     }
-    CHECK(stats[0].glimpsed == 0 && stats[1].glimpsed > 0);
-    CHECK(stats[0].shaded >= stats[1].shaded + stats[1].glimpsed - 1 && stats[2].shaded < stats[1].shaded);
+    CHECK(stats[0].skipped == 0 && stats[1].skipped > 0);
+    CHECK(stats[0].shaded >= stats[1].shaded + stats[1].skipped - 1 && stats[2].shaded < stats[1].shaded);
     options[0].max_error = 2;
     CHECK(ssdgs_render_ex(model, &camera, &light, 1, options, &out, NULL) == SSDGS_ERR_ARGUMENT);
     options[0] = ssdgs_render_options_exact();

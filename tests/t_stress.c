@@ -1378,10 +1378,10 @@ static void row_50(void) { /* lights at rest: no new maps for a new view, and th
     for (i = 0; i < 3; i++) {
         camera.cx += 3;
         show(model, &camera, &light, 1, &options, &a);
-        CHECK(a.stats.lights_kept == 1 && a.stats.camera_kept == 0);
+        CHECK(a.stats.lights_cached == 1 && a.stats.camera_cached == 0);
         ssdgs_model_get(model);
         show(model, &camera, &light, 1, &options, &b);
-        CHECK(b.stats.lights_kept == 0 && same(&a, &b));
+        CHECK(b.stats.lights_cached == 0 && same(&a, &b));
     }
     ssdgs_model_destroy(model);
 }
