@@ -199,8 +199,8 @@ SPEED
   for 64 neighbouring Gaussians; terms and networks not in use, gradients of those that rest; components and
   planes nobody asked for. And what the last frame on the context found, where model, options and camera, or
   lights, are the same: a camera at rest needs no projection, order and tiles, lights at rest no maps, no
-  shadow network and no transport. Writing through ssdgs_model_get() needs a new call of it each time, which
-  is how the library knows. ssdgs_render_stats tells what was left out.
+  shadow network and no transport. Writing through ssdgs_model_arrays() needs a new call of it each time,
+which is how the library knows. ssdgs_render_stats tells what was left out.
 
 SIMD
   The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit
@@ -311,14 +311,12 @@ VERSIONS
 #define SSDGS_VERSION 100 /* 0.1.0; written into files */
 
 #ifndef SSDGS_API
-#ifdef SSDGS_STATIC
-#if defined(__GNUC__) && !defined(__TINYC__)
+#if !defined(SSDGS_STATIC)
+#define SSDGS_API extern
+#elif defined(__GNUC__) && !defined(__TINYC__)
 #define SSDGS_API static __attribute__((unused))
 #else
 #define SSDGS_API static
-#endif
-#else
-#define SSDGS_API extern
 #endif
 #endif
 
@@ -326,8 +324,7 @@ VERSIONS
 extern "C" {
 #endif
 
-/* All arithmetic. The tests build the whole library in double by defining SSDGS_REAL64. */
-#ifdef SSDGS_REAL64
+#ifdef SSDGS_REAL64 /* for tests of values and gradients */
 typedef double ssdgs_real;
 #else
 typedef float ssdgs_real;
@@ -350,50 +347,444 @@ typedef float ssdgs_real;
 typedef enum ssdgs_result { SSDGS_RESULTS(SSDGS__RESULT_ENUM) SSDGS_RESULT_COUNT } ssdgs_result;
 #undef SSDGS__RESULT_ENUM
 
+/* clang-format off */
 typedef enum ssdgs_isa {
-    SSDGS_ISA_AUTO = 0,
-    SSDGS_ISA_SCALAR,
-    SSDGS_ISA_SSE2,
-    SSDGS_ISA_AVX2,
-    SSDGS_ISA_AVX512,
-    SSDGS_ISA_NEON,
-    SSDGS_ISA_COUNT
+    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON, SSDGS_ISA_COUNT
 } ssdgs_isa;
+/* clang-format on */
 
-typedef struct ssdgs_context ssdgs_context; /* allocator, log, threads, kernels, GPU hook */
+typedef struct ssdgs_context ssdgs_context; /* allocator, log, threads, kernels */
 typedef struct ssdgs_model ssdgs_model;     /* Gaussians, ASG bases, both networks, settings */
 typedef struct ssdgs_trainer ssdgs_trainer; /* optimiser state of one training run */
 
-/* ---- the context ---- */
+/* ---- context ---- */
 
-typedef struct ssdgs_allocator { /* both or none */
+typedef struct ssdgs_allocator { /* both functions or none */
     void *(*allocate)(void *user, size_t bytes);
     void (*release)(void *user, void *memory);
     void *user;
 } ssdgs_allocator;
 
-typedef struct ssdgs_logger {
+typedef struct ssdgs_logger { /* hears failures, and notes with the code SSDGS_OK */
     void (*write)(void *user, ssdgs_result code, const char *message);
     void *user;
 } ssdgs_logger;
 
-/* Runs task(data, 0) .. task(data, count - 1), in any order, on any threads, and returns when all are done.
-   Results never depend on how. */
+/* Runs task(data, 0) .. task(data, count - 1) in any order, on any threads, and returns when all are done. */
 typedef struct ssdgs_parallel {
     void (*run)(void *user, int count, void (*task)(void *data, int index), void *data);
     void *user;
 } ssdgs_parallel;
 
-/* The stages of a frame, in order. A hook replaces any of them; NULL runs the CPU's. */
+typedef struct ssdgs_context_desc {   /* all zero = defaults */
+    ssdgs_allocator allocator;        /* malloc and free */
+    ssdgs_logger logger;              /* none */
+    ssdgs_parallel parallel;          /* threads of the context's own */
+    const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
+    int threads;                      /* how many of its own, the caller counted; 0 = one per CPU */
+    ssdgs_isa isa; /* the best this CPU has; another fails with ERR_ISA where it is missing */
+} ssdgs_context_desc;
+
+/* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
+SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
+/* Joins the threads. The memory stays until the context's models and trainers are gone too. NULL is fine. */
+SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
+/* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
+SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
+SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
+SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa);
+SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context); /* the one in use */
+SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);   /* how many work */
+
+/* ---- model ---- */
+
+/* clang-format off */
+enum { /* terms of eq. 3; a mask */
+    SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8, SSDGS_ALL_TERMS = 15
+};
+typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
+typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED } ssdgs_dipole;
+typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_DEFERRED = 2 } ssdgs_asg;
+typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
+
+#define SSDGS_ASG_COUNT 8
+#define SSDGS_MATERIAL_COUNT 6
+#define SSDGS_MAX_LAYERS 16   /* linear layers of a network */
+#define SSDGS_MAX_WIDTH 1024  /* neurons of a layer */
+
+/* Raw parameters of a Gaussian, one plane each: the first plane of each. ssdgs_gaussian has them in physical units. */
+enum {
+    SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
+    SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
+};
+/* clang-format on */
+
+/* What a model computes; stored in its file. 0 or 1 where nothing else is said. */
+typedef struct ssdgs_settings {
+    int version;  /* set by ssdgs_settings_default / _published */
+    int terms;    /* SSDGS_*_TERM mask: what the model has */
+    int baked;    /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
+    int transfer; /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
+    int dipole;   /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
+    int asg; /* ssdgs_asg: highlights per Gaussian (eq. 12), or deferred: per pixel, from blended normals */
+    int per_channel_optics; /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
+    int depth_cue; /* 1: the scattering network sees how far a point lies behind what the light meets first */
+    int transport; /* 1: it also sees what true dipole transport brings from where light enters */
+    int residual_shadow;      /* 1: the shadow network corrects the logit of eq. 7; 0: its output is S */
+    int shadow_on_scattering; /* 1: eq. 14, the paper's ablation: S darkens scattering too */
+    int scattering_layers;    /* linear layers of the scattering network, 2 .. SSDGS_MAX_LAYERS */
+    int scattering_width;     /* neurons of its hidden layers, up to SSDGS_MAX_WIDTH */
+    int view_octaves;      /* 0 .. 8: sines and cosines of wo that it sees; many let it learn photographs by
+                              heart */
+    int light_octaves;     /* 0 .. 8: and of wi */
+    int shadow_layers;     /* linear layers of the shadow network; 0 = none: S is eq. 7's transmittance */
+    int shadow_width;      /* neurons of its hidden layers */
+    int light_blur;        /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
+    int light_map_size;    /* px a side; 0 = such that a typical Gaussian is one pixel wide */
+    ssdgs_real light_bias; /* length units: what lies nearer to the light by less casts no shadow. For models
+                              made in code three standard deviations of their Gaussians */
+    ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: added to a splat's in the camera pass */
+    ssdgs_real eta;            /* index of refraction, 1 .. 2.5 */
+    ssdgs_real centre[3];      /* world: origin of the networks' positions */
+    ssdgs_real length_unit;    /* world units in one unit of the networks */
+    ssdgs_real light_scale;    /* factor from the dataset's intensities to the model's */
+    ssdgs_real origin[3]; /* where the model's 0 lies in its dataset's world. Only files use it: for scenes so
+                             far from 0 that floats are too coarse */
+} ssdgs_settings;
+
+SSDGS_API ssdgs_settings ssdgs_settings_default(void);
+SSDGS_API ssdgs_settings ssdgs_settings_published(void); /* the paper's model */
+
+/* A model of count Gaussians, each as ssdgs_gaussian_default(), networks at their start. settings NULL =
+   default. */
+SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
+                                          ssdgs_model **out);
+SSDGS_API void ssdgs_model_destroy(ssdgs_model *model); /* NULL is fine */
+SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
+
+/* One Gaussian in physical units. */
+typedef struct ssdgs_gaussian {
+    ssdgs_real position[3];   /* world */
+    ssdgs_real rotation[4];   /* quaternion w x y z, of any length: its axes in the world */
+    ssdgs_real scale[3];      /* standard deviations along them, world units */
+    ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
+    ssdgs_real opacity;       /* 0 .. 1 at the centre */
+    ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
+    ssdgs_real specular[3];   /* c_s: 0 = none, about 1 for a dielectric of the highlight's sharpness */
+    ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
+    ssdgs_real
+        sharpness[2];    /* lambda, mu of a deferred highlight: 1 = as trained ones start, more is narrower */
+    ssdgs_real f0;       /* reflectance at normal incidence of a deferred highlight: 0.04 for dielectrics */
+    ssdgs_real softness; /* 0: a deferred shadow is the pixel's, sharp; 1: the Gaussian's */
+    ssdgs_real material[SSDGS_MATERIAL_COUNT]; /* code that the networks see */
+} ssdgs_gaussian;
+
+SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void); /* grey, opacity 0.1, 0.02 wide, at 0 */
+/* Writes and reads Gaussian `index`. ERR_ARGUMENT: no such Gaussian, or a value out of range. */
+SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdgs_gaussian *gaussian);
+SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdgs_gaussian *gaussian);
+/* Puts Gaussians in the order that training leaves, neighbours together, which is faster. Indices change.
+   Call it once a model made in code is filled; not while it is trained. ERR_ARGUMENT, ERR_MEMORY. */
+SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
+/* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor. */
+SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
+
+/* The raw arrays, valid until the model changes. Call ssdgs_model_arrays() before each round of writing: it
+   is how rendering knows that what it has cached is out of date. */
+typedef struct ssdgs_model_view {
+    int count;             /* Gaussians */
+    size_t stride;         /* reals from one plane to the next */
+    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, stride): scale = exp, opacity = sigmoid, colours and weights =
+                              softplus */
+    ssdgs_real *asg_basis; /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
+    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
+    ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
+    ssdgs_real *scattering;    /* per layer: (out, in) weights, row-major, then (out) biases */
+    size_t scattering_count;
+    ssdgs_real *shadow;
+    size_t shadow_count;
+} ssdgs_model_view;
+SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model);
+
+typedef struct ssdgs_load_stats { /* what reading a file mended */
+    int zero_rotations;           /* replaced by the identity */
+    int clamped_opacities;        /* to +-20 before sigmoid */
+    int clamped_scales;           /* to +-20 before exp */
+    int dropped;                  /* Gaussians with values that are not finite */
+    int plain;                    /* 1: a plain splat file, loaded as baked colours */
+    int untrained;                /* 1: ours without settings, as editors leave it: ssdgs_model_adopt() */
+    int sorted;                   /* 1: was in no order, so ssdgs_model_sort() was called */
+} ssdgs_load_stats;
+
+#ifndef SSDGS_NO_STDIO
+/* One PLY file. Saving replaces it only once all is written. Loading sorts Gaussians that are in no order.
+   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE where networks or ASG
+   are not finite. */
+SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
+SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
+                                        ssdgs_load_stats *stats);
+#endif
+/* The same from bytes in memory, which are not kept. */
+SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size,
+                                               ssdgs_model **out, ssdgs_load_stats *stats);
+
+/* ---- camera and light ---- */
+
+typedef struct ssdgs_camera {  /* a pinhole */
+    int width, height;         /* px */
+    ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
+    ssdgs_real view[12];       /* (3,4) row-major, world to camera: x right, y down, z forward */
+    ssdgs_real
+        near_plane; /* world units: Gaussians with nearer centres are not drawn. 0 = 0.02 length units */
+} ssdgs_camera;
+
+typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
+typedef struct ssdgs_light {
+    ssdgs_light_kind kind;
+    ssdgs_real position[3];  /* world; directional: unit vector towards the light */
+    ssdgs_real intensity[3]; /* RGB, 0 or more, in the training data's units; directional: irradiance */
+} ssdgs_light;
+
+/* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. */
+SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
+                                            const ssdgs_real up[3], ssdgs_real fov_x, int width, int height);
+
+/* ---- render ---- */
+
+/* Where results go. Planes are the caller's; NULL = not computed. Colours are linear, not clamped
+   (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background = color. */
+typedef struct ssdgs_image {
+    int stride;             /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;      /* (h,w,3) */
+    ssdgs_real *alpha;      /* (h,w) */
+    ssdgs_real *depth;      /* (h,w) sum of weight x camera depth: divide by alpha */
+    ssdgs_real *normal;     /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;    /* (h,w,3) */
+    ssdgs_real *specular;   /* (h,w,3) */
+    ssdgs_real *scattering; /* (h,w,3) */
+    ssdgs_real *shadow;     /* (h,w) sum of weight x S, averaged over the lights */
+} ssdgs_image;
+
+typedef struct ssdgs_render_options {
+    int version;   /* set by the functions below */
+    int terms;     /* SSDGS_*_TERM mask: of the model's, those to render */
+    int antialias; /* 1: opacity makes up for pixel_variance, so far Gaussians do not grow (Mip-Splatting) */
+    ssdgs_real background[3];   /* linear; settings.transfer none: as stored */
+    ssdgs_real stop;            /* a pixel is done when its transmittance is below this; 0 = never */
+    ssdgs_real alpha_threshold; /* a splat is not drawn at pixels where its alpha is below this */
+    ssdgs_real
+        max_error; /* skips shading Gaussians whose weights sum to less than this in every pixel; 0 = none */
+    ssdgs_real light_detail; /* resolution of the light maps; 1 = the model's choice */
+} ssdgs_render_options;
+
+/* For games (max_error 1/16), the method as written, and for speed (max_error 1/8, light_detail 0.6,
+   alpha_threshold 1/200). SPEED in the manual says what they lose. */
+SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
+SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
+SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
+
+typedef struct ssdgs_render_stats {
+    int gaussians;       /* in the model */
+    int visible;         /* inside the camera's frustum */
+    int shaded;          /* contributing to a pixel */
+    int skipped;         /* contributing, but not shaded, within max_error: drawn in a neighbour's colour */
+    int rejected;        /* never drawn: a parameter is not finite */
+    int blackened;       /* drawn black: the colour is not finite */
+    int light_views;     /* light maps in use */
+    int camera_cached;   /* 1: projection, order and tiles are the last frame's */
+    int lights_cached;   /* 1: so are the light maps */
+    int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
+    double network_work; /* share of the networks' multiplications done */
+    size_t instances;    /* (tile, splat) pairs of the camera */
+} ssdgs_render_stats;
+
+/* Renders model as camera sees it under lights[0 .. light_count). After the first frame of a size nothing is
+   allocated. */
+SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
+                                    int light_count, const ssdgs_image *image);
+/* The same with options (NULL = default) and statistics (may be NULL). */
+SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera,
+                                       const ssdgs_light *lights, int light_count,
+                                       const ssdgs_render_options *options, const ssdgs_image *image,
+                                       ssdgs_render_stats *stats);
+
+SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
+SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
+/* Clamps, encodes by transfer and rounds (count) values to bytes, at most one level off. */
+SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
+typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8 } ssdgs_format;
+/* color and alpha of a rendering without background as 4-byte pixels of straight alpha; without image->alpha
+   opaque. pitch: bytes from row to row, negative where `pixels` is the first row of an image stored bottom
+   row first. */
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                               ssdgs_format format, void *pixels, ptrdiff_t pitch);
+/* Stored values (pixels,3) of such a rendering laid over `background`, stored values too. stored may be
+   color. */
+SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
+                             const ssdgs_real background[3], ssdgs_real *stored);
+
+#ifndef SSDGS_NO_TRAINER
+/* ---- train ---- */
+
+typedef enum ssdgs_pixels {
+    SSDGS_PIXELS_RGBA8 = 0,
+    SSDGS_PIXELS_RGBA16
+} ssdgs_pixels; /* native-endian 16 bit */
+typedef struct ssdgs_photo {
+    ssdgs_camera camera;
+    ssdgs_light light;
+    const void *pixels; /* (h,w,4) tightly packed, straight alpha, stored values; the caller's, must outlive
+                           the trainer */
+    ssdgs_pixels format;
+} ssdgs_photo;
+
+/* clang-format off */
+typedef enum ssdgs_schedule { /* the paper's orders H to K */
+    SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
+} ssdgs_schedule;
+/* clang-format on */
+enum { SSDGS_REFINE_CAMERA = 1, SSDGS_REFINE_LIGHT = 2 };
+
+/* A learning rate: from start to end by equal factors, to or from 0 by equal steps. */
+typedef struct ssdgs_rate {
+    ssdgs_real start, end;
+} ssdgs_rate;
+typedef struct ssdgs_rates {
+    ssdgs_rate position; /* of 1.1 x the cameras' radius */
+    ssdgs_rate opacity, scale, rotation, color;
+    ssdgs_rate asg, frame;                   /* start up to iteration 40,000*, end at 90,000* */
+    ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
+    ssdgs_rate camera, light; /* of the bounds' longest side; end at 60,000*. For 300 shows of each
+                                 photograph; with fewer, times the root of 300 / shows */
+} ssdgs_rates;
+
+/* Iterations marked * are of a run of 60,000; shorter runs scale them. 0 disables where nothing else is
+   said. */
+typedef struct ssdgs_train_options {
+    int version;             /* set by ssdgs_train_options_default / _published */
+    int iterations;          /* 20000 */
+    uint64_t seed;           /* 1 */
+    int schedule;            /* ssdgs_schedule: in which order the terms join; merged */
+    int random_background;   /* 1: photographs with transparency are laid over a new colour each step; 0: over
+                                background; 1 */
+    int initial_points;      /* random Gaussians in the bounds when the model is empty; 10000 */
+    int max_gaussians;       /* density control stops here; 100000 */
+    int densify_every;       /* iterations between two rounds of density control; 100 */
+    int densify_from;        /* first round; 200 */
+    int densify_until;       /* last round; 50000* */
+    int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
+    int refine;              /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
+    ssdgs_real background[3]; /* stored values: what opaque photographs show around the object; black */
+    ssdgs_real dssim;         /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
+    ssdgs_real
+        normal_weight; /* deferred: weight of the blended normals' distance to those of the depth; 0.05 */
+    ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
+    ssdgs_real bounds_max[3];    /* 0.5 */
+    ssdgs_real densify_gradient; /* a Gaussian pulled harder is cloned or split, in half images; 4e-4 */
+    ssdgs_real densify_shadow; /* px: one half in shadow on more of a photograph, on average, is split; 0.5 */
+    ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
+    ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
+                                  removed;  OUTLINES in the manual; 0.02 */
+    ssdgs_real
+        adam_epsilon; /* Adam's, relative to the gradient of a one-byte error in one pixel; 0.1; 0 = 1e-15 */
+    ssdgs_rates rates;
+} ssdgs_train_options;
+
+SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
+SSDGS_API ssdgs_train_options
+ssdgs_train_options_published(void); /* the paper's order, density control and length */
+
+typedef struct ssdgs_train_stats {
+    int iteration; /* done so far */
+    int gaussians;
+    int shaded;        /* in this step */
+    int terms;         /* SSDGS_*_TERM mask: the schedule's so far; the others are untrained */
+    int skipped_steps; /* refused so far, as a gradient was not finite */
+    double loss, psnr; /* of this step's image */
+} ssdgs_train_stats;
+
+/* Returns 0 to stop: ssdgs_trainer_run() then returns ERR_CANCELLED, and the model is whole. */
+typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
+
+/* Trains model on photos; the photo structs are copied. A model of 0 Gaussians starts from random points and
+   gets light_scale, centre, length_unit and new networks; one that has Gaussians goes on (with
+   SSDGS_SCHEDULE_JOINT with all terms). options NULL = default. Once something else has moved the model's
+   Gaussians (ssdgs_model_sort(), another trainer) all calls below fail. */
+SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
+                                            const ssdgs_train_options *options, ssdgs_trainer **out);
+SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer); /* NULL is fine */
+/* One iteration. ERR_NONFINITE and ERR_MEMORY: nothing has changed, but where density control alone lacks
+   memory the step is done without, as stats->iteration says. */
+SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
+/* Steps until `iterations` are done, and calls progress (may be NULL) after each. Ten refused steps in a row
+   end it. */
+SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
+/* Camera and light of photograph `index` as refined so far. */
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
+                                             ssdgs_light *light);
+/* About how many bytes a run will hold at max_gaussians, photographs not counted; 0 for what would be
+   refused. */
+SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
+                                    int width, int height);
+
+#ifndef SSDGS_NO_STDIO
+/* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
+   and settings. */
+SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
+SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
+/* How far the run of a checkpoint had come. ERR_IO without a file, ERR_FORMAT where it is no checkpoint of
+   this version. */
+SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration);
+#endif
+
+typedef struct ssdgs_metrics {
+    double psnr, ssim, flip; /* dB, 100 for equal images; 1 is best; 0 is best */
+} ssdgs_metrics;
+/* Compares (h,w,3) images of stored values, clamped to [0,1]. */
+SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
+                                     const ssdgs_real *reference, int width, int height,
+                                     ssdgs_metrics *metrics);
+/* Renders a photograph's camera and light, exactly, over `background` (stored values) and compares. image
+   (h,w,3) gets stored values; may be NULL. */
+SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
+                                      const ssdgs_real background[3], ssdgs_real *image,
+                                      ssdgs_metrics *metrics);
+/* Fits photo's camera and light position to its pixels by so many steps of Adam, the model fixed. */
+SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
+                                          const ssdgs_real background[3], int iterations);
+#endif /* SSDGS_NO_TRAINER */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSDGS_H */
+
+#if (defined(SSDGS_STAGES) || defined(SSDGS_IMPLEMENTATION)) && !defined(SSDGS__STAGES_H)
+#define SSDGS__STAGES_H
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== stages of a frame, seen with SSDGS_STAGES: for GPUs and engines that run some of their own ====
+   ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A hook reads and writes the
+   ssdgs_frame. A result other than SSDGS_OK ends the frame. With any hook set no frame uses results of the
+   last. What a stage writes in ssdgs_splat_view has no memory before it: a hook points the members at its
+   own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y. All else has memory.
+   Where layer_count is not 0, light is deferred: WALK fills the light maps, SHADE the layers, and COMPOSITE
+   adds the diffuse and specular terms of what they blend to. In training SHADE and SHADE_BACKWARD are
+   replaced together or not at all: the CPU keeps activations in between. An image's components are the CPU's
+   work. It reads layer_pixels and pixel_shadow or, where layer_count is 0, view 0's record, depth, order,
+   tile_start, tile_list and tile_seen, which must be in host memory then. */
+
 typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0, /* Gaussians -> records and depths of every view */
     SSDGS_STAGE_SORT,        /* -> order, nearest first */
     SSDGS_STAGE_BIN,         /* -> instances and tile lists */
-    SSDGS_STAGE_WALK,        /* -> seen (camera), visibility, depth_cue, flux, falls (lights) */
+    SSDGS_STAGE_WALK,        /* -> seen (camera), visibility, depth_cue, flux, light_map (lights) */
     SSDGS_STAGE_SHADE,       /* -> color, layers or the components asked for */
     SSDGS_STAGE_COMPOSITE,   /* -> pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow */
     SSDGS_STAGE_COMPOSITE_BACKWARD, /* pixel_gradient, normal_gradient -> splat_gradient, color_gradient,
-                                       layer_gradient; the shared gradients anew */
+                                       layer_gradient; sets the shared gradients */
     SSDGS_STAGE_SHADE_BACKWARD, /* color_gradient, layer_gradient -> gradient; adds to the shared gradients */
     SSDGS_STAGE_PROJECT_BACKWARD, /* splat_gradient -> gradient, view_gradient */
     SSDGS_STAGE_COUNT
@@ -404,442 +795,6 @@ typedef struct ssdgs_gpu_hook {
     ssdgs_result (*stage[SSDGS_STAGE_COUNT])(void *user, struct ssdgs_frame *frame);
     void *user;
 } ssdgs_gpu_hook;
-
-typedef struct ssdgs_context_desc { /* all zero = defaults */
-    ssdgs_allocator allocator;      /* malloc, free */
-    ssdgs_logger logger;            /* none */
-    ssdgs_parallel parallel;        /* the context's own thread pool */
-    ssdgs_gpu_hook gpu;             /* none */
-    int threads;                    /* 0 = one per CPU; the pool's size */
-    ssdgs_isa isa; /* the best this CPU has; another one fails with SSDGS_ERR_ISA if absent */
-} ssdgs_context_desc;
-
-/* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
-SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
-/* Joins the threads. Models and trainers of the context must be gone. NULL is fine. */
-SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
-/* What the last failure on this context was about: names the file, key, byte or parameter. Never NULL. */
-SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
-SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
-SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa);
-/* The instruction set in use; with the number of threads. */
-SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context);
-SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);
-
-/* ---- the model ---- */
-
-typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED } ssdgs_dipole;
-/* Specular lobes of eqs. 10 to 12. Per Gaussian: eq. 12, or the released angular form; so is S. Deferred: one
-   term per pixel and light, from what the pixel's Gaussians blend to, so that their normals agree, highlights
-   carry over to other views and shadows have edges: S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5)
-   sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))) with D = (c_d / pi) f_d E, M = c_s E, the blended normal
-   n and, over the pixel's alpha, Q = lambda xx' + mu yy' of the frames' axes and F0; p is h less its part
-   along n. So t_j chooses between the normals' mean, right for smooth surfaces, and all of them, right for
-   rough ones. n.wi / (wo.h)^2 is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos
-   2001), n.wi >= 0, wo.h >= 0.25. S is eq. 8's of the blended answers of the shadow network and of (1 - soft)
-   v + soft v_g: v is the transmittance to the place at the pixel's depth, as the light's map tells from where
-   it falls below 0.9, 0.5 and 0.1 (a veil that leaves more casts no shadow), v_g the Gaussians', over alpha
-   as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes out beside where it went
-   in */
-typedef enum ssdgs_asg { SSDGS_ASG_GEOMETRIC = 0, SSDGS_ASG_DEFERRED = 2 } ssdgs_asg;
-typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
-/* variance added to a splat's, or a floor of it with opacity compensation */
-typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
-
-enum { /* terms of eq. 3; a mask */
-       SSDGS_DIFFUSE_TERM = 1,
-       SSDGS_SPECULAR_TERM = 2,
-       SSDGS_SHADOW_TERM = 4,
-       SSDGS_SCATTERING_TERM = 8,
-       SSDGS_ALL_TERMS = 15
-};
-
-#define SSDGS_ASG_COUNT 8
-#define SSDGS_MATERIAL_COUNT 6
-#define SSDGS_MAX_LAYERS 16 /* linear layers of a network */
-
-/* Raw parameters of a Gaussian, one plane each, and their first plane. Used as: exp(log scale),
-   sigmoid(opacity), softplus(colours and ASG weights), quaternions w x y z normalised. Deferred, the first
-   ASG weights are log lambda, log mu, the logit of F0 less that of 0.04 and that of the shadow's softness;
-   the others rest. */
-enum {
-    SSDGS_POSITION = 0,
-    SSDGS_ROTATION = 3,
-    SSDGS_LOG_SCALE = 7,
-    SSDGS_OPACITY = 10,
-    SSDGS_DIFFUSE = 11,
-    SSDGS_SPECULAR = 14,
-    SSDGS_SCATTERING = 17,
-    SSDGS_FRAME = 20,
-    SSDGS_ASG_WEIGHT = 24,
-    SSDGS_MATERIAL = 32,
-    SSDGS_CHANNELS = 38
-};
-
-/* What a model computes; stored in its file. */
-typedef struct ssdgs_settings {
-    int version;  /* stamped by ssdgs_settings_default / _published */
-    int terms;    /* SSDGS_*_TERM mask */
-    int baked;    /* 1: softplus(diffuse) is the colour itself, lights are ignored (a plain splat file) */
-    int transfer; /* ssdgs_transfer: how stored images relate to the colours splatted */
-    int dipole;   /* ssdgs_dipole */
-    int asg;      /* ssdgs_asg; deferred */
-    int per_channel_optics; /* 1: sigma_s, sigma_a for each colour channel */
-    int depth_cue;          /* 1: the scattering network sees the depth cue; positions are in length units */
-    int transport; /* 1: it also sees the light that true dipole transport brings from where it enters */
-    int residual_shadow; /* 1: the shadow network corrects the logit of the visibility; positions in length
-                            units */
-    int shadow_on_scattering; /* 1: eq. 14, the ablation */
-    int scattering_layers;    /* linear layers, 2 .. SSDGS_MAX_LAYERS */
-    int scattering_width;     /* hidden width */
-    int view_octaves;  /* of sines and cosines of wo, which the scattering network sees, 0 .. 8: with many it
-                          learns the  photographs by heart */
-    int light_octaves; /* and of wi */
-    int shadow_layers; /* linear layers; 0 = no network, S = visibility */
-    int shadow_width;
-    int light_blur;     /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size; /* px; 0 = such that the typical Gaussian is about one pixel wide. It holds the scene;
-                           of strays, at most one Gaussian in 200 on each side, only those within three times
-                           the others' box */
-    ssdgs_real light_bias; /* length units: what lies nearer to the light by less than this casts no shadow. A
-                              surface is a layer of Gaussians that would shadow each other at random. 3
-                              standard deviations of a surface's Gaussians, where a model made in code is
-                              coarser than trained ones */
-    ssdgs_real
-        pixel_variance;     /* px^2, 0.01 .. 10: the pixel filter's, added to a splat's in the camera pass */
-    ssdgs_real eta;         /* index of refraction, 1 .. 2.5 */
-    ssdgs_real centre[3];   /* origin of the networks' positions */
-    ssdgs_real length_unit; /* world units in one network unit */
-    ssdgs_real light_scale; /* factor from the dataset's intensities to the model's */
-    ssdgs_real
-        origin[3]; /* where the model's 0 lies in the world of its dataset, as floats. Nothing is computed
-                      with it: it is for scenes far from 0, whose cameras, lights and Gaussians are given less
-                      it, since floats would be too coarse. Files hold positions with it added, as doubles */
-} ssdgs_settings;
-
-SSDGS_API ssdgs_settings ssdgs_settings_default(void);
-SSDGS_API ssdgs_settings ssdgs_settings_published(void);
-
-/* Pointers into a model's arrays, valid until the model changes. Writable: fill them to build a model in
-   code, and call ssdgs_model_get() before every round of writing: rendering keeps what it found for a model
-   that has not changed. */
-typedef struct ssdgs_model_view {
-    int count;                 /* Gaussians */
-    size_t stride;             /* floats from one plane to the next */
-    ssdgs_real *gaussians;     /* (SSDGS_CHANNELS, stride) */
-    ssdgs_real *asg_basis;     /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
-    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; angular form: raw l, u; deferred:
-                                  log s, logit t */
-    ssdgs_real *asg_sigma;  /* (SSDGS_ASG_COUNT) raw sigma of the angular form; deferred: a before softplus */
-    ssdgs_real *scattering; /* per layer: (out, in) weights, then (out) biases */
-    size_t scattering_count;
-    ssdgs_real *shadow;
-    size_t shadow_count;
-} ssdgs_model_view;
-
-/* A model of count Gaussians with neutral parameters (grey, opacity 0.1, networks at their start).
-   settings NULL = default. ERR_OPTIONS, ERR_ARGUMENT, ERR_LIMIT, ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
-                                          ssdgs_model **out);
-SSDGS_API void ssdgs_model_destroy(ssdgs_model *model);
-SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model);
-/* Puts the Gaussians in the order that training leaves, neighbours together, as speed and max_error want
-   them: for models made in code or put together. Their indices change. Not while the model is trained.
-   ERR_ARGUMENT; ERR_MEMORY, and all stays. */
-SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
-SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
-/* Gives the model the settings, ASG and networks of another, of any context: back to one whose file lost them
-   in an editor. Not while the model is trained. ERR_ARGUMENT; ERR_MEMORY, and all stays. */
-SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
-
-/* What reading a file had to mend. */
-typedef struct ssdgs_load_stats {
-    int zero_rotations;    /* all below 1e-37, or one beyond 1e37: replaced by the identity */
-    int clamped_opacities; /* infinite or beyond +-20 */
-    int clamped_scales;    /* beyond +-20 */
-    int dropped;           /* Gaussians with other non-finite values */
-    int plain;             /* 1: no SSD-GS properties, loaded as baked colours */
-    int untrained; /* 1: ours, but without settings, which other programs drop, mostly with ASG and networks:
-                      has the published settings, and networks at their start where they are missing.
-                      ssdgs_model_adopt() gives it those of the original */
-    int sorted;    /* 1: Gaussians to be shaded were in no order: ssdgs_model_sort() */
-} ssdgs_load_stats;
-
-#ifndef SSDGS_NO_STDIO
-/* One self-contained PLY. Saving goes to a temporary file that is renamed; on failure the old file is intact.
-   Loading sorts Gaussians in no order, so that their indices change: stats->sorted. stats may be NULL.
-   ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE, where networks or ASG are not
-   finite. */
-SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
-SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
-                                        ssdgs_load_stats *stats);
-#endif
-/* The same from bytes in memory (not kept). */
-SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size,
-                                               ssdgs_model **out, ssdgs_load_stats *stats);
-
-/* ---- rendering ---- */
-
-typedef struct ssdgs_camera {
-    int width, height;         /* px */
-    ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
-    ssdgs_real view[12];       /* (3,4) row-major world to camera; x right, y down, z forward */
-    ssdgs_real near_plane; /* world units; 0 = 0.02 length units, 0.01 without them. Gaussians with a centre
-                              nearer than that are not drawn, nor those more than 56 degrees to the side or
-                              above that reach back, by five standard deviations, beside the camera */
-} ssdgs_camera;
-
-typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
-typedef struct ssdgs_light {
-    ssdgs_light_kind kind;
-    ssdgs_real position[3];  /* world; directional: unit vector towards the light */
-    ssdgs_real intensity[3]; /* RGB, 0 or more, in the units of the training data; directional: irradiance */
-} ssdgs_light;
-
-/* Camera at eye looking at target; focal length for a horizontal field of view in radians. up may be any
-   vector. */
-SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
-                                            const ssdgs_real up[3], ssdgs_real fov_x, int width, int height);
-
-/* Where results go. The caller owns every plane; NULL = not computed. Colours are linear (settings.transfer
-   none: stored values), the background is in `color` only: diffuse + specular + scattering + (1 - alpha)
-   background = color. With max_error > 0 what is left unshaded has its neighbour's depth, normal and shadow
-   too. */
-typedef struct ssdgs_image {
-    int stride;             /* pixels from row to row; 0 = camera width */
-    ssdgs_real *color;      /* (h,w,3) */
-    ssdgs_real *alpha;      /* (h,w) */
-    ssdgs_real *depth;      /* (h,w) expected camera depth, sum of weight x depth, not divided by alpha */
-    ssdgs_real *normal;     /* (h,w,3) sum of weight x normal, world */
-    ssdgs_real *diffuse;    /* (h,w,3) */
-    ssdgs_real *specular;   /* (h,w,3) */
-    ssdgs_real *scattering; /* (h,w,3) */
-    ssdgs_real *shadow;     /* (h,w) sum of weight x S, S averaged over the lights */
-} ssdgs_image;
-
-typedef struct ssdgs_render_options {
-    int version;                /* stamped by ssdgs_render_options_default */
-    int terms;                  /* of the model's terms, those to render */
-    int antialias;              /* 1: opacity compensated for pixel_variance (Mip-Splatting) */
-    ssdgs_real background[3];   /* linear; transfer none: stored values */
-    ssdgs_real stop;            /* a pixel is done when its transmittance falls below; 0 = never */
-    ssdgs_real alpha_threshold; /* splats fainter than this at a pixel are not drawn */
-    ssdgs_real max_error; /* Gaussians are left unshaded where, in every pixel, the blend weights of all that
-                             are sum to no more than this; 0 = every Gaussian seen is shaded */
-    ssdgs_real light_detail; /* resolution of the lights' maps, relative to the model's choice */
-} ssdgs_render_options;
-
-/* What a game wants: shortcuts that cannot be seen (less than 0.02 dB against photographs). */
-SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
-/* The method as it is written, every shortcut off: for comparisons and tests. Training uses it. */
-SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
-/* Less than 0.1 dB against photographs. */
-SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
-
-typedef struct ssdgs_render_stats {
-    int gaussians;       /* in the model */
-    int visible;         /* inside the camera's frustum */
-    int shaded;          /* contributing to a pixel; 1 at least where any is glimpsed */
-    int skipped;         /* contributing, but left unshaded within max_error */
-    int rejected;        /* never drawn: position or rotation is not finite, scale or opacity is NaN */
-    int blackened;       /* drawn black: the colour is not finite */
-    int light_views;     /* light maps in use */
-    int camera_cached;   /* 1: projection, order, tiles and what the camera sees are the last frame's */
-    int lights_cached;   /* 1: so is the light pass */
-    int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
-    double network_work; /* share of the networks' multiplications done, neurons dead in a block left out */
-    size_t instances;    /* (tile, splat) pairs of the camera */
-} ssdgs_render_stats;
-
-/* Renders model seen by camera, lit by lights[0 .. light_count). After the first frame of a size nothing is
-   allocated. */
-SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
-                                    int light_count, const ssdgs_image *image);
-/* The same with options (NULL = default) and statistics (may be NULL). */
-SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera,
-                                       const ssdgs_light *lights, int light_count,
-                                       const ssdgs_render_options *options, const ssdgs_image *image,
-                                       ssdgs_render_stats *stats);
-
-/* sRGB transfer curve and its inverse (IEC 61966-2-1). */
-SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear);
-SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
-/* Clamps, encodes by the model's transfer and rounds (count) values to bytes, at most one level off. Like the
-   next two it does nothing where an array is NULL. */
-SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
-
-typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8 } ssdgs_format; /* 4 bytes a pixel */
-
-/* color and alpha of a rendering without background as pixels of straight alpha: encode(color / alpha).
-   Without image->alpha they are opaque. pitch: bytes from one row to the next; negative where `pixels` is the
-   first row of an image stored bottom row first. */
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                               ssdgs_format format, void *pixels, ptrdiff_t pitch);
-/* Stored values (pixels,3) of a rendering without background, color (pixels,3) and alpha (pixels), laid over
-   one of stored values: alpha encode(color / alpha) + (1 - alpha) background. stored may be color. */
-SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
-                             const ssdgs_real background[3], ssdgs_real *stored);
-
-#ifndef SSDGS_NO_TRAINER
-/* ---- training, and comparing with photographs ---- */
-
-typedef struct ssdgs_metrics {
-    double psnr, ssim, flip;
-} ssdgs_metrics; /* dB (100 for equal images); 1 is best; 0 is best */
-
-/* Compares (h,w,3) images of stored values, clamped to [0,1]. */
-SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
-                                     const ssdgs_real *reference, int width, int height,
-                                     ssdgs_metrics *metrics);
-
-typedef enum ssdgs_pixels {
-    SSDGS_PIXELS_RGBA8 = 0,
-    SSDGS_PIXELS_RGBA16
-} ssdgs_pixels; /* native-endian 16 bit */
-
-/* One photograph. The pixels stay the caller's and must outlive the trainer. */
-typedef struct ssdgs_photo {
-    ssdgs_camera camera;
-    ssdgs_light light;
-    const void *pixels; /* (h,w,4), tightly packed, straight alpha, stored values */
-    ssdgs_pixels format;
-} ssdgs_photo;
-
-typedef enum ssdgs_schedule { /* the paper's orders H to K */
-                              SSDGS_SCHEDULE_PROGRESSIVE = 0,
-                              SSDGS_SCHEDULE_JOINT,
-                              SSDGS_SCHEDULE_SWAPPED,
-                              SSDGS_SCHEDULE_MERGED
-} ssdgs_schedule;
-
-/* Learning rate: from start to end by equal factors, to or from 0 by equal steps. */
-typedef struct ssdgs_rate {
-    ssdgs_real start, end;
-} ssdgs_rate;
-
-/* Hyper-parameters. Iterations marked * are those of a 60,000-iteration run and scale with `iterations` below
-   that. */
-typedef struct ssdgs_train_options {
-    int version;           /* stamped by ssdgs_train_options_default / _published */
-    int iterations;        /* 20000 */
-    uint64_t seed;         /* 1 */
-    int schedule;          /* ssdgs_schedule; merged */
-    int random_background; /* 1: photographs are fitted on a new colour each time, so dark splats cannot pass
-                              for a dark background, but for opaque ones that show `background`; 0: on
-                              `background` */
-    int initial_points;    /* random Gaussians in the bounds when the model is empty, less those that
-                              prune_outside drops; where    these are three in four or more others are drawn;
-                              10000 */
-    int max_gaussians;     /* cap of the density control; 100000 */
-    int densify_every, densify_from, densify_until; /* 100, 200, 50000* */
-    int opacity_reset_every; /* 3000, not scaled, the last one at least half of it before densify_until*: with
-                                fewer than 5,400 iterations there is none; 0 = never */
-    int refine_camera,
-        refine_light; /* 1: fit each photograph's pose, but for what all have in common, light position; 0 */
-    ssdgs_real background[3]; /* stored values */
-    ssdgs_real dssim;         /* weight of 1 - SSIM; 0.2 */
-    ssdgs_real
-        normal_weight; /* deferred: of the mean of alpha - N.n, N the blended normals, n those of the blended
-                          depth, so that normals are right where only highlights tell; 0.05; 0 = none */
-    ssdgs_real bounds_min[3],
-        bounds_max[3]; /* where random Gaussians start: the object's box, not the cameras'; -0.5, 0.5 */
-    ssdgs_real densify_gradient; /* screen gradient, in half images, from which a Gaussian is cloned or split;
-                                  4e-4. Where outlines show that the object fills less than 0.15 of a
-                                  photograph it counts for more, by the root */
-    ssdgs_real densify_size;     /* clone below, split above, of the scene's extent; 0.01 */
-    ssdgs_real densify_shadow; /* px: one that lies half in shadow on so much of a photograph that sees it, on
-                                  average, is halved, since no shadow's edge shows within a Gaussian; 0.5; 0 =
-                                  none is */
-    ssdgs_real prune_opacity;  /* a Gaussian below is dropped; 0.005 */
-    ssdgs_real prune_weight;  /* so is one whose blend weight, summed over the pixels, is less than so many px
-                                 on average over the  photographs that see it; 0.05; 0 = none */
-    ssdgs_real prune_outside; /* and one outside of the object's outlines: where more than this share of the
-                                 photographs that have its centre in the picture, and more than one of eight
-                                 or more, are transparent there, 1/128 of the width around, or where none has
-                                 it; 0.02; 0 = none. Photographs have outlines where more than a hundredth of
-                                 the picture is wholly transparent, but not all of it; of eight or more those
-                                 are left out that are transparent on a third of what the others show */
-    ssdgs_real opacity_fade; /* px: where opaque photographs show `background` around the object (see images),
-                                and at most a fiftieth of all have outlines, an opaque Gaussian costs as much
-                                as so many px wrong by 1, less and less up to iteration 30,000*, as those of
-                                the background's colour have no other reason to go; 0.8; 0 = nothing */
-    ssdgs_real adam_epsilon; /* Adam's epsilon, in what 1 / 255 in one colour of one pixel of the photograph
-                                costs (positions: by a move of the bounds' longest side). What no photograph
-                                shows hardly moves; with the published 1e-15 rounding noise takes full steps
-                                without end; 0.1; 0 = 1e-15 */
-    ssdgs_rate position, opacity, scale, rotation,
-        color;             /* over the whole run; position: of 1.1 x the cameras' radius */
-    ssdgs_rate asg, frame; /* start up to iteration 40,000*, end at 90,000*: the published shape */
-    ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
-    ssdgs_rate camera_rate,
-        light_rate; /* up to 60,000*; of the bounds' longest side, turns of the picture's width; for 300 shows
-                       of each photograph; with fewer, times the root of 300 / shows */
-} ssdgs_train_options;
-
-SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
-/* The paper's order of the terms, what rests when, density control and length. Other than in the paper,
-   points start in the bounds, backgrounds are random (random_background) and refinement takes longer steps
-   where photographs are shown seldom. */
-SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
-
-typedef struct ssdgs_train_stats {
-    int iteration; /* done so far */
-    int gaussians;
-    int shaded; /* in this step */
-    int terms;  /* of this step, SSDGS_*_TERM: the schedule's so far; what is still to come is untrained */
-    int skipped_steps; /* refused for non-finite gradients, so far */
-    double loss, psnr; /* of this step's image */
-} ssdgs_train_stats;
-
-/* Returns 0 to stop: ssdgs_trainer_run then returns SSDGS_ERR_CANCELLED, the state is whole. */
-typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
-
-/* Trains model on photos; both must outlive the trainer, the photo structs are copied. A model of 0 Gaussians
-   starts from random points and is given light_scale, centre, length_unit and new networks; one that has
-   Gaussians keeps all it has, but the schedule begins anew: SSDGS_SCHEDULE_JOINT goes on with all terms. Once
-   another trainer's density control or checkpoint, or ssdgs_model_sort(), has moved the Gaussians this one's
-   calls fail with ERR_ARGUMENT. options NULL = default. */
-SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
-                                            const ssdgs_train_options *options, ssdgs_trainer **out);
-SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer);
-/* One iteration. A step with non-finite gradients changes nothing, is counted and returns
-   SSDGS_ERR_NONFINITE. One that runs out of memory changes nothing and can be tried again; where only its
-   density control does, it is done without, as stats->iteration says beside SSDGS_ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
-/* Steps until `iterations` are done; progress (may be NULL) is called after each. Non-finite steps are
-   skipped, ten in a row end the run. */
-SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user);
-/* The training camera and light of photo index as refined so far. */
-SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
-                                             ssdgs_light *light);
-/* About how many bytes a run will hold at max_gaussians, the photographs not counted; 0 for what would be
-   refused. */
-SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
-                                    int width, int height);
-
-#ifndef SSDGS_NO_STDIO
-/* Everything a run needs to go on bit for bit. Load into a trainer made with the same photos, options and
-   settings: others are refused, but for the photos' pixels, which are not looked at. ERR_NONFINITE as on
-   saving a model. */
-SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
-SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
-/* How far the run of a checkpoint had come, which tells whether it may be replaced. ERR_IO without a file,
-   ERR_FORMAT where it is no checkpoint or that of another version. */
-SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration);
-#endif
-
-/* Renders a photograph's camera and light, with the exact options, and compares. image (h,w,3, stored values)
-   may be NULL. background: stored values. */
-SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
-                                      const ssdgs_real background[3], ssdgs_real *image,
-                                      ssdgs_metrics *metrics);
-/* Fits photo's camera and light position to its pixels by `iterations` steps of Adam, the model fixed. */
-SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
-                                          const ssdgs_real background[3], int iterations);
-#endif /* SSDGS_NO_TRAINER */
-
-/* ---- the frame: what the stages read and write, for GPU hooks and engines that run stages of their own
-   ---- */
 
 #define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, camera depth */
 
@@ -952,13 +907,13 @@ typedef struct ssdgs_frame {
     struct ssdgs__frame_memory *memory;
 } ssdgs_frame;
 
-/* Runs the CPU's version of a stage: what a hook calls for the stages it does not replace. */
+/* Runs the CPU's version of a stage: what a hook calls for stages that it does not replace. */
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 
 #ifdef __cplusplus
 }
 #endif
-#endif /* SSDGS_H */
+#endif /* SSDGS_STAGES */
 
 /* Stop here if you only want the interface. */
 
@@ -1967,7 +1922,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
     context->logger = zero.logger;
-    context->gpu = zero.gpu;
+    if (zero.gpu) context->gpu = *zero.gpu;
     context->isa = (int)zero.isa;
     for (isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) context->isa = isa;
@@ -2182,11 +2137,11 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(residual_shadow, 0, 1);
     SSDGS__RANGE(shadow_on_scattering, 0, 1);
     SSDGS__RANGE(scattering_layers, 2, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(scattering_width, 1, 1024);
+    SSDGS__RANGE(scattering_width, 1, SSDGS_MAX_WIDTH);
     SSDGS__RANGE(view_octaves, 0, 8);
     SSDGS__RANGE(light_octaves, 0, 8);
     SSDGS__RANGE(shadow_layers, 0, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(shadow_width, 1, 1024);
+    SSDGS__RANGE(shadow_width, 1, SSDGS_MAX_WIDTH);
     SSDGS__RANGE(light_blur, 0, SSDGS_BLUR_FLOOR);
     SSDGS__RANGE(light_map_size, 0, 8192);
     SSDGS__RANGE(light_bias, 0, (ssdgs_real)1e30);
@@ -2349,12 +2304,156 @@ static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
     return view;
 }
 
-SSDGS_API ssdgs_model_view ssdgs_model_get(ssdgs_model *model) {
+SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model) {
     ssdgs_model_view none;
     memset(&none, 0, sizeof none);
     if (!model) return none;
     ssdgs__model_changed(model);
     return ssdgs__model_view(model);
+}
+
+/* ---- one Gaussian in physical units ---- */
+
+/* log(e^x - 1): what softplus makes x of; -20 for 0. */
+static double ssdgs__softplus_inverse(double x) { return x < 2.1e-9 ? -20 : x > 30 ? x : log(expm1(x)); }
+
+static double ssdgs__logit(double x) {
+    const double raw = log(x) - log1p(-x);
+    return raw < -20 ? -20 : raw > 20 ? 20 : raw;
+}
+
+/* The unit quaternion that turns the z axis into a direction; the identity for 0 0 0. */
+static void ssdgs__turn_to(const ssdgs_real direction[3], double q[4]) {
+    const double x = (double)direction[0], y = (double)direction[1], z = (double)direction[2];
+    const double length = sqrt(x * x + y * y + z * z);
+    q[0] = length + z;
+    q[1] = -y;
+    q[2] = x;
+    q[3] = 0;
+    if (!(length > 0)) q[0] = 1;
+    else if (q[0] <= 1e-9 * length) q[1] = 1, q[0] = q[2] = 0; /* straight down */
+}
+
+static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
+    const ssdgs_real values[] = {g->position[0], g->position[1], g->position[2], g->rotation[0],
+                                 g->rotation[1], g->rotation[2], g->rotation[3], g->normal[0],
+                                 g->normal[1],   g->normal[2]};
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+        if (!ssdgs__finite(values[i])) return i < 3 ? "position" : i < 7 ? "rotation" : "normal";
+    for (int i = 0; i < 3; i++) {
+        if (!(g->scale[i] > 0) || !ssdgs__finite(g->scale[i])) return "scale";
+        if (!(g->diffuse[i] >= 0) || !ssdgs__finite(g->diffuse[i])) return "diffuse";
+        if (!(g->specular[i] >= 0) || !ssdgs__finite(g->specular[i])) return "specular";
+        if (!(g->scattering[i] >= 0) || !ssdgs__finite(g->scattering[i])) return "scattering";
+        if (i < 2 && (!(g->sharpness[i] > 0) || !ssdgs__finite(g->sharpness[i]))) return "sharpness";
+    }
+    for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++)
+        if (!ssdgs__finite(g->material[i])) return "material";
+    if (!(g->opacity >= 0 && g->opacity <= 1)) return "opacity";
+    if (!(g->f0 > 0 && g->f0 < 1)) return "f0";
+    return g->softness >= 0 && g->softness <= 1 ? NULL : "softness";
+}
+
+/* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that has
+   the normal already stays: what it says of directions along the surface would be lost. */
+static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
+    double raw[SSDGS_CHANNELS], size = 0;
+    const int flat = g->normal[0] == 0 && g->normal[1] == 0 && g->normal[2] == 0;
+    ssdgs_real old[4], q[4], r[9], along = 0, length = 0;
+    for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)plane[(size_t)i * stride];
+    for (int i = 0; i < 4; i++) {
+        raw[SSDGS_ROTATION + i] = (double)g->rotation[i];
+        size += fabs((double)g->rotation[i]);
+        old[i] = plane[(size_t)(SSDGS_FRAME + i) * stride];
+    }
+    if (!(size > 0)) ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION);
+    ssdgs__rotation_scalar(old, q, r);
+    for (int i = 0; i < 3; i++) {
+        along += r[3 * i + 2] * g->normal[i];
+        length += g->normal[i] * g->normal[i];
+        raw[SSDGS_POSITION + i] = (double)g->position[i];
+        raw[SSDGS_LOG_SCALE + i] = log((double)g->scale[i]);
+        raw[SSDGS_DIFFUSE + i] = ssdgs__softplus_inverse((double)g->diffuse[i]);
+        raw[SSDGS_SPECULAR + i] = ssdgs__softplus_inverse((double)g->specular[i]);
+        raw[SSDGS_SCATTERING + i] = ssdgs__softplus_inverse((double)g->scattering[i]);
+    }
+    if (flat) memcpy(raw + SSDGS_FRAME, raw + SSDGS_ROTATION, 4 * sizeof *raw);
+    else if (!(along > (ssdgs_real)0.999999 * SSDGS__SQRT(length)))
+        ssdgs__turn_to(g->normal, raw + SSDGS_FRAME);
+    raw[SSDGS_OPACITY] = ssdgs__logit((double)g->opacity);
+    if (deferred) {
+        raw[SSDGS_ASG_WEIGHT] = log((double)g->sharpness[0]);
+        raw[SSDGS_ASG_WEIGHT + 1] = log((double)g->sharpness[1]);
+        raw[SSDGS_ASG_WEIGHT + 2] = ssdgs__logit((double)g->f0) - SSDGS__F0_LOGIT;
+        raw[SSDGS_ASG_WEIGHT + 3] = ssdgs__logit((double)g->softness);
+    }
+    for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++) raw[SSDGS_MATERIAL + i] = (double)g->material[i];
+    for (int i = 0; i < SSDGS_CHANNELS; i++) plane[(size_t)i * stride] = (ssdgs_real)raw[i];
+}
+
+static void ssdgs__gaussian_load(ssdgs_gaussian *g, const ssdgs_real *plane, size_t stride) {
+    ssdgs_real raw[SSDGS_CHANNELS], q[4], r[9];
+    for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = plane[(size_t)i * stride];
+    ssdgs__rotation_scalar(raw + SSDGS_FRAME, q, r);
+    for (int i = 0; i < 3; i++) {
+        g->position[i] = raw[SSDGS_POSITION + i];
+        g->scale[i] = ssdgs__exp_scalar(raw[SSDGS_LOG_SCALE + i]);
+        g->normal[i] = r[3 * i + 2];
+        g->diffuse[i] = ssdgs__softplus_scalar(raw[SSDGS_DIFFUSE + i]);
+        g->specular[i] = ssdgs__softplus_scalar(raw[SSDGS_SPECULAR + i]);
+        g->scattering[i] = ssdgs__softplus_scalar(raw[SSDGS_SCATTERING + i]);
+    }
+    ssdgs__rotation_scalar(raw + SSDGS_ROTATION, g->rotation, r);
+    g->opacity = ssdgs__sigmoid_scalar(raw[SSDGS_OPACITY]);
+    for (int i = 0; i < 2; i++) g->sharpness[i] = ssdgs__exp_scalar(raw[SSDGS_ASG_WEIGHT + i]);
+    g->f0 = ssdgs__sigmoid_scalar(raw[SSDGS_ASG_WEIGHT + 2] + (ssdgs_real)SSDGS__F0_LOGIT);
+    g->softness = ssdgs__sigmoid_scalar(raw[SSDGS_ASG_WEIGHT + 3]);
+    memcpy(g->material, raw + SSDGS_MATERIAL, sizeof g->material);
+}
+
+SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void) {
+    ssdgs_real plane[SSDGS_CHANNELS];
+    ssdgs_gaussian g;
+    ssdgs__gaussian_reset(plane, 1, 0);
+    ssdgs__gaussian_load(&g, plane, 1);
+    return g;
+}
+
+static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *function, int index,
+                                          const ssdgs_gaussian *gaussian) {
+    if (!gaussian) return ssdgs__null(model->context, function, "gaussian");
+    if (index >= 0 && index < model->count) return SSDGS_OK;
+    return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "%s: there is no Gaussian %d, the model has %d",
+                       function, index, model->count);
+}
+
+SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdgs_gaussian *gaussian) {
+    const char *wrong;
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_model_set");
+    if (result) return result;
+    result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
+    wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
+    if (wrong)
+        result = ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
+                             "ssdgs_model_set: the %s of Gaussian %d is out of range", wrong, index);
+    if (!result) {
+        ssdgs__model_changed(model);
+        ssdgs__gaussian_store(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, model->gaussians + index,
+                              model->capacity);
+    }
+    return ssdgs__leave(model->context, result);
+}
+
+SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdgs_gaussian *gaussian) {
+    ssdgs_result result;
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    result = ssdgs__enter(model->context, "ssdgs_model_get");
+    if (result) return result;
+    result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
+    if (!result) ssdgs__gaussian_load(gaussian, model->gaussians + index, model->capacity);
+    return ssdgs__leave(model->context, result);
 }
 
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
@@ -2995,8 +3094,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (result) return result;
     if (m->views.bytes <
         (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
-        m->cache.camera_ready = m->cache.lights_ready = m->cache.shadows_ready =
-            m->cache.transport_ready = 0;
+        m->cache.camera_ready = m->cache.lights_ready = m->cache.shadows_ready = m->cache.transport_ready = 0;
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
     if (!m->cache.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
@@ -3922,14 +4020,14 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
 
 /* Lists of rows for dense products: all of them, and those that live. */
 typedef struct ssdgs__row_lists {
-    uint16_t all[1024], in[1024], out[1024];
+    uint16_t all[SSDGS_MAX_WIDTH], in[SSDGS_MAX_WIDTH], out[SSDGS_MAX_WIDTH];
     uint64_t multiplied, multipliable; /* per Gaussian of a block: done, and of all neurons */
     int shadows_cached;
 } ssdgs__row_lists;
 
 static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     int i;
-    for (i = 0; i < 1024; i++) lists->all[i] = (uint16_t)i;
+    for (i = 0; i < SSDGS_MAX_WIDTH; i++) lists->all[i] = (uint16_t)i;
     lists->multiplied = lists->multipliable = 0;
     lists->shadows_cached = 0;
 }
@@ -6863,14 +6961,12 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.densify_until = 50000;
     o.opacity_reset_every = 3000;
     o.densify_gradient = (ssdgs_real)4e-4;
-    o.densify_size = (ssdgs_real)0.01;
     o.densify_shadow = (ssdgs_real)0.5;
-    o.prune_opacity = (ssdgs_real)0.005;
     o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
-    o.opacity_fade = (ssdgs_real)0.8;
     o.adam_epsilon = (ssdgs_real)0.1;
-#define SSDGS__RATE(field, first, last) o.field.start = (ssdgs_real)(first), o.field.end = (ssdgs_real)(last)
+#define SSDGS__RATE(field, first, last) \
+    o.rates.field.start = (ssdgs_real)(first), o.rates.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
     SSDGS__RATE(scale, 0.005, 0.005);
@@ -6881,8 +6977,8 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     SSDGS__RATE(material, 0.001, 1e-5);
     SSDGS__RATE(shadow, 0.001, 1e-5);
     SSDGS__RATE(scattering, 0.001, 1e-5);
-    SSDGS__RATE(camera_rate, 1e-3, 1e-5);
-    SSDGS__RATE(light_rate, 1e-3, 5e-5);
+    SSDGS__RATE(camera, 1e-3, 1e-5);
+    SSDGS__RATE(light, 1e-3, 5e-5);
 #undef SSDGS__RATE
     return o;
 }
@@ -6895,7 +6991,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
-    o.prune_weight = o.prune_outside = o.opacity_fade = o.adam_epsilon = 0;
+    o.prune_weight = o.prune_outside = o.adam_epsilon = 0;
     return o;
 }
 
@@ -6945,18 +7041,18 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
     const ssdgs_train_options *o = &trainer->options;
     const double whole = o->iterations > 60000 ? o->iterations : 60e3;
     switch (group) {
-    case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->position, 0, whole, t);
-    case SSDGS__G_ROTATION: return ssdgs__decay(o->rotation, 0, whole, t);
-    case SSDGS__G_SCALE: return ssdgs__decay(o->scale, 0, whole, t);
-    case SSDGS__G_OPACITY: return ssdgs__decay(o->opacity, 0, whole, t);
+    case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->rates.position, 0, whole, t);
+    case SSDGS__G_ROTATION: return ssdgs__decay(o->rates.rotation, 0, whole, t);
+    case SSDGS__G_SCALE: return ssdgs__decay(o->rates.scale, 0, whole, t);
+    case SSDGS__G_OPACITY: return ssdgs__decay(o->rates.opacity, 0, whole, t);
     case SSDGS__G_DIFFUSE:
     case SSDGS__G_SPECULAR:
-    case SSDGS__G_SCATTERING: return ssdgs__decay(o->color, 0, whole, t);
-    case SSDGS__G_FRAME: return ssdgs__decay(o->frame, 40e3, 50e3, t);
-    case SSDGS__G_MATERIAL: return ssdgs__decay(o->material, 50e3, 50e3, t);
-    case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return ssdgs__decay(o->scattering, 50e3, 50e3, t);
-    case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return ssdgs__decay(o->shadow, 50e3, 50e3, t);
-    default: return ssdgs__decay(o->asg, 40e3, 50e3, t);
+    case SSDGS__G_SCATTERING: return ssdgs__decay(o->rates.color, 0, whole, t);
+    case SSDGS__G_FRAME: return ssdgs__decay(o->rates.frame, 40e3, 50e3, t);
+    case SSDGS__G_MATERIAL: return ssdgs__decay(o->rates.material, 50e3, 50e3, t);
+    case SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET: return ssdgs__decay(o->rates.scattering, 50e3, 50e3, t);
+    case SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET: return ssdgs__decay(o->rates.shadow, 50e3, 50e3, t);
+    default: return ssdgs__decay(o->rates.asg, 40e3, 50e3, t);
     }
 }
 
@@ -7399,6 +7495,9 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
 #define SSDGS__STATISTICS 4
+#define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
+#define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
+#define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
 #define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
 #define SSDGS__HALVED \
     0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
@@ -7496,7 +7595,7 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
             p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from])
             longest = c;
     if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <=
-                      log((double)o->densify_size * trainer->extent))
+                      log(SSDGS__SPLIT_SIZE * trainer->extent))
         return; /* the copy is the clone */
     for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
     ssdgs__rotation_scalar(raw, q, r);
@@ -7618,7 +7717,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const size_t n = (size_t)model->count;
     const double largest_size =
         0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
-    const ssdgs_real faint = (ssdgs_real)log((double)o->prune_opacity / (1 - (double)o->prune_opacity));
+    const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: weights say little */
     const int before = trainer->iteration - 1,
               last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
@@ -7757,12 +7856,9 @@ static double ssdgs__bounds_side(const ssdgs_train_options *o) {
 }
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
-    static const char *const names[12] = {"position", "opacity",    "scale",       "rotation",
-                                          "color",    "asg",        "frame",       "material",
-                                          "shadow",   "scattering", "camera_rate", "light_rate"};
-    const ssdgs_rate rates[12] = {o->position, o->opacity,    o->scale,       o->rotation,
-                                  o->color,    o->asg,        o->frame,       o->material,
-                                  o->shadow,   o->scattering, o->camera_rate, o->light_rate};
+    static const char *const names[12] = {"position", "opacity",  "scale",  "rotation",   "color",  "asg",
+                                          "frame",    "material", "shadow", "scattering", "camera", "light"};
+    const ssdgs_rate *rates = &o->rates.position;
     const ssdgs_real most = (ssdgs_real)1e30;
     int i;
     if (o->version != SSDGS_VERSION)
@@ -7774,15 +7870,13 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(max_gaussians, 1, SSDGS__MAX_GAUSSIANS);
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
+    SSDGS__RANGE(refine, 0, SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT);
     SSDGS__RANGE(dssim, 0, 1);
     SSDGS__RANGE(normal_weight, 0, most);
     SSDGS__RANGE(densify_gradient, 0, most);
-    SSDGS__RANGE(densify_size, (ssdgs_real)1e-30, most);
     SSDGS__RANGE(densify_shadow, 0, most);
-    SSDGS__RANGE(prune_opacity, (ssdgs_real)1e-30, (ssdgs_real)0.999);
     SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
-    SSDGS__RANGE(opacity_fade, 0, most);
     SSDGS__RANGE(adam_epsilon, 0, most);
 #undef SSDGS__RANGE
     for (i = 0; i < 12; i++)
@@ -8473,7 +8567,7 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
         ssdgs__note(
             trainer->context,
             "too few photographs are transparent around the object, but their borders have the colour of "
-            "`background`: it is taken for empty, and Gaussians of its colour fade (opacity_fade=0 keeps "
+            "`background`: it is taken for empty, and Gaussians of its colour fade (prune_outside=0 keeps "
             "them)");
     else
         ssdgs__note(trainer->context,
@@ -8642,13 +8736,14 @@ static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     return (int)trainer->order[at];
 }
 
-/* Adds the gradient of opacity_fade x the sum of opacities / pixels at time t, where outlines are not
+/* Adds the gradient of SSDGS__FADE x the sum of opacities / pixels at time t, where outlines are not
    known. */
 static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, ssdgs_real *gradient) {
     const size_t n = (size_t)trainer->model->count;
     const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
-    const double fade =
-        !trainer->backdrop || t >= 30e3 ? 0 : (double)trainer->options.opacity_fade * (1 - t / 30e3) / pixels;
+    const double fade = !trainer->backdrop || trainer->options.prune_outside <= 0 || t >= 30e3
+                            ? 0
+                            : SSDGS__FADE * (1 - t / 30e3) / pixels;
     size_t i;
     for (i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
@@ -8696,8 +8791,8 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     if (result) return result;
     ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
     for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-    moves[0] = o->refine_camera && t >= 5e3;
-    moves[1] = o->refine_light && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
+    moves[0] = (o->refine & SSDGS_REFINE_CAMERA) && t >= 5e3;
+    moves[1] = (o->refine & SSDGS_REFINE_LIGHT) && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
     for (j = 0; j < 9 && !result; j++)
         if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
@@ -8714,14 +8809,14 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
         const double angle = ssdgs__view_angle(&camera);
         if (moves[0])
             ssdgs__correction_step(correction, gradient, 0,
-                                   wider * ssdgs__decay(o->camera_rate, 0, 60e3, t) *
+                                   wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) *
                                        (t < 20e3 ? t / 20e3 : 1),
                                    trainer->unit, angle);
-        if (moves[0] && o->position.start > 0)
+        if (moves[0] && o->rates.position.start > 0)
             ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
         if (moves[1])
             ssdgs__correction_step(correction, gradient, 1,
-                                   wider * ssdgs__decay(o->light_rate, 0, 60e3, t) *
+                                   wider * ssdgs__decay(o->rates.light, 0, 60e3, t) *
                                        (t < 30e3 ? t / 30e3 : 1),
                                    trainer->unit, angle);
     }
@@ -9020,6 +9115,7 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
 
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
     const ssdgs_settings *s = &trainer->model->settings;
+    const ssdgs_train_options *o = &trainer->options;
     int i;
     memset(head, 0, sizeof *head);
     memcpy(head->magic, SSDGS__CHECKPOINT_MAGIC, 8);
@@ -9027,9 +9123,11 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
-    /* an even number of ints, then reals: no padding but at the end */
-    head->inputs = ssdgs__fold(UINT64_C(0xCBF29CE484222325), &trainer->options,
-                               offsetof(ssdgs_train_options, light_rate) + sizeof(ssdgs_rate));
+    /* ints, then reals, without the padding between them */
+    head->inputs =
+        ssdgs__fold(UINT64_C(0xCBF29CE484222325), o, offsetof(ssdgs_train_options, refine) + sizeof(int));
+    head->inputs =
+        ssdgs__fold(head->inputs, o->background, sizeof *o - offsetof(ssdgs_train_options, background));
     head->inputs = ssdgs__fold(head->inputs, &s->terms, SSDGS__SETTINGS_INTS);
     head->inputs =
         ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
@@ -10501,7 +10599,7 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * dept
 }
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
-    F(offsets) depth[1024];
+    F(offsets) depth[SSDGS_MAX_WIDTH];
     int column = 0, k;
     for (k = 0; k < p->depth; k++) {
         depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);

@@ -389,14 +389,17 @@ STAGES(HOOK)
 static void open_session(const bench *b, session *s, int isa, int threads, int hooks,
                          const ssdgs_allocator *allocator) {
     ssdgs_context_desc desc;
+    ssdgs_gpu_hook gpu;
     memset(&desc, 0, sizeof desc);
+    memset(&gpu, 0, sizeof gpu);
     memset(s, 0, sizeof *s);
     desc.isa = (ssdgs_isa)isa;
     desc.threads = threads;
     if (allocator) desc.allocator = *allocator;
-#define SET(name) desc.gpu.stage[SSDGS_STAGE_##name] = hooks ? time_##name : NULL;
+#define SET(name) gpu.stage[SSDGS_STAGE_##name] = time_##name;
     STAGES(SET)
-    desc.gpu.user = s;
+    gpu.user = s;
+    if (hooks) desc.gpu = &gpu;
     check(NULL, ssdgs_context_create(&desc, &s->context));
     check(s->context, ssdgs_model_load(s->context, b->model, &s->model, NULL));
 }
@@ -893,7 +896,7 @@ static void measure_scaling(bench *b) {
         for (k = 0; k < 2;
              k++) { /* the same frame twice; a model that changed in between, so that all is done again */
             const int before = m.allocations;
-            ssdgs_model_get(s.model);
+            ssdgs_model_arrays(s.model);
             run(b, &j, 0, NULL);
             m.allocations -= k ? before : 0;
         }

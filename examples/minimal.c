@@ -4,57 +4,72 @@
 #include "../ssdgs.h"
 #include "olat.h"
 
+enum { BALL = 1500, SIDE = 40, FLOOR = SIDE * SIDE, WIDTH = 320, HEIGHT = 240 };
+
+/* A flat disc of the surface at `position` that faces along `normal`. */
+static ssdgs_gaussian disc(const float position[3], const float normal[3], float radius, const float color[3],
+                           float shine) {
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    for (int i = 0; i < 3; i++) {
+        g.position[i] = position[i];
+        g.normal[i] = normal[i];
+        g.scale[i] = i < 2 ? radius : radius / 20;
+        g.diffuse[i] = color[i];
+        g.specular[i] = shine;
+    }
+    memset(g.rotation, 0, sizeof g.rotation); /* none: the third axis is the normal */
+    g.opacity = 0.99f;
+    return g;
+}
+
+static ssdgs_result fill(ssdgs_model *model) {
+    const float orange[3] = {0.9f, 0.22f, 0.06f}, grey[3] = {0.42f, 0.42f, 0.42f}, up[3] = {0, 0, 1};
+    ssdgs_result result = SSDGS_OK;
+    for (int i = 0; i < BALL && !result; i++) { /* along a spiral from pole to pole */
+        const float z = 1 - (2 * (float)i + 1) / BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
+        const float normal[3] = {r * cosf(turn), r * sinf(turn), z};
+        const float position[3] = {0.6f * normal[0], 0.6f * normal[1], 0.6f * normal[2] + 0.1f};
+        const ssdgs_gaussian g = disc(position, normal, 0.045f, orange, 0.55f);
+        result = ssdgs_model_set(model, i, &g);
+    }
+    for (int i = 0; i < FLOOR && !result; i++) {
+        const float position[3] = {0.1f * (float)(i % SIDE) - 2, 0.1f * (float)(i / SIDE) - 2, -0.5f};
+        const ssdgs_gaussian g = disc(position, up, 0.06f, grey, 0);
+        result = ssdgs_model_set(model, BALL + i, &g);
+    }
+    return result ? result : ssdgs_model_sort(model);
+}
+
 int main(int argc, char **argv) {
-    enum { BALL = 1500, FLOOR = 40, COUNT = BALL + FLOOR * FLOOR, W = 320, H = 240 };
-    static ssdgs_real color[W * H * 3], eye[3] = {0, -4, 2}, target[3] = {0, 0, 0.2f}, up[3] = {0, 0, 1};
-    static unsigned char bytes[W * H * 3];
-    char error[512] = "";
+    static float color[WIDTH * HEIGHT * 3];
+    static unsigned char bytes[WIDTH * HEIGHT * 3];
+    const char *path = argc > 1 ? argv[1] : "build/minimal.png";
+    const float eye[3] = {0, -4, 2}, target[3] = {0, 0, 0.2f}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, WIDTH, HEIGHT);
+    const ssdgs_light light = {SSDGS_LIGHT_POINT, {2, -2, 3}, {140, 140, 140}};
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, W, H);
-    ssdgs_light light = {SSDGS_LIGHT_POINT, {2, -2, 3}, {60, 60, 60}};
+    ssdgs_image image = {0};
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_image image = {0, color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    int i, c;
-    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM; /* no networks to train */
-    settings.shadow_layers = 0;
-    settings.light_bias = 0.2f; /* 3 standard deviations: coarse Gaussians must not shadow their neighbours */
-    if (ssdgs_context_create(NULL, &context) || ssdgs_model_create(context, &settings, COUNT, &model))
-        return 1;
-    for (i = 0; i < COUNT; i++) { /* flat Gaussians whose z axis is the normal (x, y, z): a spiral round the
-                                     ball, then a grid */
-        ssdgs_model_view view = ssdgs_model_get(model);
-        int ball = i < BALL, k = i - BALL;
-        double z = ball ? 1 - (2 * i + 1.0) / BALL : 1, r = sqrt(1 - z * z), x = r * cos(2.4 * i),
-               y = r * sin(2.4 * i);
-        double raw[SSDGS_SCATTERING] = {ball ? 0.6 * x : k % FLOOR * 0.1 - 2,
-                                        ball ? 0.6 * y : k / FLOOR * 0.1 - 2,
-                                        ball ? 0.6 * z + 0.1 : -0.5,
-                                        1 + z,
-                                        -y,
-                                        x,
-                                        0,
-                                        ball ? -3.1 : -2.8,
-                                        ball ? -3.1 : -2.8,
-                                        -6,
-                                        6, /* size, opacity */
-                                        ball ? 2 : 0.5,
-                                        ball ? -0.5 : 0.5,
-                                        ball ? -2 : 0.5,
-                                        ball ? 1. : -4.,
-                                        ball ? 1. : -4.,
-                                        ball ? 1. : -4.}; /* colours */
-        for (c = 0; c < SSDGS_SCATTERING; c++)
-            view.gaussians[(size_t)c * view.stride + (size_t)i] = (ssdgs_real)raw[c];
-        for (c = 0; c < 4; c++)
-            view.gaussians[(size_t)(SSDGS_FRAME + c) * view.stride + (size_t)i] = (ssdgs_real)raw[3 + c];
-    }
-    if (ssdgs_model_sort(model) || ssdgs_render(model, &camera, &light, 1, &image))
-        return fprintf(stderr, "%s\n", ssdgs_error_message(context)), 1;
-    ssdgs_to_bytes(color, W * H * 3, settings.transfer, bytes);
-    if (olat_write_png(argc > 1 ? argv[1] : "build/minimal.png", W, H, 3, bytes, error))
-        return fprintf(stderr, "%s\n", error), 1;
+    ssdgs_result result;
+    char error[512] = "";
+
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
+    settings.shadow_layers = 0; /* nothing here is trained */
+    settings.light_bias = 0.2f; /* discs as coarse as these must not shadow their neighbours */
+    image.color = color;
+
+    result = ssdgs_context_create(NULL, &context);
+    if (!result) result = ssdgs_model_create(context, &settings, BALL + FLOOR, &model);
+    if (!result) result = fill(model);
+    if (!result) result = ssdgs_render(model, &camera, &light, 1, &image);
+    if (result) fprintf(stderr, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(context));
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
-    return 0;
+    if (result) return 1;
+
+    ssdgs_to_bytes(color, WIDTH * HEIGHT * 3, settings.transfer, bytes);
+    if (!olat_write_png(path, WIDTH, HEIGHT, 3, bytes, error)) return 0;
+    fprintf(stderr, "%s\n", error);
+    return 1;
 }

@@ -264,7 +264,7 @@ static int make_trajectory(job *j) {
     double axes[3][3], intensity[3] = {0, 0, 0};
     orbit camera_orbit, light_orbit;
     ssdgs_real eye[3], centre[3], up[3];
-    ssdgs_model_view model = ssdgs_model_get(j->model);
+    ssdgs_model_view model = ssdgs_model_arrays(j->model);
     int i, k, count = 2 * (150 + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
     first = data->frames[0].camera;

@@ -74,6 +74,8 @@ typedef struct field {
     { #name, IN_SETTINGS, reals, count, offsetof(ssdgs_settings, name) }
 #define OPTION(reals, count, name) \
     { #name, IN_OPTIONS, reals, count, offsetof(ssdgs_train_options, name) }
+#define RATE(name, member) \
+    { #name, IN_OPTIONS, 1, 2, offsetof(ssdgs_train_options, member) }
 #define CORNER(name) \
     { #name, IN_CORNERS, 1, 3, offsetof(corners, name) }
 static const field fields[] = {SETTING(0, 1, dipole),
@@ -99,32 +101,28 @@ static const field fields[] = {SETTING(0, 1, dipole),
                                OPTION(0, 1, densify_from),
                                OPTION(0, 1, densify_until),
                                OPTION(0, 1, opacity_reset_every),
-                               OPTION(0, 1, refine_camera),
-                               OPTION(0, 1, refine_light),
+                               OPTION(0, 1, refine),
                                OPTION(1, 1, dssim),
                                OPTION(1, 1, normal_weight),
                                CORNER(bounds_min),
                                CORNER(bounds_max),
                                OPTION(1, 1, densify_gradient),
-                               OPTION(1, 1, densify_size),
                                OPTION(1, 1, densify_shadow),
-                               OPTION(1, 1, prune_opacity),
                                OPTION(1, 1, prune_weight),
                                OPTION(1, 1, prune_outside),
-                               OPTION(1, 1, opacity_fade),
                                OPTION(1, 1, adam_epsilon),
-                               OPTION(1, 2, position),
-                               OPTION(1, 2, opacity),
-                               OPTION(1, 2, scale),
-                               OPTION(1, 2, rotation),
-                               OPTION(1, 2, color),
-                               OPTION(1, 2, asg),
-                               OPTION(1, 2, frame),
-                               OPTION(1, 2, material),
-                               OPTION(1, 2, shadow),
-                               OPTION(1, 2, scattering),
-                               OPTION(1, 2, camera_rate),
-                               OPTION(1, 2, light_rate)};
+                               RATE(position, rates.position),
+                               RATE(opacity, rates.opacity),
+                               RATE(scale, rates.scale),
+                               RATE(rotation, rates.rotation),
+                               RATE(color, rates.color),
+                               RATE(asg, rates.asg),
+                               RATE(frame, rates.frame),
+                               RATE(material, rates.material),
+                               RATE(shadow, rates.shadow),
+                               RATE(scattering, rates.scattering),
+                               RATE(camera_rate, rates.camera),
+                               RATE(light_rate, rates.light)};
 
 /* NAME=VALUE[,VALUE...], the name and the number of values telling the field; what is wrong, or NULL. */
 static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *options, corners *bounds,
@@ -330,7 +328,7 @@ static int parse(job *j, int argc, char **argv) {
     if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
-    j->options.refine_camera = j->options.refine_light = given[REFINE] != NULL;
+    if (given[REFINE]) j->options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     for (i = 0; i < 3; i++) {
         j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
         j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
@@ -441,7 +439,7 @@ static int train(job *j) {
                *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
     char error[512] = "", text[32], *test_json = (char *)malloc(strlen(j->dataset) + 32);
     int i, width = 0, height = 0, has_test;
-    const int refines = j->options.refine_camera || j->options.refine_light;
+    const int refines = j->options.refine != 0;
     double start = seconds_now();
     ssdgs_result result;
     FILE *file;
@@ -517,7 +515,7 @@ static int train(job *j) {
         return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
                fail(error);
     }
-    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_get(j->model).count,
+    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_arrays(j->model).count,
            clock_text(seconds_now() - start, text));
     print_peak_memory();
     printf("\n");

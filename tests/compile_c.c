@@ -1,5 +1,8 @@
 /* Every function of the interface, by its address: the header alone compiles, and a definition of each
    exists. */
+#ifndef SSDGS_STAGES
+#define SSDGS_STAGES
+#endif
 #include "../ssdgs.h"
 #include "test.h"
 
@@ -16,6 +19,9 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_settings_published),
                                          ADDRESS(ssdgs_model_create),
                                          ADDRESS(ssdgs_model_destroy),
+                                         ADDRESS(ssdgs_model_arrays),
+                                         ADDRESS(ssdgs_gaussian_default),
+                                         ADDRESS(ssdgs_model_set),
                                          ADDRESS(ssdgs_model_get),
                                          ADDRESS(ssdgs_model_settings),
                                          ADDRESS(ssdgs_model_sort),

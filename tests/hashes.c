@@ -44,11 +44,11 @@ static ssdgs_result train(ssdgs_model *model, uint64_t *hash) {
     options.schedule = SSDGS_SCHEDULE_JOINT;
     options.initial_points = 500;
     options.densify_every = options.densify_from = 20;
-    options.refine_camera = options.refine_light = 1;
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
     if (!result) result = ssdgs_trainer_run(trainer, NULL, NULL);
     ssdgs_trainer_destroy(trainer);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (size_t c = 0; c < SSDGS_CHANNELS; c++)
         *hash = hash_bytes(*hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     *hash = hash_bytes(*hash, v.scattering, v.scattering_count * sizeof(ssdgs_real));

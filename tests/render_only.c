@@ -23,7 +23,7 @@ int main(void) {
         if (ssdgs_context_create(NULL, &context) ||
             ssdgs_model_create(context, &settings[kind], COUNT, &model))
             return 1;
-        view = ssdgs_model_get(model);
+        view = ssdgs_model_arrays(model);
         for (i = 0; i < COUNT; i++)
             for (c = 0; c < SSDGS_CHANNELS; c++)
                 view.gaussians[(size_t)c * view.stride + (size_t)i] +=

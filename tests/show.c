@@ -55,10 +55,13 @@ static int open_dataset(show *s, const char *folder, const char *background) {
 
 static int open_model(show *s, const char *path) {
     ssdgs_context_desc desc;
+    ssdgs_gpu_hook gpu;
     ssdgs_model_destroy(s->model);
     s->model = NULL;
     memset(&desc, 0, sizeof desc);
-    desc.gpu.stage[SSDGS_STAGE_SHADE] = show_visibility;
+    memset(&gpu, 0, sizeof gpu);
+    gpu.stage[SSDGS_STAGE_SHADE] = show_visibility;
+    desc.gpu = &gpu;
     if (!s->context && (ssdgs_context_create(NULL, &s->context) || ssdgs_context_create(&desc, &s->coarse)))
         return failed(s, "no context");
     if (ssdgs_model_load(s->context, path, &s->model, NULL))

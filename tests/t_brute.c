@@ -94,7 +94,7 @@ static ssdgs_model *make_model(ssdgs_context *context) {
     ssdgs_model_view v;
     size_t c, i;
     if (!CHECK(!ssdgs_model_create(context, &s.settings, s.count, &model))) exit(1);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (c = 0; c < SSDGS_CHANNELS; c++)
         memcpy(v.gaussians + c * v.stride, s.raw[c], (size_t)s.count * sizeof(ssdgs_real));
     memcpy(v.asg_basis, s.basis, sizeof s.basis);
@@ -1087,7 +1087,7 @@ static void test_veil(void) {
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     if (!CHECK(!ssdgs_model_create(best(), &settings, FLOOR + 1, &model))) exit(1);
     for (tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
-        const ssdgs_model_view v = ssdgs_model_get(model);
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
         double shadow;
         for (i = 0; i <= FLOOR; i++) {
             ssdgs_real *p = v.gaussians + i;

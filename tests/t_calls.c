@@ -140,10 +140,13 @@ static void test_from_within(void) {
     for (from = 0; from < 4; from++)
         for (with_trainer = 0; with_trainer < 2; with_trainer++) {
             ssdgs_context_desc desc;
+            ssdgs_gpu_hook gpu;
             ssdgs_real bad = photo.camera.near_plane;
             memset(&desc, 0, sizeof desc);
             desc.threads = 2;
-            if (from == 0) desc.gpu.stage[SSDGS_STAGE_SHADE] = hook;
+            memset(&gpu, 0, sizeof gpu);
+            gpu.stage[SSDGS_STAGE_SHADE] = hook;
+            if (from == 0) desc.gpu = &gpu;
             if (from == 1) desc.parallel.run = run;
             if (from == 2) desc.allocator.allocate = allocate, desc.allocator.release = release;
             if (from == 3) desc.logger.write = hear;
@@ -369,7 +372,7 @@ static void test_shared(void) {
             char text[100];
             set_up(NULL, 1);
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
-            view = ssdgs_model_get(all.model);
+            view = ssdgs_model_arrays(all.model);
             at[0] = view.asg_basis, at[1] = view.asg_sharpness, at[2] = view.asg_sigma,
             at[3] = view.scattering, at[4] = view.shadow;
             at[group][5] = kind ? (ssdgs_real)NAN : (ssdgs_real)INFINITY;
@@ -381,7 +384,7 @@ static void test_shared(void) {
             snprintf(text, sizeof text, FILE_NAME ": model: value 5 of %s is not finite", names[group]);
             CHECK(ssdgs_model_save(all.model, FILE_NAME) == SSDGS_ERR_NONFINITE &&
                   !strcmp(ssdgs_error_message(all.context), text));
-            view = ssdgs_model_get(all.model);
+            view = ssdgs_model_arrays(all.model);
             at[group][5] = 0;
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
             tear_down();

@@ -19,7 +19,7 @@ static ssdgs_model *make_model(ssdgs_context *context) {
     size_t i, c;
     settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (i = 0; i < COUNT; i++) {
         const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
         const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z,
@@ -73,7 +73,7 @@ static void check_same(ssdgs_model *model, const ssdgs_camera *camera, const ssd
     if (!test_check(stats.camera_cached == camera_cached && stats.lights_cached == lights_cached, __FILE__,
                     __LINE__, name))
         printf("    camera kept %d, lights kept %d\n", stats.camera_cached, stats.lights_cached);
-    (void)ssdgs_model_get(model); /* forget */
+    (void)ssdgs_model_arrays(model); /* forget */
     render(model, camera, lights, count, options, image[1], &stats);
     CHECK(!stats.camera_cached && !stats.lights_cached && stats.shadows_cached == 0);
     test_check(!memcmp(image[0], image[1], sizeof image[0]), __FILE__, __LINE__, name);
@@ -136,7 +136,7 @@ static void test_kept(void) {
     render(other, &a, lights, 2, &options, image[1], NULL);
     check_same(model, &a, lights, 2, &options, 0, 0, "another model between");
     FIRST();
-    view = ssdgs_model_get(model);
+    view = ssdgs_model_arrays(model);
     view.gaussians[SSDGS_POSITION * view.stride] += (ssdgs_real)0.2;
     check_same(model, &a, lights, 2, &options, 0, 0, "the model changed");
     ssdgs_model_destroy(other);
@@ -249,7 +249,7 @@ static void test_walk(void) {
                 break;
             case 17: /* the model's own, in both contexts */
                 for (k = 0; k < 2; k++) {
-                    const ssdgs_model_view v = ssdgs_model_get(models[k][which]);
+                    const ssdgs_model_view v = ssdgs_model_arrays(models[k][which]);
                     v.gaussians[(size_t)channel * v.stride + (size_t)gaussian] += 2 * value - 1;
                     v.scattering[channel] += value - (ssdgs_real)0.5;
                 }
@@ -352,7 +352,7 @@ static void test_spent_budget(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context)) ||
         !CHECK(!ssdgs_model_create(context, NULL, LAYERS, &model)))
         exit(1);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (i = 0; i < LAYERS; i++) {
         v.gaussians[SSDGS_POSITION * v.stride + (size_t)i] = (ssdgs_real)(0.001 * i);
         v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.6;
@@ -540,7 +540,7 @@ static void test_all_glimpsed(void) {
         exit(1);
     for (pass = 0; pass < 2; pass++) {
         options.max_error = (ssdgs_real)(pass ? 0.5 : 0);
-        v = ssdgs_model_get(model);
+        v = ssdgs_model_arrays(model);
         for (i = 0; i < 3; i++) {
             v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.5;
             for (c = 0; c < 3; c++)

@@ -219,7 +219,7 @@ static void make_photos(void) {
     options.densify_from = options.densify_every = DENSE;
     options.opacity_reset_every = RESETS;
     options.densify_gradient = (ssdgs_real)1e-4;
-    options.refine_camera = options.refine_light = 1;
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
 }
 
 static ssdgs_settings small_settings(int width) {
@@ -236,7 +236,7 @@ static ssdgs_model *random_model(int count, int width) {
     ssdgs_model_view v;
     int i, c;
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &m))) exit(1);
-    v = ssdgs_model_get(m);
+    v = ssdgs_model_arrays(m);
     for (i = 0; i < count; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1;
@@ -965,8 +965,8 @@ static void test_checkpoints(void) {
         options = other;
         if (i == 0) options.seed++;
         if (i == 1) options.iterations++;
-        if (i == 2) options.position.end = 0;
-        if (i == 3) options.light_rate.end *= 2;
+        if (i == 2) options.rates.position.end = 0;
+        if (i == 3) options.rates.light.end *= 2;
         if (i == 4) options.prune_weight = 0;
         settings = small_settings(i == 5 ? 9 : 8);
         settings.transport = i != 6;

@@ -93,7 +93,7 @@ static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
     ssdgs_model_view view;
     if (!CHECK(!ssdgs_model_create(context, settings, (int)gold_find(&file, "mean")->dims[0], &model)))
         exit(1);
-    view = ssdgs_model_get(model);
+    view = ssdgs_model_arrays(model);
     to_planes("mean", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
     to_planes("quat", view.gaussians + SSDGS_ROTATION * view.stride, view.stride);
     to_planes("log_scale", view.gaussians + SSDGS_LOG_SCALE * view.stride, view.stride);
@@ -284,7 +284,7 @@ static void test_asg(void) {
     run.n = gold_find(&file, "position")->dims[0];
     run.stride = (run.n + BLOCK - 1) / BLOCK * BLOCK;
     if (!CHECK(!ssdgs_model_create(context, &settings, (int)run.n, &run.model))) exit(1);
-    view = ssdgs_model_get(run.model);
+    view = ssdgs_model_arrays(run.model);
     to_planes("position", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
     to_planes("frame_quat", view.gaussians + SSDGS_FRAME * view.stride, view.stride);
     to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * view.stride, view.stride);
@@ -669,7 +669,7 @@ static void test_full(const char *name, int defaults) {
     settings.view_octaves = settings.light_octaves = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
     model = gold_geometry(&settings);
-    view = ssdgs_model_get(model);
+    view = ssdgs_model_arrays(model);
     stride = view.stride;
     to_planes("kd_raw", view.gaussians + SSDGS_DIFFUSE * stride, stride);
     to_planes("ks_raw", view.gaussians + SSDGS_SPECULAR * stride, stride);

@@ -23,7 +23,7 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
 /* Soft, small splats spread in depth: smooth almost everywhere. */
 static void fill(ssdgs_model *model) {
-    ssdgs_model_view v = ssdgs_model_get(model);
+    ssdgs_model_view v = ssdgs_model_arrays(model);
     uint64_t at = 0;
     size_t i;
     int c;
@@ -356,7 +356,7 @@ static void test_edges(void) {
     light.position[1] = 2;
     for (c = 0; c < 3; c++) light.intensity[c] = 1;
     if (!CHECK(!ssdgs_model_create(context, &settings, 2, &model))) exit(1);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     v.gaussians[SSDGS_OPACITY * v.stride] =
         -8; /* too faint for the light's map: nothing is known to be in its way */
     memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);

@@ -69,7 +69,7 @@ static ssdgs_model *make_model(int count) {
     settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
-    view = ssdgs_model_get(model);
+    view = ssdgs_model_arrays(model);
     for (channel = 0; channel < SSDGS_CHANNELS; channel++)
         for (i = 0; i < count; i++)
             view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
@@ -87,7 +87,7 @@ static ssdgs_model *make_model(int count) {
 }
 
 static int same_globals(ssdgs_model *a, ssdgs_model *b) {
-    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
     const size_t real = sizeof *u.shadow;
     return u.scattering_count == v.scattering_count && u.shadow_count == v.shadow_count &&
            !memcmp(u.asg_basis, v.asg_basis, SSDGS_ASG_COUNT * 4 * real) &&
@@ -98,7 +98,7 @@ static int same_globals(ssdgs_model *a, ssdgs_model *b) {
 }
 
 static int same_gaussians(ssdgs_model *a, ssdgs_model *b) {
-    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
     int channel, equal = u.count == v.count;
     for (channel = 0; equal && channel < SSDGS_CHANNELS; channel++)
         equal = !memcmp(u.gaussians + (size_t)channel * u.stride, v.gaussians + (size_t)channel * v.stride,
@@ -434,7 +434,7 @@ static void test_foreign(void) {
                                 : 0.25 * i - 14);
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
-        view = ssdgs_model_get(back);
+        view = ssdgs_model_arrays(back);
         CHECK(stats.plain && stats.clamped_opacities == 3 && stats.dropped == 0 &&
               stats.zero_rotations == 0 && view.count == 3);
         CHECK(ssdgs_model_settings(back)->baked == 1 &&
@@ -447,7 +447,7 @@ static void test_foreign(void) {
         CHECK(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) < 2e-6); /* below black */
         CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 -
                    0.28209479 * 7.5) < 1e-6);
-        if (fresh) neutral = ssdgs_model_get(fresh);
+        if (fresh) neutral = ssdgs_model_arrays(fresh);
         for (channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
             CHECK(view.gaussians[(size_t)channel * view.stride] ==
                   neutral.gaussians[(size_t)channel * neutral.stride]);
@@ -473,7 +473,7 @@ static void test_foreign(void) {
          "0\n");
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
-        view = ssdgs_model_get(back);
+        view = ssdgs_model_arrays(back);
         CHECK(view.count == 2 && stats.dropped == 3 && stats.zero_rotations == 1);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 2);
         CHECK(view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
@@ -710,7 +710,7 @@ static void test_origin(void) {
 
 static void test_mending(void) {
     ssdgs_model *model = make_model(8), *back = NULL;
-    ssdgs_model_view view = ssdgs_model_get(model);
+    ssdgs_model_view view = ssdgs_model_arrays(model);
     const size_t stride = view.stride;
     ssdgs_load_stats stats;
     bytes file;
@@ -731,7 +731,7 @@ static void test_mending(void) {
     file = saved(model);
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK);
     if (back) {
-        const ssdgs_model_view now = ssdgs_model_get(back);
+        const ssdgs_model_view now = ssdgs_model_arrays(back);
         CHECK(now.count == 6 && stats.dropped == 2 && stats.zero_rotations == 2);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 1);
         CHECK(now.gaussians[SSDGS_ROTATION * now.stride] == 1 &&
@@ -1000,7 +1000,7 @@ static void test_disk(void) {
 
 /* Mean distance from a Gaussian to the next. */
 static double mean_step(ssdgs_model *model) {
-    const ssdgs_model_view view = ssdgs_model_get(model);
+    const ssdgs_model_view view = ssdgs_model_arrays(model);
     double sum = 0;
     int i, c;
     for (i = 1; i < view.count; i++) {
@@ -1016,7 +1016,7 @@ static double mean_step(ssdgs_model *model) {
 
 /* How many Gaussians of b are Gaussian i of a, in every channel. */
 static int found(ssdgs_model *a, int i, ssdgs_model *b) {
-    const ssdgs_model_view u = ssdgs_model_get(a), v = ssdgs_model_get(b);
+    const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
     int j, channel, count = 0;
     for (j = 0; j < v.count; j++) {
         for (channel = 0; channel < SSDGS_CHANNELS; channel++)
@@ -1039,7 +1039,8 @@ static void test_order(void) {
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 &&
           same_globals(model, back));
     for (i = 0; i < MANY; i++) once += found(model, i, back) == 1;
-    CHECK(once == MANY && ssdgs_model_get(back).count == MANY && mean_step(back) < 0.25 * mean_step(model));
+    CHECK(once == MANY && ssdgs_model_arrays(back).count == MANY &&
+          mean_step(back) < 0.25 * mean_step(model));
     free(file.data);
     file = saved(back);
     CHECK(load(file.data, file.size, &again, &stats) == SSDGS_OK && !stats.sorted && same(back, again));

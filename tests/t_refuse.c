@@ -55,21 +55,19 @@ static const field render_fields[] = {
 static const field train_fields[] = {
 #define I(name, low, high) WHOLE(ssdgs_train_options, name, low, high)
 #define R(name, low, high) REAL(ssdgs_train_options, name, low, high)
-#define RATE(name) R(name.start, 0, 1e30), R(name.end, 0, 1e30)
+#define RATE(name) R(rates.name.start, 0, 1e30), R(rates.name.end, 0, 1e30)
     I(iterations, 1, 100000000),
     I(schedule, 0, 3),
     I(max_gaussians, 1, 1 << 28),
     I(densify_every, 1, 2000000000),
     I(opacity_reset_every, 0, 2000000000),
+    I(refine, 0, 3),
     R(dssim, 0, 1),
     R(normal_weight, 0, 1e30),
     R(densify_gradient, 0, 1e30),
-    R(densify_size, 1e-30, 1e30),
     R(densify_shadow, 0, 1e30),
-    R(prune_opacity, 1e-30, 0.999),
     R(prune_weight, 0, 1e30),
     R(prune_outside, 0, 1),
-    R(opacity_fade, 0, 1e30),
     R(adam_epsilon, 0, 1e30),
     RATE(position),
     RATE(opacity),
@@ -81,8 +79,8 @@ static const field train_fields[] = {
     RATE(material),
     RATE(shadow),
     RATE(scattering),
-    RATE(camera_rate),
-    RATE(light_rate)
+    RATE(camera),
+    RATE(light)
 #undef I
 #undef R
 };
@@ -219,9 +217,9 @@ static void test_messages(void) {
     memcpy(&light.kind, &numbers[1], sizeof numbers[1]);
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
     SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "ssdgs_compare: reference is NULL");
-    options.prune_opacity = 0;
+    options.densify_every = 0;
     SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer),
-         "prune_opacity = 0 is not within 1e-30 .. 0.999");
+         "densify_every = 0 is not within 1 .. ");
     options = train_options;
     options.dssim = (ssdgs_real)-1.5e20;
     SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "dssim = -1.5e20 is");
@@ -261,7 +259,7 @@ static void test_missing(void) {
           *ssdgs_isa_string(SSDGS_ISA_COUNT));
     CHECK(ssdgs_context_isa(NULL) == SSDGS_ISA_AUTO && !ssdgs_context_threads(NULL) &&
           !ssdgs_model_settings(NULL));
-    CHECK(!ssdgs_model_get(NULL).count && !ssdgs_model_get(NULL).gaussians);
+    CHECK(!ssdgs_model_arrays(NULL).count && !ssdgs_model_arrays(NULL).gaussians);
     MISSING(ssdgs_stage_cpu(NULL, SSDGS_STAGE_PROJECT));
     MISSING(ssdgs_model_create(NULL, NULL, 0, &made));
     MISSING(ssdgs_model_create(context, NULL, 0, NULL));
@@ -352,6 +350,84 @@ static void test_curve(void) {
     }
 }
 
+/* ssdgs_model_set() and _get(): what is written is what is used and what is read; what makes no sense is
+   named. */
+static void test_gaussian(void) {
+    static const struct {
+        size_t at;
+        double value;
+        const char *name;
+    } bad[] = {{offsetof(ssdgs_gaussian, position), NAN, "position"},
+               {offsetof(ssdgs_gaussian, rotation), NAN, "rotation"},
+               {offsetof(ssdgs_gaussian, scale), 0, "scale"},
+               {offsetof(ssdgs_gaussian, normal), NAN, "normal"},
+               {offsetof(ssdgs_gaussian, opacity), 1.01, "opacity"},
+               {offsetof(ssdgs_gaussian, opacity), NAN, "opacity"},
+               {offsetof(ssdgs_gaussian, diffuse), -0.1, "diffuse"},
+               {offsetof(ssdgs_gaussian, specular), NAN, "specular"},
+               {offsetof(ssdgs_gaussian, scattering), -1, "scatter"},
+               {offsetof(ssdgs_gaussian, sharpness), 0, "sharpness"},
+               {offsetof(ssdgs_gaussian, f0), 0, "f0"},
+               {offsetof(ssdgs_gaussian, softness), -1, "softness"},
+               {offsetof(ssdgs_gaussian, material), NAN, "material"}};
+    const double tolerance = sizeof(ssdgs_real) == 4 ? 2e-6 : 1e-12;
+    ssdgs_model *two = NULL;
+    ssdgs_gaussian g = ssdgs_gaussian_default(), back, again;
+    CHECK(!ssdgs_model_create(context, NULL, 2, &two));
+    CHECK(!ssdgs_model_get(two, 1, &back) &&
+          !memcmp(&g, &back, sizeof g)); /* a new model's are the default's */
+    ssdgs_model_view v = ssdgs_model_arrays(two);
+    const double values[] = {0.3,  -2,  7,    0.5,  -0.5, 0.5, 0.5, 0.02, 0.3, 1e-3, 0,
+                             -0.6, 0.8, 0.75, 0.4,  0,    2,   0.1, 0.2,  0.3, 0.5,  40,
+                             1e-4, 30,  0.5,  0.08, 0.9,  1,   -1,  0,    0.5, 2,    3};
+    ssdgs_real *fields = (ssdgs_real *)(void *)&g;
+    for (size_t i = 0; i < sizeof g / sizeof *fields; i++) fields[i] = (ssdgs_real)values[i];
+    CHECK(sizeof g == sizeof values / sizeof *values * sizeof *fields);
+    CHECK(!ssdgs_model_set(two, 1, &g) && !ssdgs_model_get(two, 1, &back));
+    CHECK_NEAR((const ssdgs_real *)(const void *)&back, values, sizeof g / sizeof *fields, tolerance,
+               tolerance, "a Gaussian is read as it was written");
+#define RAW(channel) (double)v.gaussians[(size_t)(channel)*v.stride + 1]
+    CHECK(fabs(exp(RAW(SSDGS_LOG_SCALE + 1)) - 0.3) < 1e-6 &&
+          fabs(1 / (1 + exp(-RAW(SSDGS_OPACITY))) - 0.75) < 1e-6);
+    CHECK(fabs(log1p(exp(RAW(SSDGS_DIFFUSE))) - 0.4) < 1e-6 && RAW(SSDGS_DIFFUSE + 1) < -15);
+    CHECK(fabs(exp(RAW(SSDGS_ASG_WEIGHT)) - 30) < 1e-4 && fabs(exp(RAW(SSDGS_ASG_WEIGHT + 1)) - 0.5) < 1e-6);
+    CHECK(fabs(1 / (1 + exp(3.1780538303479458 - RAW(SSDGS_ASG_WEIGHT + 2))) - 0.08) < 1e-6);
+    /* a frame that has the normal stays, whichever way it turns about it */
+    const double w = RAW(SSDGS_FRAME), x = RAW(SSDGS_FRAME + 1), y = RAW(SSDGS_FRAME + 2);
+    const double turned[4] = {0.8 * w, 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x, 0.6 * w};
+    for (size_t i = 0; i < 4; i++) v.gaussians[(SSDGS_FRAME + i) * v.stride + 1] = (ssdgs_real)turned[i];
+    CHECK(!ssdgs_model_get(two, 1, &again));
+    CHECK_NEAR(again.normal, back.normal, 3, tolerance, 0, "turned about its normal");
+    CHECK(!ssdgs_model_set(two, 1, &again) && RAW(SSDGS_FRAME + 3) == (double)(ssdgs_real)turned[3]);
+    /* without a rotation the third axis is the normal, without a normal the normal is the third axis */
+    for (int down = 0; down < 2; down++) {
+        const ssdgs_real normal[3] = {0, 0, (ssdgs_real)(down ? -2 : 2)};
+        memset(g.rotation, 0, sizeof g.rotation);
+        memcpy(g.normal, normal, sizeof normal);
+        CHECK(!ssdgs_model_set(two, 0, &g) && !ssdgs_model_get(two, 0, &back));
+        CHECK(back.normal[2] == (down ? -1 : 1) && fabs((double)back.rotation[down]) == 1);
+        memset(back.normal, 0, sizeof back.normal);
+        CHECK(!ssdgs_model_set(two, 0, &back) && !ssdgs_model_get(two, 0, &again));
+        CHECK(again.normal[2] == (down ? -1 : 1));
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        back = g;
+        const ssdgs_real value = (ssdgs_real)bad[i].value;
+        memcpy((char *)&back + bad[i].at, &value, sizeof value);
+        if (!CHECK(ssdgs_model_set(two, 0, &back) == SSDGS_ERR_ARGUMENT &&
+                   strstr(ssdgs_error_message(context), bad[i].name)))
+            printf("    %s: %s\n", bad[i].name, ssdgs_error_message(context));
+    }
+    CHECK(ssdgs_model_get(two, 0, &again) == SSDGS_OK && again.scale[0] == back.scale[0]);
+    CHECK(ssdgs_model_set(two, 2, &g) == SSDGS_ERR_ARGUMENT &&
+          ssdgs_model_get(two, -1, &g) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_set(two, 0, NULL) == SSDGS_ERR_ARGUMENT &&
+          ssdgs_model_get(two, 0, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_set(NULL, 0, &g) == SSDGS_ERR_ARGUMENT &&
+          ssdgs_model_get(NULL, 0, &g) == SSDGS_ERR_ARGUMENT);
+    ssdgs_model_destroy(two);
+}
+
 int main(void) {
     static unsigned char pixels[4 * 4 * 4];
     const ssdgs_real eye[3] = {0, -3, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
@@ -365,6 +441,7 @@ int main(void) {
     train_options = ssdgs_train_options_default();
     if (!CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 3, &model)))
         return 1;
+    test_gaussian();
     check_ranges(settings_fields, sizeof settings_fields / sizeof *settings_fields, &settings, make_model);
     check_ranges(render_fields, sizeof render_fields / sizeof *render_fields, &render_options, render);
     check_ranges(train_fields, sizeof train_fields / sizeof *train_fields, &train_options, make_trainer);

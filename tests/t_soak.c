@@ -53,7 +53,7 @@ static uint64_t fnv(uint64_t hash, const void *words, size_t size) {
 }
 
 static uint64_t hash_model(ssdgs_model *model) {
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     uint64_t hash = fnv(FNV_START, &v.count, sizeof v.count);
     size_t c;
     for (c = 0; c < SSDGS_CHANNELS; c++)
@@ -63,7 +63,7 @@ static uint64_t hash_model(ssdgs_model *model) {
 
 /* The largest magnitude among a model's parameters; infinite if one is not finite. */
 static double largest_parameter(ssdgs_model *model) {
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     double most = 0;
     size_t c, i;
     for (c = 0; c < SSDGS_CHANNELS; c++)
@@ -109,7 +109,7 @@ static ssdgs_context *new_context(int isa, int threads, meter *m, const ssdgs_gp
     memset(&desc, 0, sizeof desc);
     desc.isa = (ssdgs_isa)isa;
     desc.threads = threads;
-    if (hook) desc.gpu = *hook;
+    desc.gpu = hook;
     if (m) {
         desc.allocator.allocate = metered_allocate;
         desc.allocator.release = metered_release;
@@ -125,7 +125,7 @@ static ssdgs_model *new_truth(ssdgs_context *context) {
     ssdgs_model_view v;
     int i, c;
     if (!CHECK(!ssdgs_model_create(context, NULL, TRUTH, &model))) exit(1);
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (i = 0; i < TRUTH; i++)
         for (c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(11, (uint64_t)(64 * i + c)) - 1;
@@ -279,7 +279,7 @@ static void row_54(void) {
     uint64_t after = 0, undisturbed = 0;
     int group, i;
     make_photos(16);
-    o.refine_camera = o.refine_light = 1;
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     memset(&hook, 0, sizeof hook);
     hook.stage[SSDGS_STAGE_PROJECT_BACKWARD] = spoil_gradient;
     hook.user = &s;
@@ -496,7 +496,7 @@ static void row_58(void) {
     o.max_gaussians = 1100;
     t.context = new_context(SSDGS_ISA_AUTO, 2, NULL, NULL);
     CHECK(!ssdgs_model_create(t.context, NULL, 1000, &t.model));
-    v = ssdgs_model_get(t.model);
+    v = ssdgs_model_arrays(t.model);
     for (i = 0; i < 1000; i++)
         for (c = 0; c < 3; c++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -2;
     t = start(t.context, t.model, NULL, &o, PHOTOS);
@@ -543,7 +543,7 @@ static void row_59(void) {
     printf("figure train_memory_share %.2f\n", worst);
     o = short_run(40);
     t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
-    v = ssdgs_model_get(t.model);
+    v = ssdgs_model_arrays(t.model);
     for (i = 0; i < v.count; i++) v.gaussians[(size_t)SSDGS_OPACITY * v.stride + (size_t)i] = -20;
     steps(&t, 40);
     CHECK(t.model->count == 1 && ALL_FINITE(t.model));
@@ -553,13 +553,13 @@ static void row_59(void) {
 /* A hundred times every rate: a bad model, but a model. */
 static void row_60(void) {
     ssdgs_train_options o = short_run(full ? 2000 : 300 / SLOW);
-    ssdgs_rate *const rates[12] = {&o.position, &o.opacity,    &o.scale,       &o.rotation,
-                                   &o.color,    &o.asg,        &o.frame,       &o.material,
-                                   &o.shadow,   &o.scattering, &o.camera_rate, &o.light_rate};
+    ssdgs_rate *const rates[12] = {&o.rates.position, &o.rates.opacity,    &o.rates.scale,  &o.rates.rotation,
+                                   &o.rates.color,    &o.rates.asg,        &o.rates.frame,  &o.rates.material,
+                                   &o.rates.shadow,   &o.rates.scattering, &o.rates.camera, &o.rates.light};
     training t;
     int i;
     make_photos(16);
-    o.refine_camera = o.refine_light = 1;
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     for (i = 0; i < 12; i++) {
         rates[i]->start *= 100;
         rates[i]->end *= 100;
@@ -642,9 +642,10 @@ static void row_62(void) {
     t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
     globals = (ssdgs_real *)malloc(t.model->global_count * sizeof *globals);
     memcpy(globals, t.model->globals, t.model->global_count * sizeof *globals);
-    for (c = 0; c < SSDGS_CHANNELS; c++) was[c] = ssdgs_model_get(t.model).gaussians[c * t.model->capacity];
+    for (c = 0; c < SSDGS_CHANNELS; c++)
+        was[c] = ssdgs_model_arrays(t.model).gaussians[c * t.model->capacity];
     steps(&t, o.iterations);
-    v = ssdgs_model_get(t.model);
+    v = ssdgs_model_arrays(t.model);
     for (c = SSDGS_SPECULAR; c < SSDGS_MATERIAL; c++) /* every Gaussian's start is the same */
         for (i = 0; i < (size_t)v.count && (c < SSDGS_FRAME || c >= SSDGS_ASG_WEIGHT); i++)
             moved += c != SSDGS_ASG_WEIGHT + 3 && memcmp(v.gaussians + c * v.stride + i, &was[c],
@@ -745,8 +746,8 @@ static void row_63(void) {
         ssdgs_camera camera;
         ssdgs_light light;
         training t;
-        o.refine_camera = 1;
-        o.position.start = o.position.end = 0; /* or the scene would follow instead */
+        o.refine = SSDGS_REFINE_CAMERA;
+        o.rates.position.start = o.rates.position.end = 0; /* or the scene would follow instead */
         t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, 1);
         t.trainer->corrections[0].value[4] = angles[a];
         CHECK(!ssdgs_trainer_refined(t.trainer, 0, &camera, &light));
@@ -783,8 +784,9 @@ static void row_64(void) {
     static const char *const names[3] = {"pose_centre_left", "pose_angle_left", "light_left"};
     static ssdgs_photo truth[PHOTOS];
     ssdgs_train_options o = short_run((full ? 1000 : 500) * (full ? PHOTOS : 2));
-    ssdgs_rate *const rates[10] = {&o.position, &o.opacity, &o.scale,    &o.rotation, &o.color,
-                                   &o.asg,      &o.frame,   &o.material, &o.shadow,   &o.scattering};
+    ssdgs_rate *const rates[10] = {&o.rates.position, &o.rates.opacity,   &o.rates.scale, &o.rates.rotation,
+                                   &o.rates.color,    &o.rates.asg,       &o.rates.frame, &o.rates.material,
+                                   &o.rates.shadow,   &o.rates.scattering};
     double before[3] = {0, 0, 0}, after[3] = {0, 0, 0};
     training t;
     uint64_t hash;
@@ -795,8 +797,8 @@ static void row_64(void) {
     for (i = 0; i < 10; i++)
         rates[i]->start = rates[i]->end = 0; /* a moving model could take the disturbance over */
     without_density_control(&o);
-    o.refine_camera = o.refine_light = 1;
-    o.camera_rate.start = o.light_rate.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    o.rates.camera.start = o.rates.light.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
     for (i = 0; i < count; i++) {
         double value[9], length[3] = {0, 0, 0};
         for (c = 0; c < 9; c++) {
@@ -964,7 +966,7 @@ static void row_67(void) {
             truth = new_truth(context);
             ssdgs__network_sizes(&truth->settings, 0, sizes);
             for (j = 0; follows && j < sizes[1]; j++)
-                memset(ssdgs_model_get(truth).scattering + (j + 1) * sizes[0] - SSDGS__LENGTHS, 0,
+                memset(ssdgs_model_arrays(truth).scattering + (j + 1) * sizes[0] - SSDGS__LENGTHS, 0,
                        SSDGS__LENGTHS * sizeof(ssdgs_real));
             image.color = color[!nearest];
             CHECK(!ssdgs_render(truth, &photos[1].camera, &photos[2].light, 1, &image));
@@ -1032,7 +1034,7 @@ static void row_68(void) {
         hash[round][1] = hash_file(paths[1]);
         ssdgs_model_destroy(loaded);
         CHECK(!ssdgs_model_load_memory(t.context, ascii, sizeof ascii - 1, &loaded, NULL));
-        v = ssdgs_model_get(loaded);
+        v = ssdgs_model_arrays(loaded);
         CHECK(fabs((double)v.gaussians[0] - 0.25) < 1e-7 &&
               fabs((double)v.gaussians[v.stride] + 0.15) < 1e-7);
         CHECK(fabs((double)v.gaussians[SSDGS_LOG_SCALE * v.stride] + 2.75) < 1e-7);

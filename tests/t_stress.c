@@ -89,7 +89,7 @@ static ssdgs_model *make(ssdgs_settings settings, int count) {
 
 /* A raw parameter; asking for it tells the library that the model changes. */
 static ssdgs_real *raw(ssdgs_model *model, int channel, int gaussian) {
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     return v.gaussians + (size_t)channel * v.stride + gaussian;
 }
 
@@ -110,7 +110,7 @@ static void put(ssdgs_model *model, int gaussian, double x, double y, double z, 
 /* Gaussians at random in a ball of radius 1/2 around the centre, all parameters at random. */
 static ssdgs_model *cloud(ssdgs_settings settings, int count) {
     ssdgs_model *model = make(settings, count);
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     int i, k;
     for (i = 0; i < count; i++) {
         double x[3], r2 = 2;
@@ -157,7 +157,7 @@ static void turn(const double q[4], ssdgs_model *model, ssdgs_camera *camera, ss
     const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
                          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
                          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     const ssdgs_camera was = *camera;
     double p[4];
     int i, j, k, f;
@@ -283,7 +283,7 @@ static void trains(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
     photo.light = *light;
     photo.pixels = pixels;
     options.schedule = SSDGS_SCHEDULE_JOINT;
-    options.refine_camera = options.refine_light = 1;
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     if (!CHECK(!ssdgs_trainer_create(model, &photo, 1, &options, &trainer))) return;
     if (!CHECK(!ssdgs_trainer_step(trainer, &stats))) printf("    %s\n", ssdgs_error_message(context));
     ssdgs_trainer_destroy(trainer);
@@ -676,7 +676,7 @@ static void row_17(
 /* Gaussians that cover an image of 3840 x 2160 each. */
 static ssdgs_model *curtains(int count) {
     ssdgs_model *model = make(plain(), count);
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     int i;
     for (i = 0; i < count; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = 1;
     for (i = 0; i < 3 * count; i++)
@@ -724,7 +724,7 @@ static void row_19(void) { /* what lies behind the camera costs a record, whatev
     if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
     model = curtains(BEHIND);
     {
-        const ssdgs_model_view v = ssdgs_model_get(model);
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
         int i;
         for (i = 0; i < BEHIND; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = -1;
     }
@@ -804,7 +804,7 @@ static void row_26(
     for (s = 0; s < 4;
          s++) { /* what all deferred lobes share, and reflectances within what is not yet black */
         ssdgs_model *model = cloud(full(), 200);
-        const ssdgs_model_view v = ssdgs_model_get(model);
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
         for (i = 0; i < SSDGS_ASG_COUNT; i++) {
             v.asg_sigma[i] = (ssdgs_real)(s & 1 ? 1e30 : -1e30);
             v.asg_sharpness[2 * i] = v.asg_sharpness[2 * i + 1] = (ssdgs_real)(s & 2 ? 1e30 : -1e30);
@@ -838,7 +838,7 @@ static void row_27(void) { /* backgrounds that are not finite */
 
 /* Eq. 1 for every pixel and every Gaussian of a plain model, in double, no threshold; color (3, h, w). */
 static void brute(ssdgs_model *model, const ssdgs_camera *camera, double variance, double *color) {
-    const ssdgs_model_view v = ssdgs_model_get(model);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
     double through[PIXELS];
     int i, j, k, n, p, *done = (int *)calloc((size_t)v.count, sizeof *done);
     for (p = 0; p < PIXELS; p++) through[p] = 1;
@@ -1196,7 +1196,7 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     for (k = 0; k < 2; k++) {
         settings.length_unit = (ssdgs_real)(k ? 2e-4 : 0.5);
         model = cloud(settings, 200);
-        v = ssdgs_model_get(model);
+        v = ssdgs_model_arrays(model);
         for (i = 0; !k && i < v.scattering_count; i++) v.scattering[i] *= 1000;
         for (i = 0; !k && i < v.shadow_count; i++) v.shadow[i] = (ssdgs_real)(1000 * draw(8, i));
         show(model, &camera, &light, 1, NULL, &a);
@@ -1207,7 +1207,7 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     }
     for (k = 0; k < 2; k++) {
         model = cloud(full(), 10);
-        v = ssdgs_model_get(model);
+        v = ssdgs_model_arrays(model);
         (k ? v.shadow : v.scattering)[5] = 12345;
         CHECK(!ssdgs_model_save(model, path) && !ssdgs__read_file(context, path, &bytes, &size));
         for (i = 0, at = size; i + 4 <= size; i++)
@@ -1379,7 +1379,7 @@ static void row_50(void) { /* lights at rest: no new maps for a new view, and th
         camera.cx += 3;
         show(model, &camera, &light, 1, &options, &a);
         CHECK(a.stats.lights_cached == 1 && a.stats.camera_cached == 0);
-        ssdgs_model_get(model);
+        ssdgs_model_arrays(model);
         show(model, &camera, &light, 1, &options, &b);
         CHECK(b.stats.lights_cached == 0 && same(&a, &b));
     }
@@ -1395,12 +1395,15 @@ static ssdgs_result shade_all(void *user, ssdgs_frame *frame) {
 static void row_51(void) { /* what the camera does not see is not shaded, and would change nothing */
     ssdgs_context *shared = context;
     ssdgs_context_desc desc;
+    ssdgs_gpu_hook gpu;
     int all;
     for (all = 0; all < 2; all++) {
         ssdgs_model *model;
         memset(&desc, 0, sizeof desc);
-        desc.gpu.stage[SSDGS_STAGE_WALK] = shade_all;
-        desc.gpu.user = all ? &desc : NULL;
+        memset(&gpu, 0, sizeof gpu);
+        gpu.stage[SSDGS_STAGE_WALK] = shade_all;
+        gpu.user = all ? &desc : NULL;
+        desc.gpu = &gpu;
         desc.threads = ssdgs_context_threads(shared);
         desc.isa = ssdgs_context_isa(shared);
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);

@@ -55,7 +55,7 @@ static ssdgs_train_options short_run(int iterations) {
     o.densify_every = 10;
     o.opacity_reset_every = 30;
     o.densify_gradient = (ssdgs_real)1e-5;
-    o.refine_camera = o.refine_light = 1;
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     return o;
 }
 
@@ -132,6 +132,7 @@ static void test_same_bits(void) {
         memset(&first, 0, sizeof first);
         for (variant = 0; variant < 5; variant++) {
             static const int threads[5] = {1, 2, 7, 1, 2};
+            ssdgs_gpu_hook gpu;
             ssdgs_context_desc desc;
             ssdgs_context *context;
             run_result r;
@@ -141,16 +142,17 @@ static void test_same_bits(void) {
             desc.threads = threads[variant];
             if (variant == 3) desc.parallel.run = backwards_run;
             if (variant == 4) {
-                desc.gpu.user = calls;
-                desc.gpu.stage[SSDGS_STAGE_PROJECT] = hook_project;
-                desc.gpu.stage[SSDGS_STAGE_SORT] = hook_sort;
-                desc.gpu.stage[SSDGS_STAGE_BIN] = hook_bin;
-                desc.gpu.stage[SSDGS_STAGE_WALK] = hook_walk;
-                desc.gpu.stage[SSDGS_STAGE_SHADE] = hook_shade;
-                desc.gpu.stage[SSDGS_STAGE_COMPOSITE] = hook_composite;
-                desc.gpu.stage[SSDGS_STAGE_COMPOSITE_BACKWARD] = hook_composite_backward;
-                desc.gpu.stage[SSDGS_STAGE_SHADE_BACKWARD] = hook_shade_backward;
-                desc.gpu.stage[SSDGS_STAGE_PROJECT_BACKWARD] = hook_project_backward;
+                desc.gpu = &gpu;
+                gpu.user = calls;
+                gpu.stage[SSDGS_STAGE_PROJECT] = hook_project;
+                gpu.stage[SSDGS_STAGE_SORT] = hook_sort;
+                gpu.stage[SSDGS_STAGE_BIN] = hook_bin;
+                gpu.stage[SSDGS_STAGE_WALK] = hook_walk;
+                gpu.stage[SSDGS_STAGE_SHADE] = hook_shade;
+                gpu.stage[SSDGS_STAGE_COMPOSITE] = hook_composite;
+                gpu.stage[SSDGS_STAGE_COMPOSITE_BACKWARD] = hook_composite_backward;
+                gpu.stage[SSDGS_STAGE_SHADE_BACKWARD] = hook_shade_backward;
+                gpu.stage[SSDGS_STAGE_PROJECT_BACKWARD] = hook_project_backward;
             }
             if (ssdgs_context_create(&desc, &context)) {
                 if (variant == 0) printf("skipped: %s\n", ssdgs_isa_string((ssdgs_isa)isa));
@@ -333,7 +335,7 @@ static void test_components(void) {
     int i, c, blank = 0;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 200, &model));
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (i = 0; i < 200; i++) {
         for (c = 0; c < SSDGS_CHANNELS; c++)
             v.gaussians[(size_t)c * v.stride + (size_t)i] =
@@ -399,7 +401,7 @@ static void test_lights(void) {
     int i, c, p;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 300, &model));
-    v = ssdgs_model_get(model);
+    v = ssdgs_model_arrays(model);
     for (i = 0; i < 300; i++) {
         double r2 = 0;
         for (c = 0; c < 3; c++) {
@@ -646,7 +648,7 @@ static void test_learning(void) {
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 0, &model));
     options.opacity_reset_every = 0;
-    options.refine_camera = options.refine_light = 0;
+    options.refine = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
     CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
     CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &before));
@@ -703,7 +705,7 @@ static void test_adam(double share) {
         rates[g].start = (ssdgs_real)(0.01 * (g + 1));
         rates[g].end = (ssdgs_real)(0.002 * (10 - g));
     }
-    memcpy(&options.position, rates, sizeof rates);
+    memcpy(&options.rates.position, rates, sizeof rates);
     options.adam_epsilon = (ssdgs_real)share;
     options.bounds_max[1] = 2; /* so that the longest side is 2.5 */
     settings.asg = SSDGS_ASG_GEOMETRIC;
@@ -812,9 +814,9 @@ static void test_refinement(void) {
         disturbed[p].camera.view[7] -= (ssdgs_real)(0.02 * way);
         disturbed[p].light.position[p % 3] += (ssdgs_real)(0.3 * way);
     }
-    memset(&options.position, 0, 10 * sizeof options.position);
-    options.camera_rate.start = options.camera_rate.end = (ssdgs_real)2e-3;
-    options.light_rate.start = options.light_rate.end = (ssdgs_real)2e-2;
+    memset(&options.rates.position, 0, 10 * sizeof options.rates.position);
+    options.rates.camera.start = options.rates.camera.end = (ssdgs_real)2e-3;
+    options.rates.light.start = options.rates.light.end = (ssdgs_real)2e-2;
     options.densify_until = 0;
     options.random_background = 0; /* the model is not as opaque as its photographs */
     CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
@@ -857,7 +859,7 @@ static void test_anchor(void) {
     ssdgs__correction kept[PHOTOS];
     double worst = 0, largest = 0;
     int i, j, l, p, both;
-    options.refine_camera = 1;
+    options.refine = SSDGS_REFINE_CAMERA;
     for (j = 0; j < 3; j++) {
         options.bounds_min[j] = (ssdgs_real)(centre[j] - 0.5);
         options.bounds_max[j] = (ssdgs_real)(centre[j] + 0.5);
@@ -1882,7 +1884,7 @@ static void test_clipped(void) {
         settings.terms = SSDGS_DIFFUSE_TERM;
         CHECK(!ssdgs_context_create(NULL, &context));
         if (!CHECK(!ssdgs_model_create(context, &settings, 40, &model))) exit(1);
-        g = ssdgs_model_get(model).gaussians;
+        g = ssdgs_model_arrays(model).gaussians;
         for (i = 0; i < 40; i++) {
             for (c = 0; c < 3; c++) {
                 g[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
@@ -1984,17 +1986,16 @@ static void test_outlines_known(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Where opaque photographs show the background the loss has opacity_fade x the sum of opacities / pixels,
+/* Where opaque photographs show the background the loss has SSDGS__FADE x the sum of opacities / pixels,
    half of it half way to 30,000 of 60,000; not where outlines are known, nor where the photographs show other
    things up to their borders. */
 static void test_fade(void) {
     enum { MANY = 5 };
-    const double fade = 3, step = 1e-3, area = 50;
+    const double fade = SSDGS__FADE, step = 1e-3, area = 10;
     static unsigned char opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     int known, i;
-    options.opacity_fade = (ssdgs_real)fade;
     CHECK(!ssdgs_context_create(NULL, &context));
     for (known = 0; known < 3; known++) { /* nothing; outlines; that pictures are filled */
         memset(opaque, known == 2 ? 200 : 0, sizeof opaque);

@@ -15,7 +15,7 @@ static void begin_as(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *
     static const ssdgs_real eye[3] = {0, -2, (ssdgs_real)0.5}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     static ssdgs_camera camera;
     camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
-    ssdgs_model_get(model);
+    ssdgs_model_arrays(model);
     if (!CHECK(!ssdgs__frame_begin(frame, model, &camera, lights, light_count, NULL, 0, training))) exit(1);
     if (!CHECK(!ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK))) exit(1);
 }
@@ -268,7 +268,7 @@ static void test_bits(void) {
             }
         if (part == 3) { /* the last SSDGS__LENGTHS inputs of the first layer */
             int sizes[SSDGS_MAX_LAYERS + 1];
-            ssdgs_real *weights = ssdgs_model_get(model).scattering;
+            ssdgs_real *weights = ssdgs_model_arrays(model).scattering;
             ssdgs__network_sizes(&model->settings, 0, sizes);
             for (i = 0; i < sizes[1]; i++)
                 for (c = 0; c < SSDGS__LENGTHS; c++) weights[(i + 1) * sizes[0] - 1 - c] = 0;
@@ -278,7 +278,7 @@ static void test_bits(void) {
         for (view = part == 2 || part > 3 ? 0 : 1; view < 2; view++) {
             const ssdgs_real x = (ssdgs_real)(0.6 * draw(50000) - 0.3);
             light.position[0] = part == 4 && !view ? -2 : 2;
-            if (part == 5) *ssdgs_model_get(model).gaussians = view ? x : x + 1;
+            if (part == 5) *ssdgs_model_arrays(model).gaussians = view ? x : x + 1;
             const ssdgs_camera camera =
                 ssdgs_camera_look_at(eye[part > 3 ? 1 : view], target, up, (ssdgs_real)0.7, SIDE, SIDE);
             CHECK(!ssdgs_render(model, &camera, &light, 1, &image));

@@ -311,8 +311,7 @@ static ssdgs_train_options draw_options(input *in) {
     if (flags & 128) o.iterations *= 1000;
     o.schedule = draw_below(in, 4);
     o.random_background = ~flags & 1;
-    o.refine_camera = flags >> 1 & 1;
-    o.refine_light = flags >> 2 & 1;
+    o.refine = flags >> 1 & 3;
     if (flags & 8) o.normal_weight = (ssdgs_real)(flags & 16 ? 1e30 : 0);
     if (flags & 32) o.prune_outside = (ssdgs_real)(flags & 64 ? 1 : 0);
     o.initial_points = draw_below(in, 40);
@@ -322,20 +321,18 @@ static ssdgs_train_options draw_options(input *in) {
     o.opacity_reset_every = draw_below(in, 4);
     o.dssim = draw_real(in, 0.2, 1);
     o.densify_gradient = draw_real(in, 0, 1);
-    o.densify_size = draw_real(in, 0.01, 1);
     o.densify_shadow = draw_real(in, 0, 1);
-    o.prune_opacity = draw_real(in, 0.005, 1);
     o.prune_weight = draw_real(in, 0, 1);
     for (i = 0; i < 3; i++) {
         o.background[i] = draw_real(in, 0.5, 1);
         o.bounds_min[i] = draw_real(in, -0.5, 1);
         o.bounds_max[i] = draw_real(in, 0.5, 1);
     }
-    rates[0] = &o.position, rates[1] = &o.opacity, rates[2] = &o.scale, rates[3] = &o.rotation,
-    rates[4] = &o.color;
-    rates[5] = &o.asg, rates[6] = &o.frame, rates[7] = &o.material, rates[8] = &o.shadow,
-    rates[9] = &o.scattering;
-    rates[10] = &o.camera_rate, rates[11] = &o.light_rate;
+    rates[0] = &o.rates.position, rates[1] = &o.rates.opacity, rates[2] = &o.rates.scale,
+    rates[3] = &o.rates.rotation, rates[4] = &o.rates.color;
+    rates[5] = &o.rates.asg, rates[6] = &o.rates.frame, rates[7] = &o.rates.material,
+    rates[8] = &o.rates.shadow, rates[9] = &o.rates.scattering;
+    rates[10] = &o.rates.camera, rates[11] = &o.rates.light;
     for (i = 0; i < rate_count; i++) {
         rates[i]->start = draw_real(in, (double)rates[i]->start, 1);
         rates[i]->end = draw_real(in, (double)rates[i]->end, 1);
@@ -409,7 +406,7 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     const char *path;
     int i, same, sound;
     options.iterations = 2;
-    options.refine_camera = options.refine_light = 1;
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     options.initial_points = 3;
     options.densify_until = 0;
     draw_photo(&defaults, &photo, pixels);
@@ -902,12 +899,15 @@ static void fuzz_hooks(const unsigned char *data, size_t size) {
     static unsigned char pixels[64 * 4];
     input in = {data, data + size, 1}, defaults = defaults_only();
     ssdgs_context_desc desc;
+    ssdgs_gpu_hook gpu;
     ssdgs_model *model = NULL;
     int i, hooks = draw(&in), flags = draw(&in);
     memset(&desc, 0, sizeof desc);
+    memset(&gpu, 0, sizeof gpu);
+    desc.gpu = &gpu;
     desc.threads = 1 + (flags & 1);
     for (i = 0; i < SSDGS_STAGE_COUNT; i++)
-        if ((hooks | (flags & 2) << 7) >> i & 1) desc.gpu.stage[i] = stages[i];
+        if ((hooks | (flags & 2) << 7) >> i & 1) gpu.stage[i] = stages[i];
     if (flags & 4) desc.parallel.run = play_run;
     if (flags & 8) desc.allocator.allocate = play_allocate, desc.allocator.release = play_release;
     if (flags & 16) desc.logger.write = play_hear;
