@@ -1243,8 +1243,8 @@ static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
 #if defined(__GNUC__) && !defined(__TINYC__)
     return __builtin_ctzll(mask);
 #else
-    int bit = 0, half;
-    for (half = 32; half; half /= 2)
+    int bit = 0;
+    for (int half = 32; half; half /= 2)
         if (!(mask >> bit & (((uint64_t)1 << half) - 1))) bit += half;
     return bit;
 #endif
@@ -1254,8 +1254,8 @@ static SSDGS__INLINE int ssdgs__highest_bit(uint64_t mask) { /* of 0: 0 */
 #if defined(__GNUC__) && !defined(__TINYC__)
     return 63 ^ __builtin_clzll(mask | 1);
 #else
-    int bit = 0, half;
-    for (half = 32; half; half /= 2)
+    int bit = 0;
+    for (int half = 32; half; half /= 2)
         if (mask >> bit >> half) bit += half;
     return bit;
 #endif
@@ -1291,11 +1291,9 @@ static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned b
 /* Closes the list of each pixel, of `levels` so far. */
 static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *levels,
                                  const ssdgs_real *transmittance) {
-    int i;
-    for (i = 0; i < 256; i++) {
+    for (int i = 0; i < 256; i++) {
         ssdgs_real *at = tile->light_map + i * SSDGS__MAP_VALUES;
-        int l;
-        for (l = levels[i]; l < SSDGS__MAP_STEPS; l++) at[l] = SSDGS__NEVER;
+        for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) at[l] = SSDGS__NEVER;
         at[SSDGS__BEHIND] = transmittance[i];
     }
 }
@@ -1418,15 +1416,16 @@ static void ssdgs__append(char *text, size_t *at, const char *more) {
 
 static void ssdgs__append_number(char *text, size_t *at, double value) {
     char digits[32];
-    int n = 31, i;
-    uint64_t whole, rest;
+    int n = 31;
     digits[n] = 0;
     if (value < 0) {
         ssdgs__append(text, at, "-");
         value = -value;
     }
+    uint64_t whole;
     memcpy(&whole, &value, sizeof whole);
-    rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF), whole = UINT64_C(0x7FF0000000000000);
+    uint64_t rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF);
+    whole = UINT64_C(0x7FF0000000000000);
     if (rest >= whole) {
         ssdgs__append(text, at, rest > whole ? "NaN" : "infinite");
         return;
@@ -1446,7 +1445,7 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
     }
     if (rest) {
         int shown = 0;
-        for (i = 0; i < 6; i++, rest /= 10) {
+        for (int i = 0; i < 6; i++, rest /= 10) {
             if (rest % 10 || shown) {
                 digits[--n] = (char)('0' + rest % 10);
                 shown = 1;
@@ -1486,7 +1485,6 @@ static void ssdgs__tell(ssdgs_context *context, ssdgs_result code, const char *m
 /* Records what went wrong, tells the log, returns the code; without a context, that alone. */
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
-    va_list arguments;
     if (!context) return code;
     context->message[0] = 0;
     if (context->subject) {
@@ -1496,6 +1494,7 @@ static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const
             ssdgs__append_number(context->message, &at, context->subject_number);
         ssdgs__append(context->message, &at, ": ");
     }
+    va_list arguments;
     va_start(arguments, format);
     ssdgs__append_format(context->message, &at, format, arguments);
     va_end(arguments);
@@ -1570,11 +1569,10 @@ static void ssdgs__default_release(void *user, void *memory) {
 
 /* 64-byte aligned and zeroed; the distance to the allocator's pointer stands in front. */
 static void *ssdgs__allocate_from(const ssdgs_allocator *allocator, size_t bytes) {
-    unsigned char *raw, *memory;
     if (bytes > SIZE_MAX - 128) return NULL;
-    raw = (unsigned char *)allocator->allocate(allocator->user, bytes + 128);
+    unsigned char *raw = (unsigned char *)allocator->allocate(allocator->user, bytes + 128);
     if (!raw) return NULL;
-    memory = raw + 128 - ((uintptr_t)raw & 63);
+    unsigned char *memory = raw + 128 - ((uintptr_t)raw & 63);
     memory[-1] = (unsigned char)(memory - raw);
     memset(memory, 0, bytes);
     return memory;
@@ -1748,13 +1746,12 @@ static void ssdgs__pool_run(void *user, int count, ssdgs__task task, void *data)
 }
 
 static void ssdgs__pool_destroy(const ssdgs_allocator *allocator, ssdgs__pool *pool) {
-    int i;
     ssdgs__lock(&pool->mutex);
     pool->stop = 1;
     SSDGS__PUBLISH(&pool->generation, pool->generation + 1); /* no worker lingers on */
     ssdgs__wake(&pool->start);
     ssdgs__unlock(&pool->mutex);
-    for (i = 0; i < pool->thread_count; i++) ssdgs__thread_join(pool->threads[i]);
+    for (int i = 0; i < pool->thread_count; i++) ssdgs__thread_join(pool->threads[i]);
     ssdgs__condition_destroy(&pool->done);
     ssdgs__condition_destroy(&pool->start);
     ssdgs__mutex_destroy(&pool->mutex);
@@ -1788,9 +1785,8 @@ static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int thr
 #endif
 
 static void ssdgs__serial_run(void *user, int count, ssdgs__task task, void *data) {
-    int i;
     (void)user;
-    for (i = 0; i < count; i++) task(data, i);
+    for (int i = 0; i < count; i++) task(data, i);
 }
 
 static void ssdgs__context_serial(ssdgs_context *context) {
@@ -1845,11 +1841,13 @@ static void ssdgs__cpuid(unsigned leaf, unsigned subleaf, unsigned out[4]) {
 
 /* 1 = SSE2, 2 = and AVX2 with FMA, 3 = and AVX-512F; the operating system must save the registers too. */
 static int ssdgs__x86_level(void) {
-    unsigned a[4], b[4], saved;
+    unsigned a[4];
     ssdgs__cpuid(1, 0, a);
+    unsigned b[4];
     ssdgs__cpuid(7, 0, b);
     if (!(a[3] >> 26 & 1)) return 0;
     if (!(a[2] >> 27 & 1) || !(a[2] >> 28 & 1) || !(a[2] >> 12 & 1) || !(b[1] >> 5 & 1)) return 1;
+    unsigned saved;
 #if defined(_MSC_VER)
     saved = (unsigned)_xgetbv(0);
 #else
@@ -1902,11 +1900,9 @@ SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, struct ssdgs__frame_memory *memory);
 
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out) {
-    ssdgs_context_desc zero;
-    ssdgs_context *context;
-    int isa;
     if (!out) return SSDGS_ERR_ARGUMENT;
     *out = NULL;
+    ssdgs_context_desc zero;
     memset(&zero, 0, sizeof zero);
     if (desc) zero = *desc;
     if (!zero.allocator.allocate != !zero.allocator.release || zero.threads < 0 || zero.threads > 1024)
@@ -1918,13 +1914,13 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT ||
         (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)zero.isa)))
         return SSDGS_ERR_ISA;
-    context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
+    ssdgs_context *context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
     context->logger = zero.logger;
     if (zero.gpu) context->gpu = *zero.gpu;
     context->isa = (int)zero.isa;
-    for (isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
+    for (int isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) context->isa = isa;
     context->k = ssdgs__table(context->isa);
     context->references = 1;
@@ -2045,21 +2041,20 @@ static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
 /* Layer sizes, inputs first; returns the number of linear layers. */
 static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
     const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
-    int i;
     sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT
                       : 27 + 3 * (1 + 2 * settings->view_octaves) + 3 * (1 + 2 * settings->light_octaves) +
                             3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0) +
                             (settings->transport ? SSDGS__LENGTHS : 0);
-    for (i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
+    for (int i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
     if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
     return layers;
 }
 
 static size_t ssdgs__network_count(const ssdgs_settings *settings, int shadow) {
-    int sizes[SSDGS_MAX_LAYERS + 1], i;
+    int sizes[SSDGS_MAX_LAYERS + 1];
     const int layers = ssdgs__network_sizes(settings, shadow, sizes);
     size_t count = 0;
-    for (i = 0; i < layers; i++) count += (size_t)(sizes[i] + 1) * (size_t)sizes[i + 1];
+    for (int i = 0; i < layers; i++) count += (size_t)(sizes[i] + 1) * (size_t)sizes[i + 1];
     return count;
 }
 
@@ -2161,27 +2156,26 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
 
 /* Neutral values of one Gaussian: grey, opacity 0.1, everything else at the start of training. */
 static void ssdgs__gaussian_reset(ssdgs_real *gaussians, size_t stride, size_t index) {
-    int i;
-    for (i = 0; i < SSDGS_CHANNELS; i++) gaussians[(size_t)i * stride + index] = 0;
+    for (int i = 0; i < SSDGS_CHANNELS; i++) gaussians[(size_t)i * stride + index] = 0;
     gaussians[SSDGS_ROTATION * stride + index] = gaussians[SSDGS_FRAME * stride + index] = 1;
     gaussians[SSDGS_OPACITY * stride + index] = (ssdgs_real)-2.1972245773362196; /* logit 0.1 */
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         gaussians[(size_t)(SSDGS_LOG_SCALE + i) * stride + index] = (ssdgs_real)-4;
         gaussians[(size_t)(SSDGS_DIFFUSE + i) * stride + index] =
             gaussians[(size_t)(SSDGS_SPECULAR + i) * stride + index] =
                 gaussians[(size_t)(SSDGS_SCATTERING + i) * stride + index] = (ssdgs_real)0.5;
     }
-    for (i = 0; i < SSDGS_MATERIAL_COUNT; i++) gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
+    for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++)
+        gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
 }
 
 /* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow
    network's last layer is 0. ASG lobes start spread over the hemisphere, from broad to sharp. */
 static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
     const double pi = 3.14159265358979323846;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], at;
-    int net, layer, j, i;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         ssdgs_real *q = model->globals + 4 * j,
                    *sharpness = model->globals + first[SSDGS__ASG_SHARPNESS] + 2 * j;
         q[0] = (ssdgs_real)cos(pi * j / (2 * SSDGS_ASG_COUNT));
@@ -2190,14 +2184,14 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
         sharpness[0] = (ssdgs_real)((model->settings.asg == SSDGS_ASG_DEFERRED ? 1.5 : 0.5) + 0.6 * j);
         sharpness[1] = model->settings.asg == SSDGS_ASG_DEFERRED ? 0 : sharpness[0];
     }
-    for (net = 0; net < 2; net++) {
+    for (int net = 0; net < 2; net++) {
         int sizes[SSDGS_MAX_LAYERS + 1];
         const int layers = ssdgs__network_sizes(&model->settings, net, sizes);
-        at = first[net ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
-        for (layer = 0; layer < layers; layer++) {
+        size_t at = first[net ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
+        for (int layer = 0; layer < layers; layer++) {
             const double bound = 1 / sqrt((double)sizes[layer]);
             const int still = net && layer == layers - 1 && model->settings.residual_shadow;
-            for (i = 0; i < (sizes[layer] + 1) * sizes[layer + 1]; i++, at++)
+            for (int i = 0; i < (sizes[layer] + 1) * sizes[layer + 1]; i++, at++)
                 model->globals[at] =
                     still ? 0 : (ssdgs_real)(bound * (2 * ssdgs__uniform(seed ^ UINT64_C(0x6E6574), at) - 1));
         }
@@ -2205,9 +2199,8 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
 }
 
 static void ssdgs__model_drop(ssdgs_model *model) {
-    ssdgs_context *context;
     if (!model || --model->references) return;
-    context = model->context;
+    ssdgs_context *context = model->context;
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
     ssdgs__release(context, model);
@@ -2217,27 +2210,25 @@ static void ssdgs__model_drop(ssdgs_model *model) {
 static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
                                         ssdgs_model **out) {
     const ssdgs_settings s = settings ? *settings : ssdgs_settings_default();
-    ssdgs_model *model;
-    ssdgs_result result;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], bytes;
-    int i;
     if (!out) return ssdgs__null(context, "ssdgs_model_create", "out");
-    result = ssdgs__settings_check(context, &s);
+    const ssdgs_result result = ssdgs__settings_check(context, &s);
     if (result) return result;
     if (count < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians", count);
     if (count > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians", count);
-    model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
+    ssdgs_model *model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
     if (!model) return SSDGS_ERR_MEMORY;
     model->context = context;
     context->references++;
     model->references = 1;
     model->settings = s;
     model->revision = ++context->revisions;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&s, first);
     model->global_count = first[SSDGS__GLOBAL_GROUPS];
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
+    size_t bytes;
     if (model->globals && ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
         model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!model->gaussians) {
@@ -2245,7 +2236,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
         return SSDGS_ERR_MEMORY;
     }
     model->count = count;
-    for (i = 0; i < count; i++) ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
+    for (int i = 0; i < count; i++) ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
     ssdgs__globals_reset(model, 1);
     *out = model;
     return SSDGS_OK;
@@ -2253,17 +2244,15 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
 
 SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
                                           ssdgs_model **out) {
-    ssdgs_result result;
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(context, "ssdgs_model_create");
+    const ssdgs_result result = ssdgs__enter(context, "ssdgs_model_create");
     return result ? result : ssdgs__leave(context, ssdgs__model_create(context, settings, count, out));
 }
 
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
-    ssdgs_context *context;
     if (!model || ssdgs__enter(model->context, "ssdgs_model_destroy")) return;
-    context = model->context;
+    ssdgs_context *context = model->context;
     if (model->references > 1)
         ssdgs__note(context, "ssdgs_model_destroy: a trainer still has the model, which goes with it");
     context->references++;
@@ -2275,11 +2264,12 @@ SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
 static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
     static const char *const names[SSDGS__GLOBAL_GROUPS] = {"asg_basis", "asg_sharpness", "asg_sigma",
                                                             "the scattering network", "the shadow network"};
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], i;
-    int group;
     if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
+    size_t i;
     for (i = 0; ssdgs__finite(model->globals[i]); i++) {}
+    int group;
     for (group = 0; i >= first[group + 1]; group++) {}
     return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %z of %s is not finite",
                        i - first[group], names[group]);
@@ -2288,9 +2278,9 @@ static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
 static void ssdgs__model_changed(ssdgs_model *model) { model->revision = ++model->context->revisions; }
 
 static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
-    ssdgs_model_view view;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
+    ssdgs_model_view view;
     view.count = model->count;
     view.stride = model->capacity;
     view.gaussians = model->gaussians;
@@ -2359,14 +2349,16 @@ static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
 static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
     double raw[SSDGS_CHANNELS], size = 0;
     const int flat = g->normal[0] == 0 && g->normal[1] == 0 && g->normal[2] == 0;
-    ssdgs_real old[4], q[4], r[9], along = 0, length = 0;
+    ssdgs_real along = 0, length = 0;
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)plane[(size_t)i * stride];
+    ssdgs_real old[4];
     for (int i = 0; i < 4; i++) {
         raw[SSDGS_ROTATION + i] = (double)g->rotation[i];
         size += fabs((double)g->rotation[i]);
         old[i] = plane[(size_t)(SSDGS_FRAME + i) * stride];
     }
     if (!(size > 0)) ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION);
+    ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(old, q, r);
     for (int i = 0; i < 3; i++) {
         along += r[3 * i + 2] * g->normal[i];
@@ -2392,8 +2384,9 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
 }
 
 static void ssdgs__gaussian_load(ssdgs_gaussian *g, const ssdgs_real *plane, size_t stride) {
-    ssdgs_real raw[SSDGS_CHANNELS], q[4], r[9];
+    ssdgs_real raw[SSDGS_CHANNELS];
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = plane[(size_t)i * stride];
+    ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw + SSDGS_FRAME, q, r);
     for (int i = 0; i < 3; i++) {
         g->position[i] = raw[SSDGS_POSITION + i];
@@ -2413,8 +2406,8 @@ static void ssdgs__gaussian_load(ssdgs_gaussian *g, const ssdgs_real *plane, siz
 
 SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void) {
     ssdgs_real plane[SSDGS_CHANNELS];
-    ssdgs_gaussian g;
     ssdgs__gaussian_reset(plane, 1, 0);
+    ssdgs_gaussian g;
     ssdgs__gaussian_load(&g, plane, 1);
     return g;
 }
@@ -2428,13 +2421,11 @@ static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *
 }
 
 SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdgs_gaussian *gaussian) {
-    const char *wrong;
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_model_set");
+    ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_set");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
-    wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
+    const char *wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
     if (wrong)
         result = ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
                              "ssdgs_model_set: the %s of Gaussian %d is out of range", wrong, index);
@@ -2447,9 +2438,8 @@ SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdg
 }
 
 SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdgs_gaussian *gaussian) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_model_get");
+    ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_get");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
     if (!result) ssdgs__gaussian_load(gaussian, model->gaussians + index, model->capacity);
@@ -2471,21 +2461,20 @@ static int ssdgs__key_compare(const void *a, const void *b) {
    Neighbours in space then share a block, whose neurons live and die together, the cache, and a node of what
    transport gathers from. */
 static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
-    size_t node, half, i, c;
     while (count > 8) {
         const ssdgs_real *along = position;
         double longest = -1;
-        for (c = 0; c < 3; c++) {
+        for (size_t c = 0; c < 3; c++) {
             const ssdgs_real *x = position + c * stride;
             double low = 1e30, high = -1e30;
-            for (i = 0; i < count; i++) {
+            for (size_t i = 0; i < count; i++) {
                 const double at = (double)x[(uint32_t)keys[i]];
                 low = at < low ? at : low;
                 high = at > high ? at : high;
             }
             if (high - low > longest) longest = high - low, along = x;
         }
-        for (i = 0; i < count; i++) {
+        for (size_t i = 0; i < count; i++) {
             const float x = (float)along[(uint32_t)keys[i]];
             uint32_t bits;
             memcpy(&bits, &x, sizeof bits);
@@ -2493,8 +2482,9 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
             keys[i] = (uint64_t)bits << 32 | (uint32_t)keys[i];
         }
         qsort(keys, count, sizeof *keys, ssdgs__key_compare);
+        size_t node;
         for (node = 8; 8 * node < count;) node *= 8;
-        half = (count / 2 + node - 1) / node * node;
+        const size_t half = (count / 2 + node - 1) / node * node;
         ssdgs__split(position, stride, keys, half);
         keys += half;
         count -= half;
@@ -2504,22 +2494,21 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
 /* Puts a Gaussian's values, or what is kept of them, in the places of its key. scratch: count values. */
 static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count,
                            ssdgs_real *scratch) {
-    size_t c, i;
-    for (c = 0; c < SSDGS_CHANNELS; c++) {
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
         ssdgs_real *plane = planes + c * stride;
-        for (i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
+        for (size_t i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
         memcpy(plane, scratch, count * sizeof *plane);
     }
 }
 
 static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
     const size_t count = (size_t)model->count;
-    size_t bytes, i;
+    size_t bytes;
     uint64_t *keys;
     if (!ssdgs__product_fits(count + 1, sizeof *keys + sizeof(ssdgs_real), &bytes)) return SSDGS_ERR_MEMORY;
     keys = (uint64_t *)ssdgs__allocate(model->context, bytes);
     if (!keys) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < count; i++) keys[i] = i;
+    for (size_t i = 0; i < count; i++) keys[i] = i;
     ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
     ssdgs__arrange(model->gaussians, model->capacity, keys, count, (ssdgs_real *)(keys + count));
     ssdgs__release(model->context, keys);
@@ -2529,32 +2518,29 @@ static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
 }
 
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_model_sort");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_sort");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
 }
 
 static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *original) {
-    ssdgs_real *globals;
-    size_t i;
-    int c;
     if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
     if (model->settings.baked || original->settings.baked)
         return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
                            "ssdgs_model_adopt: a baked model has no networks");
     if (model->references > 1)
         return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a trainer has the model");
-    globals = (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
+    ssdgs_real *globals =
+        (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
     if (!globals) return SSDGS_ERR_MEMORY;
     memcpy(globals, original->globals, original->global_count * sizeof *globals);
     ssdgs__release(model->context, model->globals);
     model->globals = globals;
     model->global_count = original->global_count;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         const double move = (double)model->settings.origin[c] - (double)original->settings.origin[c];
         ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
-        for (i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++)
+        for (size_t i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++)
             x[i] = (ssdgs_real)((double)x[i] + move);
     }
     model->settings = original->settings;
@@ -2563,9 +2549,8 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
 }
 
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_model_adopt");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_adopt");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_adopt(model, original));
 }
 
@@ -2575,12 +2560,12 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
     enum { FEW = 1024, AROUND = 128 }; /* order of few matters little */
     const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
     const size_t n = (size_t)model->count;
-    size_t i, c, further = 0;
+    size_t further = 0;
     if (n < FEW) return 0;
-    for (i = AROUND; i < n; i++) {
+    for (size_t i = AROUND; i < n; i++) {
         const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (AROUND - 2));
         double step2 = 0, back2 = 0;
-        for (c = 0; c < 3; c++) {
+        for (size_t c = 0; c < 3; c++) {
             const ssdgs_real *at = x + c * model->capacity + i;
             const double step = (double)at[0] - (double)*(at - 1),
                          leap = (double)at[0] - (double)*(at - back);
@@ -2630,15 +2615,13 @@ typedef struct ssdgs__frame_memory {
 } ssdgs__frame_memory;
 
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
-    size_t i;
-    int v;
     if (!m) return;
-    for (v = 0; v < m->view_room; v++) {
+    for (int v = 0; v < m->view_room; v++) {
         ssdgs__buffer *b = (ssdgs__buffer *)((ssdgs__view_memory *)m->view_memory.memory + v);
-        for (i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++)
+        for (size_t i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++)
             ssdgs__release(context, b[i].memory);
     }
-    for (i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
+    for (size_t i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
         ssdgs__release(context, ((ssdgs__buffer *)m + i)->memory);
     ssdgs__release(context, m);
 }
@@ -2652,9 +2635,8 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
 
 /* Room for `count` views; what the present ones own is kept. */
 static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_memory *m, int count) {
-    ssdgs__view_memory *grown;
     if (count <= m->view_room) return SSDGS_OK;
-    grown = (ssdgs__view_memory *)ssdgs__allocate(context, (size_t)count * sizeof *grown);
+    ssdgs__view_memory *grown = (ssdgs__view_memory *)ssdgs__allocate(context, (size_t)count * sizeof *grown);
     if (!grown) return SSDGS_ERR_MEMORY;
     if (m->view_room) memcpy(grown, m->view_memory.memory, (size_t)m->view_room * sizeof *grown);
     ssdgs__release(context, m->view_memory.memory);
@@ -2667,18 +2649,21 @@ static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_me
    forward. */
 static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3],
                               ssdgs_real view[12]) {
-    double f[3], r[3], d[3], u[3], length, best = 2;
-    int i, axis = 0;
-    length = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
-    for (i = 0; i < 3; i++)
+    double best = 2;
+    int axis = 0;
+    double length = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
+    double f[3];
+    for (int i = 0; i < 3; i++)
         f[i] = length > 0 && length < 1e300 ? forward[i] / length : (i == 2); /* no direction: any */
-    for (i = 0; i < 3; i++) {
+    double u[3];
+    for (int i = 0; i < 3; i++) {
         u[i] = up ? up[i] : 0;
         if (fabs(f[i]) < best) {
             best = fabs(f[i]);
             axis = i;
         }
     }
+    double r[3];
     for (;;) { /* an up along the view is replaced */
         r[0] = f[1] * u[2] - f[2] * u[1];
         r[1] = f[2] * u[0] - f[0] * u[2];
@@ -2688,11 +2673,12 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
         u[0] = u[1] = u[2] = 0;
         u[axis] = 1;
     }
-    for (i = 0; i < 3; i++) r[i] /= length;
+    for (int i = 0; i < 3; i++) r[i] /= length;
+    double d[3];
     d[0] = f[1] * r[2] - f[2] * r[1];
     d[1] = f[2] * r[0] - f[0] * r[2];
     d[2] = f[0] * r[1] - f[1] * r[0];
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         view[i] = (ssdgs_real)r[i];
         view[4 + i] = (ssdgs_real)d[i];
         view[8 + i] = (ssdgs_real)f[i];
@@ -2705,11 +2691,10 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
 SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
                                             const ssdgs_real up[3], ssdgs_real fov_x, int width, int height) {
     ssdgs_camera camera;
-    double e[3], f[3], u[3];
-    int i;
     memset(&camera, 0, sizeof camera);
     if (!eye || !target || !up) return camera;
-    for (i = 0; i < 3; i++) {
+    double e[3], f[3], u[3];
+    for (int i = 0; i < 3; i++) {
         e[i] = (double)eye[i];
         f[i] = (double)target[i] - (double)eye[i];
         u[i] = (double)up[i];
@@ -2729,7 +2714,6 @@ static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint,
                          double high[3], double *log_scale) {
     const ssdgs_real *p = g->gaussians + index;
     ssdgs_real largest = -20;
-    double reach;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
     for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
     for (*log_scale = 0; j < SSDGS_OPACITY;
@@ -2740,7 +2724,7 @@ static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint,
         *log_scale += (double)(s > -20 ? s : -20) / 3;
     }
     if (!usable) return 0;
-    reach = (double)(3 * ssdgs__exp_scalar(largest));
+    const double reach = (double)(3 * ssdgs__exp_scalar(largest));
     for (j = 0; j < 3; j++) {
         low[j] = (double)p[(size_t)j * g->stride] - reach;
         high[j] = (double)p[(size_t)j * g->stride] + reach;
@@ -2759,19 +2743,18 @@ static void ssdgs__bounds_task(void *data, int index) {
     const ssdgs_model_view *g = job->g;
     ssdgs__bounds *b = job->chunk + index;
     const int end = (index + 1) * SSDGS__CHUNK < g->count ? (index + 1) * SSDGS__CHUNK : g->count;
-    double low[3], high[3], log_scale;
-    int i, j;
-    for (j = 0; j < 3; j++) {
+    for (int j = 0; j < 3; j++) {
         b->low[j] = 1e30;
         b->high[j] = -1e30;
     }
     b->log_scale = 0;
     b->count = 0;
-    for (i = index * SSDGS__CHUNK; i < end; i++) {
+    for (int i = index * SSDGS__CHUNK; i < end; i++) {
+        double low[3], high[3], log_scale;
         if (!ssdgs__box_of(g, i, job->faint, low, high, &log_scale)) continue;
         b->log_scale += log_scale;
         b->count++;
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             b->low[j] = low[j] < b->low[j] ? low[j] : b->low[j];
             b->high[j] = high[j] > b->high[j] ? high[j] : b->high[j];
         }
@@ -2791,18 +2774,19 @@ static void ssdgs__keep_least(double *least, int keep, double number) {
    scene. */
 static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs__bounds *total) {
     enum { SAMPLE = 4096, KEEP = SAMPLE / 200 + 1 };
-    double least[6][KEEP], low[3], high[3], log_scale;
-    int i, j, seen = 0;
-    for (i = 0; i < 6 * KEEP; i++) least[i / KEEP][i % KEEP] = 1e300;
-    for (i = 0; i < g->count; i += 1 + (g->count - 1) / SAMPLE) {
+    double least[6][KEEP];
+    int seen = 0;
+    for (int i = 0; i < 6 * KEEP; i++) least[i / KEEP][i % KEEP] = 1e300;
+    for (int i = 0; i < g->count; i += 1 + (g->count - 1) / SAMPLE) {
+        double low[3], high[3], log_scale;
         if (!ssdgs__box_of(g, i, faint, low, high, &log_scale)) continue;
         seen++;
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             ssdgs__keep_least(least[j], KEEP, low[j]);
             ssdgs__keep_least(least[3 + j], KEEP, -high[j]);
         }
     }
-    for (j = 0; j < 3 && seen; j++) {
+    for (int j = 0; j < 3 && seen; j++) {
         const double from = least[j][seen / 200], to = -least[3 + j][seen / 200], margin = to - from;
         if (from - margin > total->low[j]) total->low[j] = from - margin;
         if (to + margin < total->high[j]) total->high[j] = to + margin;
@@ -2815,17 +2799,16 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
                                         ssdgs__bounds *total) {
     const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
     ssdgs__bounds_job job;
-    int i, j;
     SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
     job.g = g;
     job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold)
                                                    : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
-    for (i = 0; i < chunks; i++) {
+    for (int i = 0; i < chunks; i++) {
         const ssdgs__bounds *b = job.chunk + i;
         if (!b->count) continue;
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             if (!total->count || b->low[j] < total->low[j]) total->low[j] = b->low[j];
             if (!total->count || b->high[j] > total->high[j]) total->high[j] = b->high[j];
         }
@@ -2841,9 +2824,8 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_mem
    far, six faces of a cube from close by or inside. Returns how many; with views NULL only that. */
 static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b,
                               const ssdgs_light *light, double detail, int index, ssdgs_splat_view *views) {
-    double centre[3], position[3], to_scene[3], radius2 = 0, radius, distance2 = 0, distance, size;
-    int i, faces, face, map;
-    for (i = 0; i < 3; i++) {
+    double centre[3], position[3], to_scene[3], radius2 = 0, distance2 = 0;
+    for (int i = 0; i < 3; i++) {
         const double half = b->count ? 0.5 * (b->high[i] - b->low[i]) : 1;
         centre[i] = b->count ? 0.5 * (b->high[i] + b->low[i]) : 0;
         position[i] = (double)light->position[i];
@@ -2851,21 +2833,20 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         radius2 += half * half;
         distance2 += to_scene[i] * to_scene[i];
     }
-    radius = sqrt(radius2);
-    distance = sqrt(distance2);
+    const double radius = sqrt(radius2);
+    double distance = sqrt(distance2);
     if (light->kind == SSDGS_LIGHT_DIRECTIONAL) distance = 1e30;
-    faces = distance > 1.3 * radius ? 1 : 6;
+    const int faces = distance > 1.3 * radius ? 1 : 6;
     if (!views) return faces;
-    map = settings->light_map_size;
+    int map = settings->light_map_size;
     if (!map) {
-        size = 2 * radius / exp(b->log_scale);
+        const double size = 2 * radius / exp(b->log_scale);
         map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
     }
-    size = map * detail < 8192 ? map * detail : 8192;
+    const double size = map * detail < 8192 ? map * detail : 8192;
     map = size < 16 ? 16 : ((int)size + 15) / 16 * 16;
-    for (face = 0; face < faces; face++) {
+    for (int face = 0; face < faces; face++) {
         ssdgs_splat_view *v = views + face;
-        double direction[3], eye[3], f;
         memset(v, 0, sizeof *v);
         v->light = index;
         v->width = v->height = map;
@@ -2873,8 +2854,9 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         v->variance = (ssdgs_real)(v->blur == SSDGS_BLUR_FLOOR ? 0.2 : 0.3);
         v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
         v->cx = v->cy = (ssdgs_real)map / 2;
+        double direction[3], eye[3], f;
         if (faces == 6) {
-            for (i = 0; i < 3; i++) {
+            for (int i = 0; i < 3; i++) {
                 direction[i] = i == face / 2 ? (face & 1 ? -1 : 1) : 0;
                 eye[i] = position[i];
             }
@@ -2884,7 +2866,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         } else {
             v->orthographic = distance > 1000 * radius;
             v->distance = v->orthographic && light->kind == SSDGS_LIGHT_POINT ? (ssdgs_real)distance : 1;
-            for (i = 0; i < 3; i++) {
+            for (int i = 0; i < 3; i++) {
                 direction[i] = to_scene[i];
                 eye[i] =
                     v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
@@ -2901,8 +2883,6 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
 }
 
 static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c) {
-    double determinant;
-    int i, j;
     if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
     if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
@@ -2912,34 +2892,33 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
                            "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
                            "lengths must be positive, near_plane not negative, all finite",
                            (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
-    for (i = 0; i < 12; i++)
+    for (int i = 0; i < 12; i++)
         if (!ssdgs__finite(c->view[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
-    for (i = 0; i < 3; i++)
-        for (j = 0; j <= i; j++) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
             const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
             const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
             if (fabs(dot - (i == j)) > 1e-3)
                 return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                    "camera: the rows of view are not orthonormal");
         }
-    determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
-                           c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
-                           c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
+    const double determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
+                                        c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
+                                        c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
     if (determinant < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: view is a mirror image");
     return SSDGS_OK;
 }
 
 static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
-    int i, j;
     if (light_count < 0 || (light_count && !lights))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
-    for (i = 0; i < light_count; i++) {
+    for (int i = 0; i < light_count; i++) {
         double norm2 = 0;
         if (lights[i].kind != SSDGS_LIGHT_POINT && lights[i].kind != SSDGS_LIGHT_DIRECTIONAL)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             if (!ssdgs__finite(lights[i].position[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
             if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
@@ -3004,8 +2983,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
     const ssdgs_light *lights = (const ssdgs_light *)frame->memory->cached_lights.memory;
     const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
-    int known = !frame->training && cache->revision == frame->model->revision, i, j;
-    for (i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
+    int known = !frame->training && cache->revision == frame->model->revision;
+    for (int i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
     cache->revision = frame->training ? 0 : frame->model->revision;
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
@@ -3020,9 +2999,9 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
             ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
             !(frame->terms & ~cache->terms &
               (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
-    for (i = 0; known && i < frame->light_count; i++) {
+    for (int i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
-        for (j = 0; j < 3; j++)
+        for (int j = 0; j < 3; j++)
             known =
                 known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
     }
@@ -3041,21 +3020,17 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
                                        const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
-    ssdgs_light *cached_lights;
-    ssdgs_result result;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
-    size_t pixels;
-    int i, j, needs_light;
     if (!context->frame) context->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
     if (!context->frame) return SSDGS_ERR_MEMORY;
     m = context->frame;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
-    result = ssdgs__render_options_check(context, &frame->options);
+    ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
     if (!result) result = ssdgs__camera_check(context, camera);
     if (!result) result = ssdgs__lights_check(context, lights, light_count);
     if (result) return result;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
     if (m->cache.revision != model->revision) {
@@ -3073,10 +3048,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (model->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     frame->terms = model->settings.terms & frame->options.terms;
     frame->training = training;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
-    needs_light = ssdgs__needs_light(frame, frame->terms);
+    const int needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__compare_cache(frame);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
@@ -3086,7 +3061,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
             if (result) return result;
             m->cache.bounds_ready = m->cache.revision != 0;
         }
-        for (i = 0; i < frame->light_count; i++)
+        for (int i = 0; i < frame->light_count; i++)
             frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i,
                                                     (double)frame->options.light_detail, i, NULL);
     }
@@ -3113,15 +3088,16 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
-    for (i = 0, j = 1; needs_light && i < frame->light_count && !m->cache.lights_ready; i++)
+    for (int i = 0, j = 1; needs_light && i < frame->light_count && !m->cache.lights_ready; i++)
         j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
                                 i, frame->views + j);
     frame->views[0].cached = m->cache.camera_ready;
-    for (i = 1; i < frame->view_count; i++) frame->views[i].cached = m->cache.lights_ready;
+    for (int i = 1; i < frame->view_count; i++) frame->views[i].cached = m->cache.lights_ready;
     m->cache.camera_ready = m->cache.lights_ready = 0; /* again once the walks are done */
+    ssdgs_light *cached_lights;
     SSDGS__RESERVE(m->cached_lights, cached_lights, ssdgs_light, frame->light_count + 1);
-    for (i = 0; i < frame->light_count; i++) cached_lights[i] = lights[i];
-    pixels = (size_t)camera->width * (size_t)camera->height;
+    for (int i = 0; i < frame->light_count; i++) cached_lights[i] = lights[i];
+    const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -3210,8 +3186,7 @@ static void ssdgs__project_task(void *data, int index) {
 static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
-    int i;
-    for (i = 0; i < frame->view_count; i++) {
+    for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         SSDGS__RESERVE(m->record, v->record, ssdgs_real, n * 8);
@@ -3231,42 +3206,41 @@ static void ssdgs__sort_task(void *data, int index) {
     const int n = frame->gaussians.count;
     uint64_t *from =
                  (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory,
-             *to = from + n, *swap;
+             *to = from + n;
     uint32_t *histogram = (uint32_t *)(to + n);
-    int i, pass, visible = 0;
+    int visible = 0;
     if (v->cached) return;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
-    for (i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++) {
         const float depth = (float)v->depth[i];
-        uint32_t bits;
         if (!(depth >= 0)) continue;
+        uint32_t bits;
         memcpy(&bits, &depth, 4);
         from[visible++] = (uint64_t)bits << 32 | (uint32_t)i;
         histogram[bits & 2047]++;
         histogram[2048 + (bits >> 11 & 2047)]++;
         histogram[4096 + (bits >> 22)]++;
     }
-    for (pass = 0; pass < 3; pass++) {
+    for (int pass = 0; pass < 3; pass++) {
         uint32_t *h = histogram + 2048 * pass, sum = 0;
-        for (i = 0; i < 2048; i++) {
+        for (int i = 0; i < 2048; i++) {
             const uint32_t count = h[i];
             h[i] = sum;
             sum += count;
         }
-        for (i = 0; i < visible; i++) to[h[from[i] >> (32 + 11 * pass) & 2047]++] = from[i];
-        swap = from;
+        for (int i = 0; i < visible; i++) to[h[from[i] >> (32 + 11 * pass) & 2047]++] = from[i];
+        uint64_t *swap = from;
         from = to;
         to = swap;
     }
-    for (i = 0; i < visible; i++) v->order[i] = (uint32_t)from[i];
+    for (int i = 0; i < visible; i++) v->order[i] = (uint32_t)from[i];
     v->visible = visible;
 }
 
 static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->gaussians.count;
-    int i;
-    for (i = 0; i < frame->view_count; i++) {
+    for (int i = 0; i < frame->view_count; i++) {
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         uint64_t *keys;
         SSDGS__RESERVE(m->keys, keys, uint64_t, 2 * n + 3 * 1024);
@@ -3282,8 +3256,7 @@ static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record,
     const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1},
                      high[2] = {record[0] + record[6] + 1, record[1] + record[7] + 1};
     const int tiles[2] = {v->tiles_x, v->tiles_y};
-    int a;
-    for (a = 0; a < 2; a++) {
+    for (int a = 0; a < 2; a++) {
         const ssdgs_real last = (ssdgs_real)(16 * tiles[a] - 1);
         const ssdgs_real from = low[a] < last ? low[a] : last, to = high[a] < last ? high[a] : last;
         box[a] = (uint16_t)((unsigned)(int)(from > 0 ? from : 0) / 16);
@@ -3305,10 +3278,10 @@ static void ssdgs__bin_room_task(void *data, int index) {
     const ssdgs_splat_view *v = frame->views + view;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     uint64_t room = 0;
-    int begin, end, g;
     if (v->cached) return;
+    int begin, end;
     ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
-    for (g = begin; g < end; g++) {
+    for (int g = begin; g < end; g++) {
         uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
         if (v->depth[g] >= 0) {
             ssdgs__tile_box(v, v->record + 8 * (size_t)g, box);
@@ -3326,8 +3299,8 @@ static void ssdgs__bin_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
-    int begin, end;
     if (frame->views[view].cached) return;
+    int begin, end;
     ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
     frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
                            begin, end, (uint32_t)m->chunk_room[chunk]);
@@ -3347,18 +3320,19 @@ static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     const ssdgs_splat_view *v = frame->views + view;
     ssdgs_instances *of_rank = (ssdgs_instances *)m->of_rank.memory;
-    uint32_t *histogram = ssdgs__histogram(frame, view, chunk), i;
-    int begin, end, rank, ahead;
+    uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
     if (v->cached) return;
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
+    int begin, end;
     ssdgs__bin_range(v->visible, chunk, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
+    for (int rank = begin; rank < end; rank++) {
         const ssdgs_instances of = v->of_gaussian[v->order[rank]];
         of_rank[rank] = of;
+        int ahead;
         if ((ahead = rank + SSDGS__AHEAD) < end)
             SSDGS__PREFETCH(v->instance + v->of_gaussian[v->order[ahead]].first);
         if ((ahead += SSDGS__AHEAD) < end) SSDGS__PREFETCH(v->of_gaussian + v->order[ahead]);
-        for (i = of.first; i < of.first + of.count; i++) histogram[v->instance[i].place]++;
+        for (uint32_t i = of.first; i < of.first + of.count; i++) histogram[v->instance[i].place]++;
     }
 }
 
@@ -3368,11 +3342,10 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
     ssdgs_splat_view *v = frame->views + index;
     const int tiles = v->tiles_x * v->tiles_y;
     uint32_t sum = 0;
-    int tile, chunk;
     if (v->cached) return;
-    for (tile = 0; tile < tiles; tile++) {
+    for (int tile = 0; tile < tiles; tile++) {
         v->tile_start[tile] = sum;
-        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
+        for (int chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
             uint32_t *h = ssdgs__histogram(frame, index, chunk) + tile;
             const uint32_t count = *h;
             *h = sum;
@@ -3389,14 +3362,14 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     const ssdgs_instances *of_rank = (const ssdgs_instances *)m->of_rank.memory;
     const ssdgs_splat_view *v = frame->views + view;
-    uint32_t *place = ssdgs__histogram(frame, view, chunk), i;
-    int begin, end, rank;
+    uint32_t *place = ssdgs__histogram(frame, view, chunk);
     if (v->cached) return;
+    int begin, end;
     ssdgs__bin_range(v->visible, chunk, &begin, &end);
-    for (rank = begin; rank < end; rank++) {
+    for (int rank = begin; rank < end; rank++) {
         const ssdgs_instances of = of_rank[rank];
         if (rank + SSDGS__AHEAD < end) SSDGS__PREFETCH(v->instance + of_rank[rank + SSDGS__AHEAD].first);
-        for (i = of.first; i < of.first + of.count; i++) {
+        for (uint32_t i = of.first; i < of.first + of.count; i++) {
             const uint32_t at = place[v->instance[i].place]++;
             v->instance[i].place = at;
             v->tile_list[at].gaussian = v->order[rank];
@@ -3409,24 +3382,21 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->gaussians.count;
     const int tasks = frame->view_count * SSDGS__BIN_CHUNKS;
-    int i, chunk;
-    for (i = 0; i < frame->view_count; i++) {
+    for (int i = 0; i < frame->view_count; i++) {
         uint16_t *box;
         SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t,
                        4 * n + 4);
         (void)box;
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
-    for (i = 0; i < frame->view_count; i++) {
+    for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
-        ssdgs_instances *of_rank;
-        uint32_t *histogram;
-        uint64_t room = 0, chunk_room;
+        uint64_t room = 0;
         if (v->cached) continue;
-        for (chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first number */
-            chunk_room = m->chunk_room[chunk];
+        for (int chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) { /* from here on a chunk's first number */
+            const uint64_t chunk_room = m->chunk_room[chunk];
             m->chunk_room[chunk] = room;
             room += chunk_room;
         }
@@ -3435,10 +3405,12 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
                                v->height);
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->of_gaussian, v->of_gaussian, ssdgs_instances, n + 1);
+        ssdgs_instances *of_rank;
         SSDGS__RESERVE(m->of_rank, of_rank, ssdgs_instances, v->visible + 1);
         SSDGS__RESERVE(m->instance, v->instance, ssdgs_instance, v->instance_room + 1);
         SSDGS__RESERVE(m->list, v->tile_list, ssdgs_tile_entry, v->instance_room + 1);
         SSDGS__RESERVE(m->start, v->tile_start, uint32_t, tiles + 1);
+        uint32_t *histogram;
         SSDGS__RESERVE(m->histogram, histogram, uint32_t, tiles * SSDGS__BIN_CHUNKS);
         (void)of_rank, (void)histogram;
     }
@@ -3488,10 +3460,9 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
 static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
-    ssdgs__tile tile;
     for (; v->cached || index >= v->tiles_x * v->tiles_y; v++)
         index -= v->cached ? 0 : v->tiles_x * v->tiles_y;
-    tile = ssdgs__tile_of(frame, v, index, 0);
+    ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
     if (v->light < 0)
         frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index],
@@ -3509,17 +3480,17 @@ static void ssdgs__gather_light_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
     const ssdgs_frame *frame = job->frame;
     const size_t first = (size_t)frame->gaussians.count * (size_t)job->light;
-    int begin, end, g, view, c;
-    uint32_t i;
+    int begin, end;
     ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
-    for (g = begin; g < end; g++) {
+    for (int g = begin; g < end; g++) {
         const size_t at = first + (size_t)g;
         ssdgs_real sum[4] = {0, 0, 0, 0};
-        for (view = job->first_view; view < job->end_view; view++) {
+        for (int view = job->first_view; view < job->end_view; view++) {
             const ssdgs_splat_view *v = frame->views + view;
             const ssdgs_instances of = v->of_gaussian[g];
-            for (i = of.first; i < of.first + of.count; i++)
-                for (c = 0; c < 4; c++) sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
+            for (uint32_t i = of.first; i < of.first + of.count; i++)
+                for (int c = 0; c < 4; c++)
+                    sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
         }
         frame->visibility[at] =
             sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
@@ -3531,13 +3502,12 @@ static void ssdgs__gather_light_task(void *data, int index) {
 static void ssdgs__gather_camera_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
-    int begin, end, g;
-    uint32_t i;
+    int begin, end;
     ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
-    for (g = begin; g < end; g++) {
+    for (int g = begin; g < end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
         unsigned seen = 0, needed = 0;
-        for (i = of.first; i < of.first + of.count; i++) {
+        for (uint32_t i = of.first; i < of.first + of.count; i++) {
             const uint32_t place = v->instance[i].place;
             seen |= v->tile_seen[place];
             needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
@@ -3548,9 +3518,8 @@ static void ssdgs__gather_camera_task(void *data, int index) {
 
 static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    ssdgs__gather_job job;
-    int i, tiles = 0;
-    for (i = 0; i < frame->view_count; i++) {
+    int tiles = 0;
+    for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         if (v->cached) continue;
@@ -3570,6 +3539,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
     if (!frame->views->cached) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
+    ssdgs__gather_job job;
     job.frame = frame;
     job.end_view = 1;
     for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count &&
@@ -3618,15 +3588,13 @@ typedef struct ssdgs__node_job {
 
 /* Grows a node by one of its parts, whose flux is not 0. */
 static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
-    int c;
     node->flux += flux;
-    for (c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
+    for (int c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
 }
 
 static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real radius) {
     ssdgs_real distance2 = 0;
-    int c;
-    for (c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
+    for (int c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
     radius += SSDGS__SQRT(distance2);
     node->radius = radius > node->radius ? radius : node->radius;
 }
@@ -3638,14 +3606,12 @@ static void ssdgs__node_task(void *data, int chunk) {
     const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK;
     const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
-    int light, pass;
-    size_t at, i;
-    for (light = 0; light < job->frame->light_count; light++)
-        for (at = begin / 8; 8 * at < end; at++) {
+    for (int light = 0; light < job->frame->light_count; light++)
+        for (size_t at = begin / 8; 8 * at < end; at++) {
             ssdgs__node *node = job->nodes + job->count * (size_t)light + at;
             memset(node, 0, sizeof *node);
-            for (pass = 0; pass < 2; pass++)
-                for (i = 8 * at; i < 8 * at + 8 && i < end; i++) {
+            for (int pass = 0; pass < 2; pass++)
+                for (size_t i = 8 * at; i < 8 * at + 8 && i < end; i++) {
                     const ssdgs_real x[3] = {plane[i], plane[g->stride + i], plane[2 * g->stride + i]};
                     const ssdgs_real flux = job->frame->flux[n * (size_t)light + i];
                     if (!(flux > 0)) continue;
@@ -3657,23 +3623,22 @@ static void ssdgs__node_task(void *data, int chunk) {
 
 static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, size_t *count) {
     ssdgs_context *context = frame->context;
-    size_t first[SSDGS__LEVELS + 1], i;
+    size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
-    ssdgs__node_job job;
-    int light, level, pass;
     *count = first[levels];
+    ssdgs__node_job job;
     SSDGS__RESERVE(frame->memory->nodes, job.nodes, ssdgs__node, *count * (size_t)frame->light_count + 1);
     job.frame = frame;
     job.count = *count;
     ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
-    for (light = 0; light < frame->light_count; light++)
-        for (level = 1; level < levels; level++) {
+    for (int light = 0; light < frame->light_count; light++)
+        for (int level = 1; level < levels; level++) {
             ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1];
             ssdgs__node *const end = below + (first[level] - first[level - 1]), *node = end;
             for (; below < end; node++) {
                 memset(node, 0, sizeof *node);
-                for (pass = 0; pass < 2; pass++)
-                    for (i = 0; i < 8 && below + i < end; i++) {
+                for (int pass = 0; pass < 2; pass++)
+                    for (size_t i = 0; i < 8 && below + i < end; i++) {
                         if (!(below[i].flux > 0)) continue;
                         if (pass) ssdgs__node_reach(node, below[i].x, below[i].radius);
                         else ssdgs__node_add(node, below[i].x, below[i].flux);
@@ -3688,19 +3653,18 @@ static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, 
 /* The middle of some lanes' positions (3, BLOCK) and how far they reach from it. */
 static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle[3]) {
     ssdgs_real reach2 = 0;
-    int s, c;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
-        for (s = 1; s < lanes; s++) {
+        for (int s = 1; s < lanes; s++) {
             const ssdgs_real at = x[c * SSDGS__BLOCK + s];
             low = at < low ? at : low;
             high = at > high ? at : high;
         }
         middle[c] = (low + high) / 2;
     }
-    for (s = 0; s < lanes; s++) {
+    for (int s = 0; s < lanes; s++) {
         ssdgs_real distance2 = 0;
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
         reach2 = distance2 > reach2 ? distance2 : reach2;
     }
@@ -3711,8 +3675,7 @@ static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle
 static int ssdgs__is_far(const ssdgs__node *node, const ssdgs_real middle[3], ssdgs_real reach) {
     const ssdgs_real room = node->radius * SSDGS__FAR + reach;
     ssdgs_real distance2 = 0;
-    int c;
-    for (c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
+    for (int c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
     return distance2 > room * room;
 }
 
@@ -3725,8 +3688,7 @@ typedef struct ssdgs__gather {
 } ssdgs__gather;
 
 static void ssdgs__gather_flush(ssdgs__gather *g) {
-    int s;
-    for (s = 0; s < SSDGS__BLOCK; s += 16)
+    for (int s = 0; s < SSDGS__BLOCK; s += 16)
         if (g->groups >> s / 16 & 1)
             g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
     g->count = 0;
@@ -3742,8 +3704,7 @@ static void ssdgs__gather_point(ssdgs__gather *g, ssdgs_real x, ssdgs_real y, ss
 static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
     const size_t n = (size_t)g->frame->gaussians.count, stride = g->frame->gaussians.stride;
     const ssdgs_real *x = g->frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
-    size_t i;
-    for (i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
+    for (size_t i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
         if (g->flux[i] > 0) ssdgs__gather_point(g, x[i], x[stride + i], x[2 * stride + i], g->flux[i]);
 }
 
@@ -3768,9 +3729,9 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
     const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
     ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
-    size_t first[SSDGS__LEVELS + 1], stack[8 * SSDGS__LEVELS], leaves[SSDGS__NEAR];
+    size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels(n, first);
-    int depth = 0, level_of[8 * SSDGS__LEVELS], leaf_count = 0, k, s, i;
+    int depth = 0, leaf_count = 0;
     ssdgs__gather g;
     g.frame = frame;
     g.flux = frame->flux + n * (size_t)light;
@@ -3783,16 +3744,17 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     g.scale[1] =
         (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
     memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
+    size_t stack[8 * SSDGS__LEVELS], leaves[SSDGS__NEAR];
+    int level_of[8 * SSDGS__LEVELS];
     for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
         const size_t at = stack[--depth];
         const int level = level_of[depth];
         const ssdgs__node *node = nodes + first[level] + at;
-        size_t part;
         if (!(node->flux > 0)) continue;
         if (ssdgs__is_far(node, middle, reach))
             ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
         else if (level) {
-            for (part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
+            for (size_t part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
                 stack[depth] = part;
                 level_of[depth++] = level - 1;
             }
@@ -3800,11 +3762,11 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         else ssdgs__gather_leaf(&g, at);
     }
     ssdgs__gather_flush(&g);
-    for (s = 0; s < SSDGS__BLOCK; s += 16) {
+    for (int s = 0; s < SSDGS__BLOCK; s += 16) {
         g.groups = groups & 1 << s / 16;
         if (!g.groups) continue;
         reach = ssdgs__reach(x + s, 16, middle);
-        for (i = 0; i < leaf_count; i++) {
+        for (int i = 0; i < leaf_count; i++) {
             const ssdgs__node *node = nodes + leaves[i];
             if (ssdgs__is_far(node, middle, reach))
                 ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
@@ -3812,10 +3774,10 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         }
         ssdgs__gather_flush(&g);
     }
-    for (k = 0; k < SSDGS__LENGTHS; k++) {
+    for (int k = 0; k < SSDGS__LENGTHS; k++) {
         const ssdgs_real scale =
             (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
-        for (s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
+        for (int s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
     }
 }
 
@@ -3828,25 +3790,25 @@ static void ssdgs__transport_task(void *data, int slot) {
     const ssdgs_frame *frame = job->frame;
     const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
     const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
-    ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
-    int block, light, s, k;
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+    ssdgs_real x[3 * SSDGS__BLOCK];
+    for (int block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
          block++) {
         const size_t first = (size_t)block * SSDGS__BLOCK;
         int seen = 0;
-        for (s = 0; s < SSDGS__BLOCK; s++) {
+        for (int s = 0; s < SSDGS__BLOCK; s++) {
             const size_t at =
                 first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
-            for (k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
+            for (int k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
             seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
         }
-        for (light = 0; light < frame->light_count; light++) {
+        for (int light = 0; light < frame->light_count; light++) {
             const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
             const int groups = seen & ~job->known[at];
             if (!groups) continue;
+            ssdgs_real sums[SSDGS__LENGTHS * SSDGS__BLOCK];
             ssdgs__transport_block(job, light, slot, x, groups, sums);
-            for (k = 0; k < SSDGS__LENGTHS; k++)
-                for (s = 0; s < SSDGS__BLOCK; s++)
+            for (int k = 0; k < SSDGS__LENGTHS; k++)
+                for (int s = 0; s < SSDGS__BLOCK; s++)
                     if (groups >> s / 16 & 1)
                         job->sums[(at * SSDGS__LENGTHS + (size_t)k) * SSDGS__BLOCK + (size_t)s] =
                             sums[k * SSDGS__BLOCK + s];
@@ -3860,16 +3822,16 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     ssdgs_context *context = frame->context;
     ssdgs__cache *cache = &frame->memory->cache;
     ssdgs__transport_job job;
-    size_t blocks, first[SSDGS__LEVELS + 1];
     job.frame = frame;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
-    blocks = (size_t)job.blocks * (size_t)frame->light_count;
+    const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
     SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real,
                    (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
                    blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
     job.nodes = (const ssdgs__node *)frame->memory->nodes.memory;
+    size_t first[SSDGS__LEVELS + 1];
     job.node_count = first[ssdgs__levels((size_t)frame->gaussians.count, first)];
     if (!cache->transport_ready) {
         const ssdgs_result result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
@@ -3900,21 +3862,19 @@ typedef struct ssdgs__block_layout {
 /* Rows of all layers' outputs. */
 static size_t ssdgs__output_rows(const int *sizes, int layers) {
     size_t rows = 0;
-    int i;
-    for (i = 1; i <= layers; i++) rows += (size_t)sizes[i];
+    for (int i = 1; i <= layers; i++) rows += (size_t)sizes[i];
     return rows;
 }
 
 static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     ssdgs__block_layout l;
     const size_t b = SSDGS__BLOCK;
-    int i;
     memset(&l, 0, sizeof l);
     if (frame->terms & SSDGS_SCATTERING_TERM)
         l.scattering_layers = ssdgs__network_sizes(&frame->settings, 0, l.scattering);
     if (frame->terms & SSDGS_SHADOW_TERM)
         l.shadow_layers = ssdgs__network_sizes(&frame->settings, 1, l.shadow);
-    for (i = 0; i <= SSDGS_MAX_LAYERS; i++) {
+    for (int i = 0; i <= SSDGS_MAX_LAYERS; i++) {
         l.widest = l.scattering[i] > l.widest ? l.scattering[i] : l.widest;
         l.widest = l.shadow[i] > l.widest ? l.shadow[i] : l.widest;
     }
@@ -3951,9 +3911,8 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     const ssdgs_settings *s = &frame->settings;
     const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
     ssdgs__lighting k;
-    int i, j;
     memset(&k, 0, sizeof k);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         k.light[i] = frame->lights[light].position[i];
         k.intensity[i] = frame->lights[light].intensity[i] * s->light_scale;
         k.eye[i] = frame->eye[i];
@@ -3976,18 +3935,18 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     k.inverse_fy = 1 / frame->camera.fy;
     k.cx = frame->camera.cx;
     k.cy = frame->camera.cy;
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
         ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
         ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
-        for (i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
+        for (int i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
         if (k.deferred) {
             b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
             b[9] = ssdgs__exp_scalar(sharpness[0]);
             b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
             b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
         } else {
-            for (i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
+            for (int i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
         }
     }
     return k;
@@ -3995,9 +3954,8 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
 
 static ssdgs_result ssdgs__lightings(const ssdgs_frame *frame, ssdgs__lighting **lightings) {
     ssdgs_context *context = frame->context;
-    int light;
     SSDGS__RESERVE(frame->memory->lightings, *lightings, ssdgs__lighting, frame->light_count + 1);
-    for (light = 0; light < frame->light_count; light++)
+    for (int light = 0; light < frame->light_count; light++)
         (*lightings)[light] = ssdgs__lighting_of(frame, light);
     return SSDGS_OK;
 }
@@ -4005,16 +3963,15 @@ static ssdgs_result ssdgs__lightings(const ssdgs_frame *frame, ssdgs__lighting *
 /* Sums over lanes of dL/d(basis rows) -> raw ASG parameters. */
 static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
-    int i, j;
     ssdgs__global_groups(&frame->settings, first);
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         const ssdgs_real *d = dbasis + 12 * j, *sharpness = frame->gaussians.asg_sharpness + 2 * j;
         ssdgs_real q[4], r[9], dr[9],
             inverse = ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
         ssdgs_real *out = frame->global_gradient + first[SSDGS__ASG_SHARPNESS] + 2 * j;
-        for (i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
+        for (int i = 0; i < 9; i++) dr[i % 3 * 3 + i / 3] = d[i];
         ssdgs__rotation_backward_scalar(frame->global_gradient + 4 * j, q, inverse, dr);
-        for (i = 0; i < 2; i++) out[i] = d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
+        for (int i = 0; i < 2; i++) out[i] = d[9 + i] * ssdgs__exp_scalar(sharpness[i]);
     }
 }
 
@@ -4026,8 +3983,7 @@ typedef struct ssdgs__row_lists {
 } ssdgs__row_lists;
 
 static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
-    int i;
-    for (i = 0; i < SSDGS_MAX_WIDTH; i++) lists->all[i] = (uint16_t)i;
+    for (int i = 0; i < SSDGS_MAX_WIDTH; i++) lists->all[i] = (uint16_t)i;
     lists->multiplied = lists->multipliable = 0;
     lists->shadows_cached = 0;
 }
@@ -4038,10 +3994,9 @@ static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, in
                                    const ssdgs_real *weights, ssdgs__row_lists *lists,
                                    const ssdgs_real *inputs, ssdgs_real *outputs) {
     ssdgs__product p;
-    int layer;
     memset(&p, 0, sizeof p);
     p.row_list = lists->all;
-    for (layer = 0; layer < layers; layer++) {
+    for (int layer = 0; layer < layers; layer++) {
         const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1];
         p.a = weights;
         p.a_row = in;
@@ -4074,8 +4029,7 @@ static size_t ssdgs__padded(int inputs) { return ((size_t)inputs + 15) / 16 * 16
 
 static size_t ssdgs__slot_gradient_size(const int *sizes, int layers) {
     size_t size = 0;
-    int i;
-    for (i = 0; i < layers; i++) size += (size_t)sizes[i + 1] * (ssdgs__padded(sizes[i]) + 16);
+    for (int i = 0; i < layers; i++) size += (size_t)sizes[i + 1] * (ssdgs__padded(sizes[i]) + 16);
     return size;
 }
 
@@ -4083,17 +4037,15 @@ static size_t ssdgs__slot_gradient_size(const int *sizes, int layers) {
    number % parts == part. */
 static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slots, size_t stride, int count,
                              int part, int parts, ssdgs_real *gradient) {
-    int layer, row, slot, lane;
-    for (layer = 0; layer < layers; layer++) {
+    for (int layer = 0; layer < layers; layer++) {
         const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1],
                      padded = ssdgs__padded(sizes[layer]);
-        for (row = part; row < sizes[layer + 1]; row += parts) {
+        for (int row = part; row < sizes[layer + 1]; row += parts) {
             const ssdgs_real *from = slots + (size_t)row * (padded + 16);
             ssdgs_real *to = gradient + (size_t)row * in, bias = 0;
-            size_t i;
-            for (slot = 0; slot < count; slot++, from += stride) {
-                for (i = 0; i < in; i++) to[i] = slot ? to[i] + from[i] : from[i];
-                for (lane = 0; lane < 16; lane++) bias += from[padded + (size_t)lane];
+            for (int slot = 0; slot < count; slot++, from += stride) {
+                for (size_t i = 0; i < in; i++) to[i] = slot ? to[i] + from[i] : from[i];
+                for (int lane = 0; lane < 16; lane++) bias += from[padded + (size_t)lane];
             }
             gradient[in * out + (size_t)row] = bias;
         }
@@ -4111,14 +4063,14 @@ static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *s
                                            ssdgs_real *transposed, ssdgs__row_lists *lists, int asked,
                                            ssdgs_real *slot_gradient) {
     const ssdgs_real *layer_in = layers > 1 ? outputs : inputs;
-    int layer, live_out = sizes[layers];
+    int live_out = sizes[layers];
     const uint16_t *outs = lists->all;
-    for (layer = 0; layer < layers; layer++) {
+    for (int layer = 0; layer < layers; layer++) {
         if (layer && layer < layers - 1) layer_in += (size_t)sizes[layer] * SSDGS__BLOCK;
         weights += (size_t)(sizes[layer] + 1) * (size_t)sizes[layer + 1];
     }
     if (slot_gradient) slot_gradient += ssdgs__slot_gradient_size(sizes, layers);
-    for (layer = layers - 1; layer >= 0; layer--) {
+    for (int layer = layers - 1; layer >= 0; layer--) {
         const size_t in = (size_t)sizes[layer], out = (size_t)sizes[layer + 1],
                      padded = ssdgs__padded(sizes[layer]);
         uint16_t *list = outs == lists->in ? lists->out : lists->in;
@@ -4207,8 +4159,7 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
 static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layout *l) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, 0, in);
-    int i;
-    for (i = 0; i < n; i++)
+    for (int i = 0; i < n; i++)
         if (!in[i].of_gaussian && in[i].from >= l->cue) return in[i].row;
     return l->scattering[0];
 }
@@ -4217,8 +4168,7 @@ static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_la
                                  const ssdgs_real *gauss, const ssdgs_real *part, ssdgs_real *activations) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
-    int i;
-    for (i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++) {
         const ssdgs_real *from = (in[i].of_gaussian ? gauss : part) + in[i].from;
         ssdgs_real *to = activations + (size_t)in[i].row * SSDGS__BLOCK;
         const int centred = in[i].of_gaussian && in[i].levels >= 0;
@@ -4236,8 +4186,7 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
                                           ssdgs_real *dgauss, ssdgs_real *drows, ssdgs_real *dvisibility) {
     ssdgs__input in[7];
     const int n = ssdgs__inputs(frame, l, shadow, in);
-    int i, s;
-    for (i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++) {
         const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
         ssdgs_real *to = in[i].of_gaussian             ? dgauss + in[i].from
                          : in[i].from == l->visibility ? dvisibility
@@ -4247,7 +4196,7 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
             frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
                                                in[i].levels);
         else
-            for (s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
+            for (int s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
     }
 }
 
@@ -4275,19 +4224,17 @@ static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
 static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                 ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
-    int s;
     if (!job->shadow_known) return 0;
-    for (s = 0; s < SSDGS__BLOCK; s++)
+    for (int s = 0; s < SSDGS__BLOCK; s++)
         if (!job->shadow_known[first + at[s]]) return 0;
-    for (s = 0; s < SSDGS__BLOCK; s++) shadow[s] = job->shadow_logit[first + at[s]];
+    for (int s = 0; s < SSDGS__BLOCK; s++) shadow[s] = job->shadow_logit[first + at[s]];
     return 1;
 }
 
 static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                const ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
-    int s;
-    for (s = 0; job->shadow_known && s < SSDGS__BLOCK; s++) {
+    for (int s = 0; job->shadow_known && s < SSDGS__BLOCK; s++) {
         job->shadow_known[first + at[s]] = 1;
         job->shadow_logit[first + at[s]] = shadow[s];
     }
@@ -4301,9 +4248,8 @@ static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
 static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t at[SSDGS__BLOCK], int live,
                                const ssdgs_real *rows) {
     ssdgs_real *to = ssdgs__layer(frame, layer);
-    int s, c;
-    for (s = 0; s < live; s++)
-        for (c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
+    for (int s = 0; s < live; s++)
+        for (int c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
 }
 
 static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
@@ -4316,25 +4262,25 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     const int rest = frame->shaded_count - block * SSDGS__BLOCK,
               live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
     size_t at[SSDGS__BLOCK];
-    int light, s, i, c;
-    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
-    for (i = 0; i < SSDGS_CHANNELS; i++) {
+    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    for (int i = 0; i < SSDGS_CHANNELS; i++) {
         const ssdgs_real *plane = frame->gaussians.gaussians + (size_t)i * frame->gaussians.stride;
-        for (s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s]];
+        for (int s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s]];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
-    for (light = 0; light < frame->light_count; light++) {
+    for (int light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
                    *shadow = NULL, *scattering = NULL;
         k->reflect(lighting, gauss, part + l->rows);
-        for (s = 0; s < SSDGS__BLOCK; s++) {
+        for (int s = 0; s < SSDGS__BLOCK; s++) {
             const size_t of_light = n * (size_t)light + at[s];
             part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
             part[l->cue + (size_t)s] =
                 lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
-            for (i = 0; job->transport && i < SSDGS__LENGTHS; i++) /* in units of the irradiance of its own */
+            for (int i = 0; job->transport && i < SSDGS__LENGTHS;
+                 i++) /* in units of the irradiance of its own */
                 part[l->transport + (size_t)(i * SSDGS__BLOCK + s)] =
                     job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS +
                                     (size_t)i) *
@@ -4363,7 +4309,7 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             ssdgs__layer_store(frame, layer, at, live, outs + 3 * SSDGS__BLOCK);
             ssdgs__layer_store(frame, layer + 1, at, live, outs);
             memset(outs, 0, 6 * SSDGS__BLOCK * sizeof *outs);
-            for (s = 0; s < live; s++) {
+            for (int s = 0; s < live; s++) {
                 ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
                 to[0] = lighting->shadow && shadow ? shadow[s] : 0;
                 to[1] = part[l->visibility + (size_t)s];
@@ -4372,41 +4318,42 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         }
     }
     if (frame->layer_count) {
-        for (i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++)
             ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
-        for (s = 0; s < live; s++) {
+        for (int s = 0; s < live; s++) {
             ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
             to[0] = frame->views[0].depth[at[s]];
             to[1] = scratch[l->lobe + 9 * SSDGS__BLOCK + (size_t)s];
             to[2] = 1;
         }
     }
-    for (s = 0; s < live; s++) {
+    for (int s = 0; s < live; s++) {
         const size_t g = at[s];
         ssdgs_real *o = outs + s, *color = frame->color + 4 * g;
         int black = !ssdgs__finite(o[9 * SSDGS__BLOCK]);
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             if (frame->settings.baked)
                 o[c * SSDGS__BLOCK] = ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s]);
             color[c] = o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
-            for (i = 0; i < frame->layer_count;
+            for (int i = 0; i < frame->layer_count;
                  i++) { /* whose products with the lobes must be finite as well */
                 const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
                 black |= !(value <= (ssdgs_real)1e30 && value >= (ssdgs_real)-1e30);
             }
         }
-        for (i = 0; i < frame->layer_count && black; i++)
+        for (int i = 0; i < frame->layer_count && black; i++)
             memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
-        for (c = 0; c < SSDGS__OUTS && black; c++)
+        for (int c = 0; c < SSDGS__OUTS && black; c++)
             color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
         color[3] = (ssdgs_real)black;
         if (!frame->diffuse) continue;
         {
-            ssdgs_real raw[4], q[4], r[9];
-            for (i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
+            ssdgs_real raw[4];
+            for (int i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
+            ssdgs_real q[4], r[9];
             ssdgs__rotation_scalar(raw, q, r);
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 frame->diffuse[4 * g + (size_t)c] = o[c * SSDGS__BLOCK];
                 frame->specular[4 * g + (size_t)c] = o[(3 + c) * SSDGS__BLOCK];
                 frame->scattering[4 * g + (size_t)c] = o[(6 + c) * SSDGS__BLOCK];
@@ -4429,16 +4376,14 @@ static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int slot) {
     const int begin = ssdgs__slot_begin(job->blocks, slot), end = ssdgs__slot_begin(job->blocks, slot + 1);
     const size_t n = (size_t)frame->gaussians.count,
                  last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
-    size_t from, g;
-    int p;
     if (begin == end) return;
-    from = frame->shaded[begin * SSDGS__BLOCK];
-    for (g = begin ? from : 0; g < last; g++) {
+    size_t from = frame->shaded[begin * SSDGS__BLOCK];
+    for (size_t g = begin ? from : 0; g < last; g++) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
         if (frame->seen[g] != SSDGS_SKIPPED) continue;
-        for (p = 0; p < (frame->diffuse ? 6 : 1); p++)
+        for (int p = 0; p < (frame->diffuse ? 6 : 1); p++)
             memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
-        for (p = 0; p < frame->layer_count; p++)
+        for (int p = 0; p < frame->layer_count; p++)
             memcpy(ssdgs__layer(frame, p) + 4 * g, ssdgs__layer(frame, p) + 4 * from, 4 * sizeof(ssdgs_real));
     }
 }
@@ -4446,9 +4391,8 @@ static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int slot) {
 static void ssdgs__shade_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
     ssdgs__row_lists lists;
-    int block;
     ssdgs__row_lists_fill(&lists);
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+    for (int block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
          block++)
         ssdgs__shade_block(job, block, &lists,
                            job->activations +
@@ -4477,20 +4421,20 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
 static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     ssdgs__cache *cache = &frame->memory->cache;
-    ssdgs__shade_job job;
-    ssdgs_result result;
-    int skips = 0, i;
+    int skips = 0;
     frame->shaded_count = 0;
-    for (i = 0; i < frame->gaussians.count; i++) {
+    for (int i = 0; i < frame->gaussians.count; i++) {
         if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
         else skips |= frame->seen[i];
     }
     if (!frame->shaded_count && skips) { /* some colour is needed: the first's */
+        int i;
         for (i = 0; !frame->seen[i]; i++) {}
         frame->seen[i] = SSDGS_SEEN;
         frame->shaded[frame->shaded_count++] = (uint32_t)i;
     }
-    result = ssdgs__shade_setup(frame, &job);
+    ssdgs__shade_job job;
+    ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real,
                    job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
@@ -4520,9 +4464,8 @@ static ssdgs_real *ssdgs__layer_gradient(const ssdgs_frame *frame, int layer) {
 /* (n, 4) of the Gaussians `at` -> rows (3, BLOCK), 0 where none is. */
 static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__BLOCK], int live,
                                  ssdgs_real *rows) {
-    int s, c;
-    for (s = 0; s < SSDGS__BLOCK; s++)
-        for (c = 0; c < 3; c++) rows[c * SSDGS__BLOCK + s] = s < live ? from[4 * at[s] + (size_t)c] : 0;
+    for (int s = 0; s < SSDGS__BLOCK; s++)
+        for (int c = 0; c < 3; c++) rows[c * SSDGS__BLOCK + s] = s < live ? from[4 * at[s] + (size_t)c] : 0;
 }
 
 static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
@@ -4538,33 +4481,32 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
     ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse,
                *dlobe = scratch + l->lobe;
-    ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK, dresidual[3 * SSDGS__BLOCK];
+    ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK;
     const int rest = frame->shaded_count - block * SSDGS__BLOCK,
               live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
-    size_t at[SSDGS__BLOCK];
-    int light, s, c;
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
-    for (s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    size_t at[SSDGS__BLOCK];
+    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
     ssdgs__gradient_rows(frame->color_gradient, at, live, dcolor);
     if (frame->layer_count) {
-        ssdgs_real rows[3 * SSDGS__BLOCK];
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live,
                                  dlobe + 3 * c * SSDGS__BLOCK);
+        ssdgs_real rows[3 * SSDGS__BLOCK];
         ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
         memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK,
                SSDGS__BLOCK * sizeof *rows);                                /* depth is the projection's */
         memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
-    for (light = 0; light < frame->light_count; light++) {
+    ssdgs_real dresidual[3 * SSDGS__BLOCK];
+    for (int light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
         const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
         const ssdgs_real *scattering =
             part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         ssdgs_real *lane_sums =
-                       job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16,
-                   *dinputs;
+            job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16;
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
         if (lighting->deferred) {
@@ -4572,16 +4514,16 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
-            for (s = 0; s < SSDGS__BLOCK; s++)
+            for (int s = 0; s < SSDGS__BLOCK; s++)
                 dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
         k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
                            lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor,
                            dgauss, drows, dshadow, dnet, dvisibility);
-        for (s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
+        for (int s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            dinputs = ssdgs__network_backward(
+            ssdgs_real *dinputs = ssdgs__network_backward(
                 k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
                 part + l->scattering_at, dnet, dnet2, scratch + l->transposed, lists,
                 ssdgs__inputs_asked(frame, l), frame->frozen[0] ? NULL : slot_gradient);
@@ -4590,17 +4532,17 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         if (l->shadow_layers) {
             memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-            dinputs = ssdgs__network_backward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs,
-                                              part + l->shadow_at, dnet, dnet2, scratch + l->transposed,
-                                              lists, l->shadow[0],
-                                              frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
+            ssdgs_real *dinputs = ssdgs__network_backward(
+                k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs, part + l->shadow_at, dnet,
+                dnet2, scratch + l->transposed, lists, l->shadow[0],
+                frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
             ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
     if (frame->layer_count) k->lobe_backward(gauss, dlobe, dgauss);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
-        for (s = 0; s < live; s++)
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
+        for (int s = 0; s < live; s++)
             frame->gradient[(size_t)c * frame->gaussians.stride + at[s]] = dgauss[c * SSDGS__BLOCK + s];
 }
 
@@ -4608,11 +4550,10 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
     const size_t lanes = (size_t)SSDGS__LANE_SUMS * 16 * (size_t)job->frame->light_count;
     ssdgs__row_lists lists;
-    int block;
     ssdgs__row_lists_fill(&lists);
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
     memset(job->lane_slots + lanes * (size_t)slot, 0, lanes * sizeof(ssdgs_real));
-    for (block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
+    for (int block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
          block++)
         ssdgs__shade_backward_block(job, block, &lists, slot);
 }
@@ -4631,9 +4572,8 @@ static void ssdgs__sum_slots_task(void *data, int part) {
 
 /* eye = -R^T t */
 static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
-    int j, c;
-    for (j = 0; j < 3; j++)
-        for (c = 0; c < 3; c++) {
+    for (int j = 0; j < 3; j++)
+        for (int c = 0; c < 3; c++) {
             frame->view_gradient[4 * j + c] -= frame->camera.view[4 * j + 3] * deye[c];
             frame->view_gradient[4 * j + 3] -= frame->camera.view[4 * j + c] * deye[c];
         }
@@ -4645,10 +4585,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS,
                  lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
-    ssdgs_real sums[SSDGS__LANE_SUMS];
     ssdgs__shade_job job;
-    size_t i;
-    int slot, light, lane;
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
@@ -4660,15 +4597,16 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     memset(frame->gradient, 0, n * sizeof(ssdgs_real));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_backward_task, &job);
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__sum_slots_task, &job);
+    ssdgs_real sums[SSDGS__LANE_SUMS];
     memset(sums, 0, sizeof sums);
-    for (slot = 0; slot < SSDGS__SLOTS; slot++)
-        for (light = 0; light < frame->light_count; light++)
-            for (i = 0; i < SSDGS__LANE_SUMS; i++) {
+    for (int slot = 0; slot < SSDGS__SLOTS; slot++)
+        for (int light = 0; light < frame->light_count; light++)
+            for (size_t i = 0; i < SSDGS__LANE_SUMS; i++) {
                 const ssdgs_real *row =
                     job.lane_slots +
                     ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) * 16;
                 ssdgs_real sum = 0;
-                for (lane = 0; lane < 16; lane++) sum += row[lane];
+                for (int lane = 0; lane < 16; lane++) sum += row[lane];
                 sums[i] += sum;
                 if (i < 3 && light == 0) frame->light_gradient[i] += sum;
             }
@@ -4682,14 +4620,13 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
 /* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes or come from them. */
 static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count,
                               ssdgs_real *const planes[]) {
-    int micro, row, c;
-    for (micro = 0; micro < 16; micro++)
-        for (row = 0; row < 4; row++) {
+    for (int micro = 0; micro < 16; micro++)
+        for (int row = 0; row < 4; row++) {
             const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row,
                       inside = tile->width - x;
             const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
             if (inside <= 0 || y >= tile->height) continue;
-            for (c = 0; c < count; c++) {
+            for (int c = 0; c < count; c++) {
                 const ssdgs_real *from = values + micro * 64 + c * 16 + 4 * row;
                 if (inside >= 4) memcpy(planes[c] + at, from, 4 * sizeof *from);
                 else memcpy(planes[c] + at, from, (size_t)inside * sizeof *from);
@@ -4698,9 +4635,8 @@ static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values,
 }
 
 static void ssdgs__tile_load(const ssdgs__tile *tile, const ssdgs_real *plane, int c, ssdgs_real *values) {
-    int micro, row;
-    for (micro = 0; micro < 16; micro++)
-        for (row = 0; row < 4; row++) {
+    for (int micro = 0; micro < 16; micro++)
+        for (int row = 0; row < 4; row++) {
             const int x = tile->x + 4 * (micro & 3), y = tile->y + 4 * (micro >> 2) + row;
             const int inside = y < tile->height ? tile->width - x : 0;
             const size_t at = (size_t)y * (size_t)tile->width + (size_t)x;
@@ -4721,10 +4657,9 @@ static ssdgs_real *ssdgs__layer_plane(const ssdgs_frame *frame, int layer, int c
 
 static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer,
                                       const ssdgs_real *values) {
-    ssdgs_real *planes[3];
-    int c;
     if (!frame->layer_pixels) return;
-    for (c = 0; c < 3; c++) planes[c] = ssdgs__layer_plane(frame, layer, c);
+    ssdgs_real *planes[3];
+    for (int c = 0; c < 3; c++) planes[c] = ssdgs__layer_plane(frame, layer, c);
     ssdgs__tile_store(tile, values, 3, planes);
 }
 
@@ -4744,14 +4679,14 @@ static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x
     const ssdgs_real *steps = map->light_map + ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 |
                                                                               (y & 3) << 2 | (x & 3))) *
                                                    SSDGS__MAP_VALUES;
-    ssdgs_real left, begin;
-    int level = 0, i;
+    int level = 0;
     if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
-    for (i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > steps[i];
+    for (int i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > steps[i];
     if (!level) return 1;
     if (level == SSDGS__MAP_STEPS) return steps[SSDGS__BEHIND];
-    left = steps[SSDGS__LEFT + level - 1];
-    begin = steps[level] - thick > steps[level - 1] ? steps[level] - thick : steps[level - 1];
+    const ssdgs_real left = steps[SSDGS__LEFT + level - 1];
+    const ssdgs_real begin =
+        steps[level] - thick > steps[level - 1] ? steps[level] - thick : steps[level - 1];
     if (distance <= begin) return left;
     return left + (steps[SSDGS__BEFORE + level - 1] - left) * (distance - begin) / (steps[level] - begin);
 }
@@ -4760,25 +4695,25 @@ static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x
 static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias) {
     const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1),
                      half = (ssdgs_real)0.5;
-    ssdgs_real t[3], u, w, inverse_z, distance, row[2];
-    int i, x, y;
-    for (i = 0; i < 3; i++)
+    ssdgs_real t[3];
+    for (int i = 0; i < 3; i++)
         t[i] = map->view[4 * i] * at[0] + map->view[4 * i + 1] * at[1] + map->view[4 * i + 2] * at[2] +
                map->view[4 * i + 3];
     if (!(t[2] > map->near_plane)) return -1;
-    inverse_z = map->orthographic ? 1 : 1 / t[2];
-    u = map->fx * t[0] * inverse_z + map->cx - half;
-    w = map->fy * t[1] * inverse_z + map->cy - half;
+    const ssdgs_real inverse_z = map->orthographic ? 1 : 1 / t[2];
+    ssdgs_real u = map->fx * t[0] * inverse_z + map->cx - half;
+    ssdgs_real w = map->fy * t[1] * inverse_z + map->cy - half;
     if (!(u >= -half && w >= -half && u <= wide + half && w <= high + half)) return -1;
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
-    distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
+    ssdgs_real distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
     distance -= bias + (ssdgs_real)1e-6 * distance + ssdgs__nearest(map);
-    x = u < wide ? (int)u : map->width - 2;
-    y = w < high ? (int)w : map->height - 2;
+    const int x = u < wide ? (int)u : map->width - 2;
+    const int y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
     w -= (ssdgs_real)y;
-    for (i = 0; i < 2; i++)
+    ssdgs_real row[2];
+    for (int i = 0; i < 2; i++)
         row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance, bias) +
                  u * ssdgs__passed(map, x + 1, y + i, distance, bias);
     return (1 - w) * row[0] + w * row[1];
@@ -4791,21 +4726,22 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
     const ssdgs_real bias = (frame->settings.light_bias + rounding) * frame->settings.length_unit;
-    int first = 1, i, c, view; /* views are in the order of lights */
+    int first = 1; /* views are in the order of lights */
     while (first < frame->view_count && frame->views[first].light < light) first++;
-    for (i = 0; i < 256; i++) {
+    for (int i = 0; i < 256; i++) {
         const int lane = i / 16 * 64 + i % 16;
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3));
-        ssdgs_real y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2)), at[3], z, passed = -1;
+        ssdgs_real y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2)), passed = -1;
         visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
-        z = depth[0] / depth[32];
+        const ssdgs_real z = depth[0] / depth[32];
         x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
         y = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
-        for (c = 0; c < 3; c++)
+        ssdgs_real at[3];
+        for (int c = 0; c < 3; c++)
             at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
-        for (view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
+        for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
              view++)
             if (frame->views[view].light_map) passed = ssdgs__passed_to(frame->views + view, at, bias);
         visibility[lane] = passed < 0
@@ -4824,27 +4760,26 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER],
         *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
-    ssdgs_real visibility[SSDGS__TILE_LAYER];
-    int layer, light;
-    for (layer = 0; layer < layers; layer++)
+    for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
     k->composite(&tile, layers, color, pixels);
     if (job->lightings && layers == 1 && frame->layer_pixels)
         memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
-    for (layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
+    for (int layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
         ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
-    for (light = 0; job->lightings && light < frame->light_count; light++) {
+    ssdgs_real visibility[SSDGS__TILE_LAYER];
+    for (int light = 0; job->lightings && light < frame->light_count; light++) {
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
         const size_t plane = (size_t)tile.width * (size_t)tile.height * (size_t)light;
         if (layers > 1) {
-            for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
+            for (int layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
                 color[layer] = ssdgs__layer(frame, first - 1 + layer);
             if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
             if (frame->visibility_given)
                 ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, visibility);
             else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, visibility);
         } else memset(visibility, 0, sizeof visibility);
-        for (layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
+        for (int layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
             ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
         if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, visibility);
         if (frame->pixel_shadow) {
@@ -4863,10 +4798,9 @@ static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *c
                                    ssdgs__lighting *lightings) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
     ssdgs__composite_job job;
-    int c;
     job.frame = frame;
     job.color = color;
-    for (c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
+    for (int c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
     job.planes[3] = frame->transmittance;
     job.lightings = lightings;
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task,
@@ -4890,13 +4824,12 @@ typedef struct ssdgs__uncomposite_job {
 /* The fourth of a walk's first layer: what the gradients' product with the pixel comes to, 1: with T's. */
 static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradient, int layers,
                                     int transmittance) {
-    int micro, lane, layer, c;
-    for (micro = 0; micro < 16; micro++)
-        for (lane = 0; lane < 16; lane++) {
+    for (int micro = 0; micro < 16; micro++)
+        for (int lane = 0; lane < 16; lane++) {
             const int at = micro * 64 + lane;
             ssdgs_real total = transmittance ? pixels[at + 48] * gradient[at + 48] : 0;
-            for (layer = 0; layer < layers; layer++)
-                for (c = 0; c < 3; c++) {
+            for (int layer = 0; layer < layers; layer++)
+                for (int c = 0; c < 3; c++) {
                     const int value = layer * SSDGS__TILE_LAYER + at + 16 * c;
                     total += gradient[value] * pixels[value];
                 }
@@ -4913,37 +4846,39 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     const size_t plane = (size_t)v->width * (size_t)v->height;
     const int deferred = frame->layer_count > 0, layers = deferred ? SSDGS__LAYERS : 1;
     const int lit = SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
-    const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER], gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER],
-        visibility[SSDGS__TILE_LAYER];
     ssdgs_real *sums = v->tile_sums + (size_t)v->tile_start[index] * job->stride;
-    int layer, light, c;
     if (!tile.count) return;
     memset(sums, 0, tile.count * job->stride * sizeof *sums);
-    for (c = 0; c < 4; c++) ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
-    for (layer = 0; layer < (deferred ? SSDGS__LIGHT_LAYER : 1); layer++)
-        for (c = 0; c < 3; c++)
+    ssdgs_real gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
+    for (int c = 0; c < 4; c++)
+        ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
+    for (int layer = 0; layer < (deferred ? SSDGS__LIGHT_LAYER : 1); layer++)
+        for (int c = 0; c < 3; c++)
             ssdgs__tile_load(
                 &tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
                 pixels + layer * SSDGS__TILE_LAYER);
     ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
-    for (c = 0; deferred && frame->normal_gradient && c < 4; c++)
+    for (int c = 0; deferred && frame->normal_gradient && c < 4; c++)
         ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c % 3 + 2 * (c / 3),
                          gradient + (c < 3 ? 4 : 3) * SSDGS__TILE_LAYER);
-    for (light = deferred ? frame->light_count - 1 : -1; light >= 0;
+    const ssdgs_real *color[SSDGS__LAYERS];
+    for (int light = deferred ? frame->light_count - 1 : -1; light >= 0;
          light--) { /* the first's are walked with the others */
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
-        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++)
-            for (c = 0; c < 3; c++)
+        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+            for (int c = 0; c < 3; c++)
                 ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c,
                                  pixels + lit + layer * SSDGS__TILE_LAYER);
+        ssdgs_real visibility[SSDGS__TILE_LAYER];
         ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
         k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient,
                               job->highlight_sums +
                                   (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
         if (!light) continue;
-        for (layer = 0; layer < SSDGS__PER_LIGHT; layer++) { /* training has one light: these may take long */
+        for (int layer = 0; layer < SSDGS__PER_LIGHT;
+             layer++) { /* training has one light: these may take long */
             const int at = lit + layer * SSDGS__TILE_LAYER;
             *color = ssdgs__layer(frame, first - 1 + layer);
             ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
@@ -4951,7 +4886,7 @@ static void ssdgs__composite_backward_task(void *data, int index) {
                                   first + layer);
         }
     }
-    for (layer = 0; layer < layers; layer++)
+    for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
     ssdgs__gradient_product(pixels, gradient, layers, 1);
     k->composite_backward(&tile, layers, color, gradient, pixels, sums, job->stride, 0);
@@ -4962,26 +4897,25 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs_splat_view *v = frame->views;
     const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
-    int begin, end, i, layer;
-    size_t g;
+    int begin, end;
     ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
-    for (g = (size_t)begin; g < (size_t)end; g++) {
+    for (size_t g = (size_t)begin; g < (size_t)end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
         const ssdgs_real *r = v->record + 8 * g;
-        ssdgs_real a, b, c, sum[8], *d = frame->splat_gradient + SSDGS__SPLAT * g;
-        uint32_t instance;
+        ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g;
         if (!of.count) continue;
-        a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
+        const ssdgs_real a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
+        ssdgs_real sum[8];
         memset(sum, 0, sizeof sum);
-        for (instance = of.first; instance < of.first + of.count; instance++) {
+        for (uint32_t instance = of.first; instance < of.first + of.count; instance++) {
             const uint32_t place = v->instance[instance].place;
             const ssdgs_real *from = v->tile_sums + (size_t)place * job->stride;
             if (!v->tile_seen[place]) continue;
-            for (i = 0; i < 8; i++) sum[i] += from[i];
-            for (layer = 0; layer <= frame->layer_count; layer++) {
+            for (int i = 0; i < 8; i++) sum[i] += from[i];
+            for (int layer = 0; layer <= frame->layer_count; layer++) {
                 ssdgs_real *to =
                     (layer ? ssdgs__layer_gradient(frame, layer - 1) : frame->color_gradient) + 4 * g;
-                for (i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
+                for (int i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
             }
         }
         /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
@@ -4999,18 +4933,17 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
 /* Sums of the tiles -> light, view and ASG gradients. */
 static void ssdgs__highlight_gradient(ssdgs_frame *frame, const ssdgs__uncomposite_job *job) {
     const size_t tiles = (size_t)frame->views[0].tiles_x * (size_t)frame->views[0].tiles_y;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], tile;
-    int light, i, j;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&frame->settings, first);
-    for (tile = 0; tile < tiles; tile++)
-        for (light = 0; light < frame->light_count; light++) {
+    for (size_t tile = 0; tile < tiles; tile++)
+        for (int light = 0; light < frame->light_count; light++) {
             const size_t at = tile * (size_t)frame->light_count + (size_t)light;
             const ssdgs_real *sum = job->highlight_sums + at * SSDGS__HIGHLIGHT_SUMS;
-            for (i = 0; i < 3 && !light; i++) frame->light_gradient[i] += sum[i];
+            for (int i = 0; i < 3 && !light; i++) frame->light_gradient[i] += sum[i];
             ssdgs__eye_backward(frame, sum + 3);
-            for (i = 0; i < 9; i++) frame->view_gradient[4 * (i / 3) + i % 3] += sum[6 + i];
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-                for (i = 0; i < 2; i++)
+            for (int i = 0; i < 9; i++) frame->view_gradient[4 * (i / 3) + i % 3] += sum[6 + i];
+            for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+                for (int i = 0; i < 2; i++)
                     frame->global_gradient[first[SSDGS__ASG_SHARPNESS] + (size_t)(2 * j + i)] +=
                         sum[15 + 2 * j + i];
                 frame->global_gradient[first[SSDGS__ASG_SIGMA] + (size_t)j] +=
@@ -5063,11 +4996,10 @@ static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) 
     ssdgs_context *context = frame->context;
     const int chunks = ssdgs__chunks(frame);
     ssdgs_real *slots;
-    int i, j;
     SSDGS__RESERVE(frame->memory->view_slots, slots, ssdgs_real, 12 * (size_t)chunks + 12);
     ssdgs__parallel(context, chunks, ssdgs__project_backward_task, frame);
-    for (i = 0; i < chunks; i++)
-        for (j = 0; j < 12; j++) frame->view_gradient[j] += slots[12 * i + j];
+    for (int i = 0; i < chunks; i++)
+        for (int j = 0; j < 12; j++) frame->view_gradient[j] += slots[12 * i + j];
     return SSDGS_OK;
 }
 
@@ -5093,8 +5025,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
 
 static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
-    int stage;
-    for (stage = first; stage <= last; stage++) {
+    for (int stage = first; stage <= last; stage++) {
         const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
                                                       : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
         if (result) return result;
@@ -5115,21 +5046,20 @@ static void ssdgs__rows_task(void *data, int index) {
     const int w = job->frame->camera.width, h = job->frame->camera.height, n = job->channels;
     const int end = (index + 1) * SSDGS__BAND < h ? (index + 1) * SSDGS__BAND : h;
     const size_t plane = (size_t)w * (size_t)h;
-    int x, y, c;
-    for (y = index * SSDGS__BAND; y < end; y++) {
+    for (int y = index * SSDGS__BAND; y < end; y++) {
         const ssdgs_real *t = transmittance + (size_t)y * (size_t)w,
                          *red = job->planes + (size_t)y * (size_t)w;
         ssdgs_real *rgb = job->out + (size_t)y * (size_t)job->stride * 3;
-        for (x = 0; n == 3 && x < w; x++, rgb += 3) {
+        for (int x = 0; n == 3 && x < w; x++, rgb += 3) {
             rgb[0] = red[x] + t[x] * job->background[0];
             rgb[1] = red[plane + (size_t)x] + t[x] * job->background[1];
             rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
         }
-        for (c = 0; n != 3 && c < n; c++) {
+        for (int c = 0; n != 3 && c < n; c++) {
             const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w,
                              background = job->background[c];
             ssdgs_real *out = job->out + (size_t)y * (size_t)job->stride * (size_t)n + c;
-            for (x = 0; x < w; x++) out[x * n] = from[x] + t[x] * background;
+            for (int x = 0; x < w; x++) out[x * n] = from[x] + t[x] * background;
         }
     }
 }
@@ -5138,13 +5068,12 @@ static void ssdgs__rows_task(void *data, int index) {
 static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride,
                               const ssdgs_real *background, ssdgs_real *out) {
     ssdgs__rows_job job;
-    int c;
     job.frame = frame;
     job.planes = planes;
     job.out = out;
     job.channels = channels;
     job.stride = stride;
-    for (c = 0; c < 3; c++) job.background[c] = background ? background[c] : 0;
+    for (int c = 0; c < 3; c++) job.background[c] = background ? background[c] : 0;
     ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task,
                     &job);
 }
@@ -5154,25 +5083,24 @@ static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes
 static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, ssdgs_real *planes) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const ssdgs_real *depth = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0);
-    size_t i;
-    int light, c;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         const ssdgs_real *scattering = ssdgs__layer_plane(frame, 0, c),
                          *all = frame->pixels + pixels * (size_t)c;
         const ssdgs_real *normal = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER + 1, c);
         ssdgs_real *to = planes + pixels * (size_t)c;
-        for (i = 0; i < pixels; i++)
+        for (size_t i = 0; i < pixels; i++)
             to[i] = component == 1             ? all[i] - scattering[i]
                     : component == 2           ? scattering[i]
                     : component == 3           ? normal[i]
                     : component == 4 && c == 1 ? depth[i]
                                                : 0;
-        for (light = 0; light < frame->light_count; light++) {
+        for (int light = 0; light < frame->light_count; light++) {
             const ssdgs_real *shadow = frame->pixel_shadow + pixels * (size_t)light;
             const ssdgs_real *d =
                 ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c);
-            for (i = 0; i < pixels && component < 2; i++) to[i] += (component ? -d[i] : d[i]) * shadow[i];
-            for (i = 0; i < pixels && component == 4 && c == 0; i++)
+            for (size_t i = 0; i < pixels && component < 2; i++)
+                to[i] += (component ? -d[i] : d[i]) * shadow[i];
+            for (size_t i = 0; i < pixels && component == 4 && c == 0; i++)
                 to[i] += shadow[i] * (1 - frame->transmittance[i]) / (ssdgs_real)frame->light_count;
         }
     }
@@ -5182,33 +5110,33 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
                                   int light_count, const ssdgs_render_options *options,
                                   const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_context *context = model->context;
-    ssdgs_frame frame;
-    ssdgs_result result;
-    ssdgs_real *planes;
-    size_t pixels, i;
     double done = 0, all = 0;
-    int stride, c, x, y, finite = 1;
+    int finite = 1;
     if (!camera || !image) return ssdgs__null(context, "ssdgs_render", camera ? "image" : "camera");
-    result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
-                                image->diffuse || image->specular || image->scattering || image->normal ||
-                                    image->shadow || image->depth,
-                                0);
+    ssdgs_frame frame;
+    ssdgs_result result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
+                                             image->diffuse || image->specular || image->scattering ||
+                                                 image->normal || image->shadow || image->depth,
+                                             0);
     if (result) return result;
-    stride = image->stride ? image->stride : camera->width;
+    const int stride = image->stride ? image->stride : camera->width;
     if (stride < camera->width)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
                            camera->width);
     result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    pixels = (size_t)camera->width * (size_t)camera->height;
+    const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     if (image->color)
         ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
+    size_t i;
+    int y;
     if (image->alpha)
         for (y = 0, i = 0; y < camera->height; y++)
-            for (x = 0; x < camera->width; x++, i++)
+            for (int x = 0; x < camera->width; x++, i++)
                 image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
+    ssdgs_real *planes;
     SSDGS__RESERVE(frame.memory->image, planes, ssdgs_real, pixels * 3);
-    for (c = 0; c < 4; c++) {
+    for (int c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
         const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
         if (!to[c]) continue;
@@ -5230,7 +5158,7 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
         stats->camera_cached = frame.views[0].cached;
         stats->lights_cached = frame.view_count > 1 && frame.views[1].cached;
         for (i = 0; i < (size_t)model->count; i++) stats->skipped += frame.seen[i] == SSDGS_SKIPPED;
-        for (c = 0; c < SSDGS__SLOTS; c++) {
+        for (int c = 0; c < SSDGS__SLOTS; c++) {
             const uint64_t *counts = frame.memory->cache.counts + 3 * c;
             done += (double)counts[0];
             all += (double)counts[1];
@@ -5240,11 +5168,11 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
         stats->instances = frame.views[0].instances;
         for (i = 0; i < (size_t)frame.shaded_count; i++)
             stats->blackened += frame.color[4 * frame.shaded[i] + 3] > 0;
-        for (c = 0; c < SSDGS_DIFFUSE; c++)
+        for (int c = 0; c < SSDGS_DIFFUSE; c++)
             finite = finite &&
                      context->k->finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
         for (i = 0; i < (size_t)model->count && !finite; i++)
-            for (c = 0; c < SSDGS_DIFFUSE; c++)
+            for (int c = 0; c < SSDGS_DIFFUSE; c++)
                 if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i]) &&
                     !(c >= SSDGS_LOG_SCALE &&
                       ssdgs__finite(1 / model->gaussians[(size_t)c * model->capacity + i]))) {
@@ -5259,10 +5187,9 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
                                        const ssdgs_light *lights, int light_count,
                                        const ssdgs_render_options *options, const ssdgs_image *image,
                                        ssdgs_render_stats *stats) {
-    ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_render");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_render");
     return result ? result
                   : ssdgs__leave(model->context,
                                  ssdgs__render(model, camera, lights, light_count, options, image, stats));
@@ -5302,11 +5229,11 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
 
 static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
     ssdgs_real begin[256];
-    int byte, at = 0;
-    for (byte = 0; byte < 256; byte++)
+    int at = 0;
+    for (int byte = 0; byte < 256; byte++)
         begin[byte] = ((ssdgs_real)byte + (ssdgs_real)0.5) / 255; /* of the next */
     ssdgs__srgb_decode_scalar(begin, begin, 256);
-    for (byte = 0; byte < 256; byte++) {
+    for (int byte = 0; byte < 256; byte++) {
         const int end = byte < 255 ? (int)(begin[byte] * SSDGS__PART_SCALE + (ssdgs_real)0.5) : SSDGS__PARTS;
         memset(bytes + at, byte, (size_t)(end - at));
         at = end;
@@ -5321,14 +5248,13 @@ static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *table, ssdgs
 }
 
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
-    unsigned char table[SSDGS__PARTS];
-    size_t i;
     if (!values || !bytes) return;
     if (transfer == SSDGS_TRANSFER_SRGB) {
+        unsigned char table[SSDGS__PARTS];
         ssdgs__bytes_make(table);
-        for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
+        for (size_t i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
     } else {
-        for (i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
+        for (size_t i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
     }
 }
 
@@ -5337,14 +5263,13 @@ SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, 
     const int red = format == SSDGS_BGRA8 ? 2 : 0;
     unsigned char bytes[SSDGS__PARTS];
     const unsigned char *table = transfer == SSDGS_TRANSFER_SRGB ? bytes : NULL;
-    int x, y;
     if (!image || !image->color || !pixels) return;
     if (table) ssdgs__bytes_make(bytes);
-    for (y = 0; y < height; y++) {
+    for (int y = 0; y < height; y++) {
         const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
         const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
         unsigned char *to = (unsigned char *)pixels + y * pitch;
-        for (x = 0; x < width; x++, color += 3, to += 4) {
+        for (int x = 0; x < width; x++, color += 3, to += 4) {
             const ssdgs_real a = alpha ? alpha[x] : 1, by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
             to[red] = ssdgs__byte(table, color[0] * by);
             to[1] = ssdgs__byte(table, color[1] * by);
@@ -5363,17 +5288,17 @@ typedef struct ssdgs__line {
 
 static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
     enum { OCTAVE = 64, POINTS = OCTAVE + 16 };
-    ssdgs_real from[POINTS], encoded[POINTS];
-    int begin, i;
-    for (begin = 0; begin < SSDGS__LINES; begin += OCTAVE) {
-        for (i = 0; i < POINTS; i++) {
+    ssdgs_real from[POINTS];
+    for (int begin = 0; begin < SSDGS__LINES; begin += OCTAVE) {
+        for (int i = 0; i < POINTS; i++) {
             const uint32_t bits = (uint32_t)(SSDGS__LINES_FIRST + begin + i) << 17;
             float start;
             memcpy(&start, &bits, sizeof start);
             from[i] = (ssdgs_real)start;
         }
+        ssdgs_real encoded[POINTS];
         SSDGS__SRGB_ENCODE(encoded, NULL, from, POINTS);
-        for (i = 0; i < OCTAVE; i++) {
+        for (int i = 0; i < OCTAVE; i++) {
             const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
             lines[begin + i].slope = slope;
             lines[begin + i].at = begin ? encoded[i] - slope * from[i]
@@ -5387,8 +5312,8 @@ static SSDGS__INLINE ssdgs_real ssdgs__on_curve(const ssdgs__line *lines, ssdgs_
 #ifdef SSDGS_REAL64
     return lines ? ssdgs_srgb_encode(linear) : linear; /* exact, for tests */
 #else
-    int32_t line;
     if (!lines) return linear;
+    int32_t line;
     memcpy(&line, &linear, sizeof line);
     line = (line >> 17) - SSDGS__LINES_FIRST; /* below 0: of less than 2^-13, negative ones too */
     line = line < 0 ? 0 : line;
@@ -5401,13 +5326,11 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
                              const ssdgs_real background[3], ssdgs_real *stored) {
     ssdgs__line curve[SSDGS__LINES];
     const ssdgs__line *lines = transfer == SSDGS_TRANSFER_SRGB ? curve : NULL;
-    size_t i;
-    int c;
     if (!color || !alpha || !background || !stored) return;
     if (lines) ssdgs__lines_make(curve);
-    for (i = 0; i < pixels; i++, color += 3, stored += 3) {
+    for (size_t i = 0; i < pixels; i++, color += 3, stored += 3) {
         const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];
     }
 }
@@ -5442,9 +5365,8 @@ static void ssdgs__loss_pad_task(void *data, int index) {
     const int channel = index / job->bands, band = index % job->bands, w = job->width;
     const int begin = band ? band * SSDGS__BAND : -5,
               end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
-    int y, x, p;
-    for (y = begin; y < end; y++)
-        for (p = 0; p < 5; p++) {
+    for (int y = begin; y < end; y++)
+        for (int p = 0; p < 5; p++) {
             const ssdgs_real *from = (p ? job->target : job->image) +
                                      (size_t)channel * (size_t)w * (size_t)job->height +
                                      (size_t)(y > 0 ? y : 0) * (size_t)w;
@@ -5452,9 +5374,9 @@ static void ssdgs__loss_pad_task(void *data, int index) {
                 p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
             const int inside = y >= 0 && y < job->height && p < 2;
             ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
-            for (x = 0; x < 16; x++) to[x] = outside;
-            for (x = 0; x < w; x++) to[16 + x] = inside ? from[x] - (ssdgs_real)0.5 : outside;
-            for (x = 16 + w; x < (int)job->stride; x++) to[x] = outside;
+            for (int x = 0; x < 16; x++) to[x] = outside;
+            for (int x = 0; x < w; x++) to[16 + x] = inside ? from[x] - (ssdgs_real)0.5 : outside;
+            for (int x = 16 + w; x < (int)job->stride; x++) to[x] = outside;
         }
 }
 
@@ -5462,15 +5384,14 @@ static void ssdgs__loss_task(void *data, int index) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
     const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
-    int y, i;
-    for (i = 0; i < 3; i++) job->sums[3 * index + i] = 0;
-    for (y = begin; y < end; y++) {
+    for (int i = 0; i < 3; i++) job->sums[3 * index + i] = 0;
+    for (int y = begin; y < end; y++) {
         const size_t at = ssdgs__padded_at(job, channel, y);
         ssdgs_real sums[3];
         job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride,
                          job->scratch + (size_t)index * 5 * job->stride, job->padded[2] + at,
                          job->padded[3] + at, job->padded[4] + at, sums);
-        for (i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
+        for (int i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
     }
 }
 
@@ -5479,8 +5400,7 @@ static void ssdgs__loss_backward_task(void *data, int index) {
     const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
     ssdgs_real *scratch = job->scratch + (size_t)index * 5 * job->stride, *row = scratch + 4 * job->stride;
-    int y;
-    for (y = begin; y < end; y++) {
+    for (int y = begin; y < end; y++) {
         const size_t at = ssdgs__padded_at(job, channel, y);
         job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch,
                                   job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, job->by_l1,
@@ -5497,9 +5417,6 @@ static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, c
     ssdgs__loss_job job;
     const double pixels = 3.0 * width * height;
     double sum[3] = {0, 0, 0};
-    size_t plane;
-    ssdgs_real *at;
-    int tasks, i, j;
     memset(&job, 0, sizeof job);
     job.k = context->k;
     job.image = image;
@@ -5509,20 +5426,21 @@ static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, c
     job.height = height;
     job.bands = (height + SSDGS__BAND - 1) / SSDGS__BAND;
     job.stride = ssdgs__padded_stride(width);
-    plane = 3 * (size_t)(height + 10) * job.stride;
-    tasks = 3 * job.bands;
+    const size_t plane = 3 * (size_t)(height + 10) * job.stride;
+    const int tasks = 3 * job.bands;
+    ssdgs_real *at;
     SSDGS__RESERVE(*memory, at, ssdgs_real, 6 * (size_t)tasks + 5 * plane + (size_t)tasks * 5 * job.stride);
     job.sums = (double *)memory->memory;
     at += 6 * (size_t)tasks;
-    for (i = 0; i < 5; i++, at += plane) job.padded[i] = at;
+    for (int i = 0; i < 5; i++, at += plane) job.padded[i] = at;
     job.scratch = at;
     job.by_l1 = (ssdgs_real)((1 - (double)dssim) / pixels);
     job.by_ssim = (ssdgs_real)(-(double)dssim / pixels);
     ssdgs__parallel(context, tasks, ssdgs__loss_pad_task, &job);
     ssdgs__parallel(context, tasks, ssdgs__loss_task, &job);
     if (gradient) ssdgs__parallel(context, tasks, ssdgs__loss_backward_task, &job);
-    for (i = 0; i < tasks; i++)
-        for (j = 0; j < 3; j++) sum[j] += job.sums[3 * i + j];
+    for (int i = 0; i < tasks; i++)
+        for (int j = 0; j < 3; j++) sum[j] += job.sums[3 * i + j];
     values->ssim = sum[0] / pixels;
     values->l1 = sum[1] / pixels;
     values->mse = sum[2] / pixels;
@@ -5543,8 +5461,7 @@ static const double ssdgs__flip_to_rgb[9] = {3.080341988280,  -1.537398969489, -
                                              0.052881292876,  -0.204011206124, 1.151129913248};
 
 static void ssdgs__flip_transform(const double matrix[9], const double v[3], double result[3]) {
-    int i;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
 }
 
@@ -5552,9 +5469,8 @@ static void ssdgs__flip_transform(const double matrix[9], const double v[3], dou
 static void ssdgs__flip_lab(const double rgb[3], double lab[3]) {
     const double delta = 6.0 / 29;
     double f[3];
-    int i;
     ssdgs__flip_transform(ssdgs__flip_to_xyz, rgb, f);
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         f[i] = f[i] > delta * delta * delta ? pow(f[i], 1.0 / 3) : f[i] / (3 * delta * delta) + 4.0 / 29;
     lab[0] = 116 * f[1] - 16;
     lab[1] = 0.01 * lab[0] * 500 * (f[0] - f[1]);
@@ -5575,13 +5491,12 @@ enum {
    Returns what the positive ones summed to before. */
 static double ssdgs__flip_kernel(int order, double sigma, int radius, ssdgs_real *taps) {
     double raw[SSDGS__FLIP_TAPS], positive = 0, negative = 0;
-    int i;
-    for (i = 0; i <= 2 * radius; i++) {
+    for (int i = 0; i <= 2 * radius; i++) {
         const double x = (i - radius) / sigma;
         raw[i] = exp(-0.5 * x * x) * (order == 0 ? 1 : order == 1 ? -x : x * x - 1);
         *(raw[i] > 0 ? &positive : &negative) += fabs(raw[i]);
     }
-    for (i = 0; i <= 2 * radius; i++)
+    for (int i = 0; i <= 2 * radius; i++)
         taps[i] = (ssdgs_real)(raw[i] / (raw[i] > 0 ? positive : raw[i] < 0 ? negative : 1));
     return positive;
 }
@@ -5593,26 +5508,25 @@ static void ssdgs__flip_filter(const ssdgs_real *input, int width, int height, c
                                ssdgs_real *output) {
     const size_t w = (size_t)width;
     ssdgs_real *row = scratch + w * (size_t)height;
-    int x, y, k;
-    for (y = 0; y < height; y++) {
+    for (int y = 0; y < height; y++) {
         const ssdgs_real *from = input + w * (size_t)y;
         ssdgs_real *to = scratch + w * (size_t)y;
-        for (x = -radius; x < width + radius; x++)
+        for (int x = -radius; x < width + radius; x++)
             row[x + radius] = from[x < 0 ? 0 : x < width ? x : width - 1];
-        for (x = 0; x < width; x++) to[x] = 0;
-        for (k = 0; k <= 2 * radius; k++) {
-            for (x = 0; x < width; x++) to[x] += across[k] * row[x + k];
+        for (int x = 0; x < width; x++) to[x] = 0;
+        for (int k = 0; k <= 2 * radius; k++) {
+            for (int x = 0; x < width; x++) to[x] += across[k] * row[x + k];
         }
     }
-    for (y = 0; y < height; y++) {
+    for (int y = 0; y < height; y++) {
         ssdgs_real *to = output + w * (size_t)y;
-        for (k = 0; k <= 2 * radius; k++) {
+        for (int k = 0; k <= 2 * radius; k++) {
             const int source = y + k - radius;
             const ssdgs_real *from = scratch + w * (size_t)(source < 0        ? 0
                                                             : source < height ? source
                                                                               : height - 1);
             const ssdgs_real tap = (ssdgs_real)weight * down[k];
-            for (x = 0; x < width; x++) to[x] += tap * from[x];
+            for (int x = 0; x < width; x++) to[x] += tap * from[x];
         }
     }
 }
@@ -5629,13 +5543,9 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
     static const int channel[4] = {0, 1, 2, 2};
     const size_t pixels = (size_t)width * (size_t)height;
     ssdgs_real *opponent = scratch + pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS;
-    ssdgs_real taps[4][SSDGS__FLIP_TAPS], smooth[SSDGS__FLIP_TAPS];
-    double gain[4], color[3], xyz[3];
-    size_t p;
-    int i, k;
-
-    for (p = 0; p < pixels; p++) { /* Yy, Cx, Cz without their scale and offset, which filters keep */
-        for (k = 0; k < 3; k++) {
+    double color[3], xyz[3];
+    for (size_t p = 0; p < pixels; p++) { /* Yy, Cx, Cz without their scale and offset, which filters keep */
+        for (int k = 0; k < 3; k++) {
             const ssdgs_real v = image[3 * p + (size_t)k];
             color[k] = (double)ssdgs_srgb_decode(v > 0 ? v < 1 ? v : 1 : 0);
         }
@@ -5645,9 +5555,11 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
         opponent[2 * pixels + p] = (ssdgs_real)(xyz[1] - xyz[2]);
     }
 
+    ssdgs_real smooth[SSDGS__FLIP_TAPS];
     ssdgs__flip_kernel(0, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS,
                        smooth); /* half of 0.082 degrees, peak to trough */
-    for (k = 1; k <= 2;
+    ssdgs_real taps[4][SSDGS__FLIP_TAPS];
+    for (int k = 1; k <= 2;
          k++) { /* edges, points: length of the two derivatives; L and a are free to hold them */
         ssdgs__flip_kernel(k, 0.041 * degree, SSDGS__FLIP_FEATURE_RADIUS, taps[0]);
         memset(planes, 0, 2 * pixels * sizeof *planes);
@@ -5655,31 +5567,32 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
                            planes);
         ssdgs__flip_filter(opponent, width, height, smooth, taps[0], SSDGS__FLIP_FEATURE_RADIUS, 1, scratch,
                            planes + pixels);
-        for (p = 0; p < pixels; p++) {
+        for (size_t p = 0; p < pixels; p++) {
             const double dx = (double)planes[p], dy = (double)planes[pixels + p];
             planes[(size_t)(2 + k) * pixels + p] = (ssdgs_real)sqrt(dx * dx + dy * dy);
         }
     }
 
-    for (i = 0; i < 4; i++) { /* a spread b is a Gaussian of sigma sqrt(b / 2) / pi degrees */
+    double gain[4];
+    for (int i = 0; i < 4; i++) { /* a spread b is a Gaussian of sigma sqrt(b / 2) / pi degrees */
         const double sum =
             ssdgs__flip_kernel(0, sqrt(spread[i] / (2 * pi2)) * degree, SSDGS__FLIP_COLOR_RADIUS, taps[i]);
         gain[i] = i < 2 ? 1 : amplitude[i] / sqrt(spread[i]) * sum * sum;
     }
     memset(planes, 0, 3 * pixels * sizeof *planes);
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         ssdgs__flip_filter(opponent + (size_t)channel[i] * pixels, width, height, taps[i], taps[i],
                            SSDGS__FLIP_COLOR_RADIUS, i < 2 ? 1 : gain[i] / (gain[2] + gain[3]), scratch,
                            planes + (size_t)channel[i] * pixels);
     }
-    for (p = 0; p < pixels; p++) {
+    for (size_t p = 0; p < pixels; p++) {
         xyz[1] = (double)planes[p];
         xyz[0] = xyz[1] + (double)planes[pixels + p];
         xyz[2] = xyz[1] - (double)planes[2 * pixels + p];
         ssdgs__flip_transform(ssdgs__flip_to_rgb, xyz, color);
-        for (k = 0; k < 3; k++) color[k] = color[k] > 0 ? color[k] < 1 ? color[k] : 1 : 0;
+        for (int k = 0; k < 3; k++) color[k] = color[k] > 0 ? color[k] < 1 ? color[k] : 1 : 0;
         ssdgs__flip_lab(color, xyz);
-        for (k = 0; k < 3; k++) planes[(size_t)k * pixels + p] = (ssdgs_real)xyz[k];
+        for (int k = 0; k < 3; k++) planes[(size_t)k * pixels + p] = (ssdgs_real)xyz[k];
     }
 }
 
@@ -5687,12 +5600,10 @@ static void ssdgs__flip_image(const ssdgs_real *image, int width, int height, ss
 static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image, const ssdgs_real *reference,
                                 int width, int height, double *flip) {
     static const double green[3] = {0, 1, 0}, blue[3] = {0, 0, 1}; /* the largest difference there is */
-    double lab[2][3], largest, knee, sum = 0;
-    ssdgs_real *planes; /* five of each image, four and a row of scratch */
-    size_t pixels, bytes, p;
-    int i;
-
+    double sum = 0;
     *flip = 0;
+    ssdgs_real *planes; /* five of each image, four and a row of scratch */
+    size_t pixels, bytes;
     if (!ssdgs__product_fits((size_t)width, (size_t)height, &pixels) ||
         pixels > SIZE_MAX / sizeof *planes / 32 ||
         !ssdgs__product_fits(14 * pixels + (size_t)width + 2 * SSDGS__FLIP_COLOR_RADIUS, sizeof *planes,
@@ -5703,21 +5614,21 @@ static ssdgs_result ssdgs__flip(ssdgs_context *context, const ssdgs_real *image,
     ssdgs__flip_image(image, width, height, planes, planes + 10 * pixels);
     ssdgs__flip_image(reference, width, height, planes + 5 * pixels, planes + 10 * pixels);
 
+    double lab[2][3];
     ssdgs__flip_lab(green, lab[0]);
     ssdgs__flip_lab(blue, lab[1]);
-    largest = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
-    knee = 0.4 * largest; /* errors below it take 95% of the scale */
-    for (p = 0; p < pixels; p++) {
-        double color, edge, point, feature;
-        for (i = 0; i < 3; i++) {
+    const double largest = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
+    const double knee = 0.4 * largest; /* errors below it take 95% of the scale */
+    for (size_t p = 0; p < pixels; p++) {
+        for (int i = 0; i < 3; i++) {
             lab[0][i] = (double)planes[(size_t)i * pixels + p];
             lab[1][i] = (double)planes[(size_t)(i + 5) * pixels + p];
         }
-        color = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
+        double color = pow(ssdgs__flip_hyab(lab[0], lab[1]), 0.7);
         color = color < knee ? 0.95 / knee * color : 0.95 + 0.05 * (color - knee) / (largest - knee);
-        edge = fabs((double)planes[3 * pixels + p] - (double)planes[8 * pixels + p]);
-        point = fabs((double)planes[4 * pixels + p] - (double)planes[9 * pixels + p]);
-        feature = sqrt((edge > point ? edge : point) / 1.41421356237309504880);
+        const double edge = fabs((double)planes[3 * pixels + p] - (double)planes[8 * pixels + p]);
+        const double point = fabs((double)planes[4 * pixels + p] - (double)planes[9 * pixels + p]);
+        const double feature = sqrt((edge > point ? edge : point) / 1.41421356237309504880);
         sum += pow(color, feature < 1 ? 1 - feature : 0);
     }
     ssdgs__release(context, planes);
@@ -5729,20 +5640,18 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
                                    const ssdgs_real *reference, int width, int height,
                                    ssdgs_metrics *metrics) {
     ssdgs__buffer planes = {0, 0}, memory = {0, 0};
-    ssdgs__loss_values values;
-    ssdgs_result result;
-    size_t pixels, i, c;
     if (!metrics) return ssdgs__null(context, "ssdgs_compare", "metrics");
     memset(metrics, 0, sizeof *metrics);
     if (!image || !reference) return ssdgs__null(context, "ssdgs_compare", image ? "reference" : "image");
     if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
-    pixels = (size_t)width * (size_t)height;
-    result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
+    const size_t pixels = (size_t)width * (size_t)height;
+    ssdgs_result result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
+    ssdgs__loss_values values;
     if (!result) {
         ssdgs_real *p = (ssdgs_real *)planes.memory;
-        for (i = 0; i < pixels; i++)
-            for (c = 0; c < 6; c++) {
+        for (size_t i = 0; i < pixels; i++)
+            for (size_t c = 0; c < 6; c++) {
                 const ssdgs_real x = (c < 3 ? image : reference)[3 * i + c % 3];
                 p[pixels * c + i] = x > 0 ? (x < 1 ? x : 1) : 0;
             }
@@ -5762,9 +5671,8 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
 SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
                                      const ssdgs_real *reference, int width, int height,
                                      ssdgs_metrics *metrics) {
-    ssdgs_result result;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(context, "ssdgs_compare");
+    const ssdgs_result result = ssdgs__enter(context, "ssdgs_compare");
     return result ? result
                   : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
 }
@@ -5877,7 +5785,6 @@ typedef struct ssdgs__ply_cursor { /* walks an element's properties: zero it, th
 static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
     const ssdgs__ply_field *const end =
         ssdgs__ply_fields + sizeof ssdgs__ply_fields / sizeof *ssdgs__ply_fields;
-    size_t length;
     if (cursor->field && cursor->index + 1 < cursor->field->count) {
         cursor->index++;
     } else {
@@ -5887,7 +5794,7 @@ static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
         if (cursor->field == end) return 0;
     }
     cursor->word = cursor->field->word + cursor->index;
-    length = strlen(cursor->field->stem);
+    const size_t length = strlen(cursor->field->stem);
     memcpy(cursor->name, cursor->field->stem, length + 1);
     if (cursor->field->count)
         cursor->name[length] = (char)('0' + cursor->index), cursor->name[length + 1] = 0;
@@ -5903,9 +5810,9 @@ static unsigned char *ssdgs__ply_setting(ssdgs_settings *settings, const ssdgs__
 /* Where anything else lies. */
 static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const ssdgs__ply_cursor *cursor) {
     const size_t width = cursor->field->count ? (size_t)cursor->field->count : 1;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     if (cursor->field->kind == SSDGS__PLY_VERTEX)
         return model->gaussians + (size_t)cursor->word * model->capacity + row;
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     return model->globals + first[cursor->field->word / 4] + row * width + (size_t)cursor->index;
 }
@@ -5920,16 +5827,14 @@ static size_t ssdgs__ply_rows(const ssdgs_settings *settings, int kind) {
 /* The float nearest to x, as bits, which can be tested whatever -ffast-math assumes. Only what is in range is
    cast. */
 static uint32_t ssdgs__ply_bits(double x) {
-    uint64_t wide, size;
-    uint32_t bits;
-    float single;
+    uint64_t wide;
     memcpy(&wide, &x, sizeof wide);
-    size = wide & UINT64_C(0x7fffffffffffffff);
-    bits = (uint32_t)((wide ^ size) >> 32);
+    const uint64_t size = wide & UINT64_C(0x7fffffffffffffff);
+    uint32_t bits = (uint32_t)((wide ^ size) >> 32);
     if (size > UINT64_C(0x7ff0000000000000)) return bits | 0x7fc00000u;
     if (size > UINT64_C(0x47efffffe0000000))
         return bits | (size < UINT64_C(0x47effffff0000000) ? 0x7f7fffffu : 0x7f800000u);
-    single = (float)x;
+    float single = (float)x;
     memcpy(&bits, &single, sizeof bits);
     return bits;
 }
@@ -6015,8 +5920,8 @@ static int ssdgs__ply_is(ssdgs__ply_token token, const char *text) {
 
 /* The next token before end; an empty one when there is none. */
 static ssdgs__ply_token ssdgs__ply_cut(const unsigned char **at, const unsigned char *end) {
-    ssdgs__ply_token token;
     while (*at < end && ssdgs__ply_space(**at)) ++*at;
+    ssdgs__ply_token token;
     token.text = *at;
     while (*at < end && !ssdgs__ply_space(**at)) ++*at;
     token.length = (size_t)(*at - token.text);
@@ -6025,9 +5930,8 @@ static ssdgs__ply_token ssdgs__ply_cut(const unsigned char **at, const unsigned 
 
 /* Decimal digits only; 0 on anything else and on overflow. */
 static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
-    size_t i;
     *count = 0;
-    for (i = 0; i < token.length; i++) {
+    for (size_t i = 0; i < token.length; i++) {
         const unsigned digit = token.text[i] - (unsigned)'0';
         if (digit > 9 || *count > (SIZE_MAX - digit) / 10) return 0;
         *count = *count * 10 + digit;
@@ -6040,19 +5944,19 @@ static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
 static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
     static const char *const words[3] = {"nan", "inf", "infinity"};
     const unsigned char *p = token.text, *const end = p + token.length;
-    int any = 0, point = 0, exponent = 0, i;
-    uint64_t bits;
+    int any = 0, point = 0, exponent = 0;
     int negative = 0;
     double value = 0;
 
     if (token.length == 0 || token.length > 1000) return 0;
     if (*p == '-' || *p == '+') negative = *p++ == '-';
-    for (i = 0; i < 3; i++) { /* by their bits: -ffast-math knows neither */
+    for (int i = 0; i < 3; i++) { /* by their bits: -ffast-math knows neither */
         const size_t length = strlen(words[i]);
         size_t k = 0;
         while (k < length && p + k < end && (p[k] | 32) == words[i][k]) k++;
         if (k < length || p + k != end) continue;
-        bits = (uint64_t)negative << 63 | (i ? UINT64_C(0x7ff0000000000000) : UINT64_C(0x7ff8000000000000));
+        uint64_t bits =
+            (uint64_t)negative << 63 | (i ? UINT64_C(0x7ff0000000000000) : UINT64_C(0x7ff8000000000000));
         memcpy(number, &bits, sizeof bits);
         return 1;
     }
@@ -6118,12 +6022,11 @@ static int ssdgs__ply_type(ssdgs__ply_token token) {
 
 static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_token *tokens) {
     ssdgs__ply_element *element = ply->elements + ply->element_count;
-    int i;
     if (ply->element_count == SSDGS__PLY_MAX_ELEMENTS) return ssdgs__ply_refuse(ply, "more than 64 elements");
     element->name = tokens[1];
     if (!ssdgs__ply_count(tokens[2], &element->count))
         return ssdgs__ply_refuse(ply, "the count is not a number");
-    for (i = 0; i < ply->element_count; i++)
+    for (int i = 0; i < ply->element_count; i++)
         if (ssdgs__ply_same(ply->elements[i].name, element->name))
             return ssdgs__ply_refuse(ply, "the second of its name");
     element->first = ply->property_count;
@@ -6138,8 +6041,6 @@ static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_tok
 static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_token *tokens, int list) {
     ssdgs__ply_element *element = ply->elements + ply->element_count - 1;
     ssdgs__ply_property *property = ply->properties + ply->property_count;
-    ssdgs__ply_cursor cursor;
-    int i;
     if (ply->element_count == 0) return ssdgs__ply_refuse(ply, "a property before any element");
     if (ply->property_count == SSDGS__PLY_MAX_PROPERTIES)
         return ssdgs__ply_refuse(ply, "more than 1024 properties");
@@ -6150,9 +6051,10 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
     if (property->type < 0 || (list && property->list < 0)) return ssdgs__ply_refuse(ply, "unknown type");
     if (property->list >= SSDGS__PLY_FLOAT32)
         return ssdgs__ply_refuse(ply, "a list's count must be an integer");
-    for (i = element->first; i < ply->property_count; i++)
+    for (int i = element->first; i < ply->property_count; i++)
         if (ssdgs__ply_same(ply->properties[i].name, property->name))
             return ssdgs__ply_refuse(ply, "the second of its name");
+    ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
         if (!ssdgs__ply_is(property->name, cursor.name)) continue;
         if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB) {
@@ -6209,10 +6111,8 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
    ends or holds something else. */
 static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t *bits, size_t *count) {
     const int size = ssdgs__ply_sizes[type], moved = origin < 0 || origin > 0;
-    uint64_t raw = 0, negative;
+    uint64_t raw = 0;
     double value;
-    float single;
-    int i;
     if (ply->format == SSDGS__PLY_ASCII) {
         const ssdgs__ply_token token = ssdgs__ply_cut(&ply->at, ply->end);
         if (count || !bits) return count ? ssdgs__ply_count(token, count) : token.length > 0;
@@ -6221,9 +6121,9 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
         return 1;
     }
     if (ply->end - ply->at < size) return 0;
-    for (i = 0; i < size; i++) raw = raw << 8 | ply->at[ply->format == SSDGS__PLY_BIG ? i : size - 1 - i];
+    for (int i = 0; i < size; i++) raw = raw << 8 | ply->at[ply->format == SSDGS__PLY_BIG ? i : size - 1 - i];
     ply->at += size;
-    negative = type < SSDGS__PLY_FLOAT32 && !(type & 1) ? raw >> (8 * size - 1) : 0;
+    const uint64_t negative = type < SSDGS__PLY_FLOAT32 && !(type & 1) ? raw >> (8 * size - 1) : 0;
     if (count) *count = (size_t)raw;
     if (count || !bits) return !count || !negative;
     value = (double)raw - (negative ? (double)((uint64_t)1 << 8 * size) : 0);
@@ -6231,6 +6131,7 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
     if (type == SSDGS__PLY_FLOAT32 && !moved) return *bits = (uint32_t)raw, 1;
     if (type == SSDGS__PLY_FLOAT32) {
         *bits = (uint32_t)raw;
+        float single;
         memcpy(&single, bits, sizeof single);
         value = (double)single;
     }
@@ -6241,8 +6142,8 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
 /* The known words of one row; NULL = step over it. */
 static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, uint32_t *words) {
     const ssdgs__ply_property *property = ply->properties + element->first;
-    int i, good = 1;
-    for (i = 0; i < element->properties && good; i++, property++) {
+    int good = 1;
+    for (int i = 0; i < element->properties && good; i++, property++) {
         size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
         if (property->list < 0) {
             const int wanted = words && property->word >= 0;
@@ -6262,21 +6163,20 @@ static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, ui
 /* Finds where every element lies, so that they may come in any order. */
 static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
     const int ascii = ply->format == SSDGS__PLY_ASCII;
-    int e, i;
-    for (e = 0; e < ply->element_count; e++) {
+    for (int e = 0; e < ply->element_count; e++) {
         ssdgs__ply_element *element = ply->elements + e;
         const ssdgs__ply_property *property = ply->properties + element->first;
         const size_t left = (size_t)(ply->end - ply->at) + (size_t)ascii; /* the last line may lack its end */
-        size_t least = 0, row;                                            /* bytes of a row */
-        int fits;
-        for (i = 0; i < element->properties; i++, property++)
+        size_t least = 0;                                                 /* bytes of a row */
+        for (int i = 0; i < element->properties; i++, property++)
             least += ascii ? 2 : ssdgs__ply_sizes[property->list < 0 ? property->type : property->list];
         element->data = ply->at;
         if (!least) continue;
-        fits = element->count <= left / least;
+        int fits = element->count <= left / least;
         if (fits && !ascii && !element->lists) ply->at += element->count * least;
         else
-            for (row = 0; fits && row < element->count; row++) fits = ssdgs__ply_row(ply, element, NULL);
+            for (size_t row = 0; fits && row < element->count; row++)
+                fits = ssdgs__ply_row(ply, element, NULL);
         if (!fits)
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
                                "%s: element %d of %d is cut short or has a broken list", ply->name, e + 1,
@@ -6302,9 +6202,6 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
 
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
-    ssdgs__ply_cursor cursor;
-    ssdgs_result result;
-    uint32_t words[SSDGS__PLY_WORDS];
     enum { ADDED = 7 };
     static const struct {
         size_t at;
@@ -6316,11 +6213,12 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
         {offsetof(ssdgs_settings, light_octaves), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
         {offsetof(ssdgs_settings, origin), 0, 0},        {offsetof(ssdgs_settings, origin), 1, 0},
         {offsetof(ssdgs_settings, origin), 2, 0}};
-    int i, next = 0;
+    int next = 0;
+    uint32_t words[SSDGS__PLY_WORDS];
     memset(words, 0, sizeof words);
-    for (i = 0; i <= ADDED; i++) {
+    for (int i = 0; i <= ADDED; i++) {
         const int word = i < ADDED ? (int)(added[i].at / sizeof(int)) + added[i].index : SSDGS__PLY_WORDS;
-        result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
+        const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
         if (i < ADDED) words[word] = ssdgs__ply_bits(added[i].before);
         next = word + 1;
@@ -6329,15 +6227,15 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers",
                            ply->name);
+    ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
         const double value = ssdgs__ply_value(words[cursor.word]);
         const ssdgs_real real = (ssdgs_real)value;
-        int integer;
         if (!ssdgs__ply_finite(words[cursor.word]) ||
             (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s makes no sense", ply->name,
                                cursor.name);
-        integer = cursor.field->integer ? (int)value : 0;
+        int integer = cursor.field->integer ? (int)value : 0;
         if (cursor.field->integer) memcpy(ssdgs__ply_setting(settings, &cursor), &integer, sizeof integer);
         else memcpy(ssdgs__ply_setting(settings, &cursor), &real, sizeof real);
     }
@@ -6347,16 +6245,15 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     settings->version = SSDGS_VERSION;
     ply->context->subject = ply->name;
     ply->context->subject_number = -1;
-    result = ssdgs__settings_check(ply->context, settings);
+    const ssdgs_result result = ssdgs__settings_check(ply->context, settings);
     ply->context->subject = NULL;
     return result ? SSDGS_ERR_FORMAT : SSDGS_OK;
 }
 
 /* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
 static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
-    double color;
     if (!ssdgs__ply_finite(bits)) return bits;
-    color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / unit;
+    double color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / unit;
     color = color < 1e-6 ? 1e-6 : color;
     return ssdgs__ply_bits(color > 20 ? color : log(expm1(color)));
 }
@@ -6365,25 +6262,24 @@ static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
    infinity, NaN. */
 static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
     const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, twenty = 0x41a00000u, one = 0x3f800000u;
-    int i, k;
-    for (i = 0; i < planes; i++) {
+    for (int i = 0; i < planes; i++) {
         const int clamped =
             i >= SSDGS_LOG_SCALE && i <= SSDGS_OPACITY; /* scales and opacity may be infinite */
         if ((words[i] & ~sign) >= infinity + (uint32_t)clamped) return stats->dropped++, 0;
     }
-    for (i = SSDGS_LOG_SCALE; i <= SSDGS_OPACITY; i++) {
+    for (int i = SSDGS_LOG_SCALE; i <= SSDGS_OPACITY; i++) {
         if ((words[i] & ~sign) <= twenty) continue;
         words[i] = (words[i] & sign) | twenty;
         ++*(i == SSDGS_OPACITY ? &stats->clamped_opacities : &stats->clamped_scales);
     }
-    for (i = SSDGS_ROTATION; i <= SSDGS_FRAME && i < planes; i += SSDGS_FRAME - SSDGS_ROTATION) {
+    for (int i = SSDGS_ROTATION; i <= SSDGS_FRAME && i < planes; i += SSDGS_FRAME - SSDGS_ROTATION) {
         double largest = 0;
-        for (k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++) {
             const double size = fabs(ssdgs__ply_value(words[i + k]));
             largest = size > largest ? size : largest;
         }
         if (largest >= 1e-37 && largest <= 1e37) continue; /* float can divide by it, as drawing does */
-        for (k = 0; k < 4; k++) words[i + k] = k ? 0 : one;
+        for (int k = 0; k < 4; k++) words[i + k] = k ? 0 : one;
         stats->zero_rotations++;
     }
     return 1;
@@ -6396,22 +6292,21 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     ssdgs__ply_element *element = ply->known[kind];
     const int dc = (int)(element->present >> SSDGS__PLY_DC & 1),
               plain = kind == SSDGS__PLY_VERTEX && stats->plain;
-    size_t row, kept = 0;
+    size_t kept = 0;
     ply->at = element->data;
     if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
-    for (row = 0; row < element->count; row++) {
+    for (size_t row = 0; row < element->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
-        ssdgs__ply_cursor cursor;
-        int i;
         if (!ssdgs__ply_row(ply, element, words))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row,
                                "a number");
-        for (i = 0; i < 3 && plain; i++)
+        for (int i = 0; i < 3 && plain; i++)
             words[SSDGS_DIFFUSE + i] =
                 ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit);
         if (kind == SSDGS__PLY_VERTEX &&
             !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats))
             continue;
+        ssdgs__ply_cursor cursor;
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
             if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
             if (!ssdgs__ply_finite(words[cursor.word]))
@@ -6430,26 +6325,26 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
 static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
-    size_t row;
-    int i, doubles = 0, far_away = 0;
-    for (i = 0; i < vertex->properties; i++) {
+    int doubles = 0, far_away = 0;
+    for (int i = 0; i < vertex->properties; i++) {
         const ssdgs__ply_property *p = ply->properties + vertex->first + i;
         doubles += p->type == SSDGS__PLY_FLOAT64 && p->list < 0 && p->word >= 0 && p->word < SSDGS_ROTATION;
     }
     ply->at = vertex->data;
+    size_t row;
     for (row = 0; doubles == 3 && row < vertex->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
         if (!ssdgs__ply_row(ply, vertex, words)) return; /* which reading it will tell */
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             const double x = ssdgs__ply_value(words[i]);
             if (!ssdgs__ply_finite(words[i])) continue;
             low[i] = x < low[i] ? x : low[i];
             high[i] = x > high[i] ? x : high[i];
         }
     }
-    for (i = 0; i < 3 && row && doubles == 3; i++)
+    for (int i = 0; i < 3 && row && doubles == 3; i++)
         far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
-    for (i = 0; i < 3 && far_away; i++)
+    for (int i = 0; i < 3 && far_away; i++)
         ply->origin[i] = (double)(settings->origin[i] =
                                       (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
 }
@@ -6462,14 +6357,11 @@ static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *eleme
 }
 
 static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_load_stats *stats) {
-    const ssdgs__ply_element *vertex;
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_result result = ssdgs__ply_header(ply);
-    int kind, ours, color;
-
     if (!result) result = ssdgs__ply_survey(ply);
     if (result) return result;
-    vertex = ply->known[SSDGS__PLY_VERTEX];
+    const ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     if (!vertex) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: no element vertex", ply->name);
     if (vertex->count > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name,
@@ -6481,19 +6373,19 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
                            "splat-transform say",
                            ply->name);
 
-    ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
+    const int ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
     stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
     stats->untrained = !stats->plain && !ours;
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
-        for (kind = 0; kind < 3; kind++) ply->origin[kind] = (double)settings.origin[kind];
+        for (int kind = 0; kind < 3; kind++) ply->origin[kind] = (double)settings.origin[kind];
     } else if (stats->plain) {
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
         settings.pixel_variance = (ssdgs_real)0.3; /* as other programs trained it */
-        color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1)
-                    ? SSDGS__PLY_DC
-                    : SSDGS__PLY_RGB;
+        const int color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1)
+                              ? SSDGS__PLY_DC
+                              : SSDGS__PLY_RGB;
         result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, color, color + 3);
     } else { /* the published implementation keeps the rest elsewhere */
         settings = ssdgs_settings_published();
@@ -6501,7 +6393,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     if (!result)
         result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
     if (!result && !ours) ssdgs__ply_find_origin(ply, &settings);
-    for (kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
+    for (int kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
         const size_t expected = ssdgs__ply_rows(&settings, kind),
                      rows = ply->known[kind] ? ply->known[kind]->count : 0;
         if (rows != expected && (ours || ply->known[kind]))
@@ -6512,7 +6404,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
     }
     if (!result) result = ssdgs__model_create(ply->context, &settings, (int)vertex->count, out);
-    for (kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
+    for (int kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     return result;
@@ -6566,11 +6458,10 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
 
 SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const void *bytes, size_t size,
                                                ssdgs_model **out, ssdgs_load_stats *stats) {
-    ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(context, "ssdgs_model_load_memory");
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_load_memory");
     if (result) return result;
     if (!bytes || !out) result = ssdgs__null(context, "ssdgs_model_load_memory", bytes ? "out" : "bytes");
     else result = ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
@@ -6595,19 +6486,17 @@ static int ssdgs__irregular(const char *path) {
 static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes,
                                      size_t *size) {
     const uint64_t limit = (uint64_t)8 << 30;
-    unsigned char *buffer = NULL, *larger;
+    unsigned char *buffer = NULL;
     size_t room = 0, used = 0;
     ssdgs_result result = SSDGS_OK;
-    FILE *file;
-    long hint;
-
     *bytes = NULL;
     *size = 0;
     if (ssdgs__irregular(path)) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
-    file = fopen(path, "rb");
+    FILE *file = fopen(path, "rb");
     if (!file) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be opened (errno %d)", path, errno);
-    hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
+    const long hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
     rewind(file);
+    unsigned char *larger;
     while (used == room && !result) { /* a byte more than the file has tells its end */
         const size_t more = room ? room : hint > 0 && (uint64_t)hint < limit ? (size_t)hint + 1 : 65536;
         if (room > limit || more > SIZE_MAX - room) {
@@ -6637,13 +6526,12 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
                                         ssdgs_load_stats *stats) {
     unsigned char *bytes = NULL;
-    size_t size;
-    ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(context, "ssdgs_model_load");
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_load");
     if (result) return result;
+    size_t size;
     if (!path || !out) result = ssdgs__null(context, "ssdgs_model_load", path ? "out" : "path");
     else result = ssdgs__read_file(context, path, &bytes, &size);
     if (!result) result = ssdgs__ply_load(context, path, bytes, size, out, stats);
@@ -6687,7 +6575,6 @@ typedef struct ssdgs__writer {
 
 static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *context, const char *path) {
     const size_t room = strlen(path) + SSDGS__WRITER_SUFFIX;
-    int attempt;
     memset(writer, 0, sizeof *writer);
     writer->context = context;
     writer->path = path;
@@ -6698,7 +6585,7 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
     writer->buffer = (unsigned char *)writer->temporary + room;
     errno = EEXIST;
-    for (attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST;
+    for (int attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST;
          attempt++) { /* a crash may have left that name */
         snprintf(writer->temporary, room, "%s.tmp.%lx.%lx.%d", path, SSDGS__PROCESS(),
                  (unsigned long)(size_t)context, attempt);
@@ -6737,10 +6624,9 @@ static ssdgs_result ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, 
 
 static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
     if (writer->file >= 0) {
-        int failed;
         ssdgs__writer_flush(writer);
-        failed = !writer->result && SSDGS__SYNC(writer->file) != 0 &&
-                 errno != EINVAL; /* some file systems cannot */
+        int failed = !writer->result && SSDGS__SYNC(writer->file) != 0 &&
+                     errno != EINVAL; /* some file systems cannot */
         failed |= SSDGS__CLOSE(writer->file) != 0;
         if (!writer->result && (failed || SSDGS__RENAME(writer->temporary, writer->path) != 0))
             writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be finished (errno %d)",
@@ -6768,8 +6654,7 @@ static void ssdgs__writer_text(ssdgs__writer *writer, const char *text) {
 
 static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
     unsigned char bytes[4];
-    int i;
-    for (i = 0; i < 4; i++) bytes[i] = (unsigned char)(word >> 8 * i);
+    for (int i = 0; i < 4; i++) bytes[i] = (unsigned char)(word >> 8 * i);
     ssdgs__writer_put(writer, bytes, 4);
 }
 
@@ -6788,17 +6673,16 @@ static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *word
     const ssdgs_settings *settings = &model->settings;
     const ssdgs_real *gaussian = model->gaussians + row;
     const size_t stride = model->capacity;
-    double q[4], scale, size = 0;
-    int i;
-    for (i = 0; i < 4; i++) {
+    double q[4], size = 0;
+    for (int i = 0; i < 4; i++) {
         q[i] = (double)gaussian[(size_t)(SSDGS_FRAME + i) * stride];
         size += q[i] * q[i];
     }
-    scale = size > 0 ? 2 / size : 0;
+    const double scale = size > 0 ? 2 / size : 0;
     words[SSDGS__PLY_NORMAL] = ssdgs__ply_bits(scale * (q[1] * q[3] + q[0] * q[2]));
     words[SSDGS__PLY_NORMAL + 1] = ssdgs__ply_bits(scale * (q[2] * q[3] - q[0] * q[1]));
     words[SSDGS__PLY_NORMAL + 2] = ssdgs__ply_bits(1 - scale * (q[1] * q[1] + q[2] * q[2]));
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         const double diffuse = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_DIFFUSE + i) * stride]);
         const double scattering = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_SCATTERING + i) * stride]);
         double color = settings->baked
@@ -6813,8 +6697,8 @@ static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *word
 static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
     ssdgs_settings settings = model->settings;
     uint32_t words[SSDGS__PLY_WORDS];
-    ssdgs__ply_cursor cursor;
     if (kind == SSDGS__PLY_VERTEX) ssdgs__ply_look(model, row, words);
+    ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
         uint32_t *word = &words[cursor.word];
         ssdgs_real real;
@@ -6839,27 +6723,25 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
 }
 
 static ssdgs_result ssdgs__savable(const ssdgs_model *model, const char *path) {
-    ssdgs_result result;
     model->context->subject = path;
     model->context->subject_number = -1;
-    result = ssdgs__globals_check(model);
+    const ssdgs_result result = ssdgs__globals_check(model);
     model->context->subject = NULL;
     return result;
 }
 
 static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path) {
-    size_t rows[SSDGS__PLY_KINDS], row;
-    char line[128];
-    ssdgs__writer writer;
-    ssdgs__ply_cursor cursor;
-    int kind;
     if (!path) return ssdgs__null(model->context, "ssdgs_model_save", "path");
     if (ssdgs__savable(model, path)) return SSDGS_ERR_NONFINITE;
+    ssdgs__writer writer;
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
-    for (kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
+    size_t rows[SSDGS__PLY_KINDS];
+    ssdgs__ply_cursor cursor;
+    for (int kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
         rows[kind] =
             kind == SSDGS__PLY_VERTEX ? (size_t)model->count : ssdgs__ply_rows(&model->settings, kind);
+        char line[128];
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
@@ -6873,16 +6755,15 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
         }
     }
     ssdgs__writer_text(&writer, "end_header\n");
-    for (kind = 0; kind < SSDGS__PLY_KINDS; kind++)
-        for (row = 0; row < rows[kind] && !writer.result; row++)
+    for (int kind = 0; kind < SSDGS__PLY_KINDS; kind++)
+        for (size_t row = 0; row < rows[kind] && !writer.result; row++)
             ssdgs__ply_write_row(model, kind, row, &writer);
     return ssdgs__writer_close(&writer);
 }
 
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_model_save");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_save");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_save(model, path));
 }
 #endif /* SSDGS_NO_STDIO */
@@ -6941,7 +6822,6 @@ struct ssdgs_trainer {
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     ssdgs_train_options o;
-    int i;
     memset(&o, 0, sizeof o);
     o.version = SSDGS_VERSION;
     o.iterations = 20000;
@@ -6951,7 +6831,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.dssim = (ssdgs_real)0.2;
     o.normal_weight = (ssdgs_real)0.05;
     o.initial_points = 10000;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         o.bounds_min[i] = (ssdgs_real)-0.5;
         o.bounds_max[i] = (ssdgs_real)0.5;
     }
@@ -7005,7 +6885,7 @@ static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) 
 static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int learns[SSDGS__GROUPS]) {
     double scattering = 9e3, specular = 16e3, freeze_scattering = 13e3, thaw_scattering = 20e3,
            thaw_asg = 20e3;
-    int terms = SSDGS_DIFFUSE_TERM, i;
+    int terms = SSDGS_DIFFUSE_TERM;
     const int joint = o->schedule == SSDGS_SCHEDULE_JOINT, merged = o->schedule == SSDGS_SCHEDULE_MERGED;
     if (o->schedule == SSDGS_SCHEDULE_SWAPPED) {
         scattering = 16e3;
@@ -7013,14 +6893,14 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
         freeze_scattering = thaw_scattering = 0;
         thaw_asg = 13e3;
     }
-    for (i = 0; i < SSDGS__GROUPS; i++) learns[i] = 1;
+    for (int i = 0; i < SSDGS__GROUPS; i++) learns[i] = 1;
     if (joint || merged) return joint || t >= 5e3 ? SSDGS_ALL_TERMS : terms;
     if (t >= 5e3) terms |= SSDGS_SHADOW_TERM;
     if (t >= scattering) terms |= SSDGS_SCATTERING_TERM;
     if (t >= specular) terms |= SSDGS_SPECULAR_TERM;
     learns[SSDGS__PLANE_GROUPS + SSDGS__SHADOW_NET] = learns[SSDGS__G_MATERIAL] = !(t >= 9e3 && t < 16e3);
     learns[SSDGS__PLANE_GROUPS + SSDGS__SCATTERING_NET] = !(t >= freeze_scattering && t < thaw_scattering);
-    for (i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++)
+    for (int i = SSDGS__ASG_BASIS; i <= SSDGS__ASG_SIGMA; i++)
         learns[SSDGS__PLANE_GROUPS + i] = t >= thaw_asg || asg == SSDGS_ASG_DEFERRED;
     return terms;
 }
@@ -7070,8 +6950,7 @@ static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, size_t pixel, int
 static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real background[3], size_t pixel,
                                ssdgs_real value[3]) {
     const ssdgs_real alpha = ssdgs__photo_value(photo, pixel, 3);
-    int c;
-    for (c = 0; c < 3; c++)
+    for (int c = 0; c < 3; c++)
         value[c] = alpha * ssdgs__photo_value(photo, pixel, c) + (1 - alpha) * background[c];
 }
 
@@ -7079,11 +6958,10 @@ static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real backgr
 static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin,
                                 size_t end, ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    ssdgs_real value[3];
-    size_t i, c;
-    for (i = begin; i < end; i++) {
+    for (size_t i = begin; i < end; i++) {
+        ssdgs_real value[3];
         ssdgs__photo_pixel(photo, background, i, value);
-        for (c = 0; c < 3; c++) planes[pixels * c + i] = value[c];
+        for (size_t c = 0; c < 3; c++) planes[pixels * c + i] = value[c];
     }
 }
 
@@ -7100,11 +6978,10 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
     const double a = t2 < 1e-3 ? 1 - t2 / 6 * (1 - t2 / 20 * (1 - t2 / 42)) : sin(t) / t;
     const double b = t2 < 1e-3 ? 0.5 * (1 - t2 / 12 * (1 - t2 / 30 * (1 - t2 / 56))) : (1 - cos(t)) / t2;
     const double c = t2 < 1e-3 ? (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72))) / 6 : (t - sin(t)) / (t2 * t);
-    int i, j, l;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
             double k2 = 0;
-            for (l = 0; l < 3; l++) k2 += k[3 * i + l] * k[3 * l + j];
+            for (int l = 0; l < 3; l++) k2 += k[3 * i + l] * k[3 * l + j];
             e[3 * i + j] = (i == j) + a * k[3 * i + j] + b * k2;
             jacobian[3 * i + j] = (i == j) + b * k[3 * i + j] + c * k2;
         }
@@ -7112,15 +6989,14 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
 
 static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdgs_camera *camera,
                            ssdgs_light *light) {
-    double e[9], jacobian[9];
-    int i, j, l;
     *camera = photo->camera;
     *light = photo->light;
+    double e[9], jacobian[9];
     ssdgs__rotate_by(value + 3, e, jacobian);
-    for (i = 0; i < 3; i++) {
-        for (j = 0; j < 4; j++) {
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++) {
             double sum = j == 3 ? value[i] : 0;
-            for (l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
+            for (int l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
             camera->view[4 * i + j] = (ssdgs_real)sum;
         }
         if (light->kind == SSDGS_LIGHT_POINT)
@@ -7131,27 +7007,29 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdg
 /* dL/d(view) of the corrected camera -> dL/d(t', w). */
 static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[9],
                                     const ssdgs_real dview[12], double d[6]) {
-    double e[9], jacobian[9], de[9], m[9], delta[3];
-    int i, j, l;
+    double e[9], jacobian[9];
     ssdgs__rotate_by(value + 3, e, jacobian);
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
+    double de[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
             de[3 * i + j] = 0;
-            for (l = 0; l < 4; l++)
+            for (int l = 0; l < 4; l++)
                 de[3 * i + j] += (double)dview[4 * i + l] * (double)photo->camera.view[4 * j + l];
         }
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
+    double m[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
             m[3 * i + j] = 0;
-            for (l = 0; l < 3; l++) m[3 * i + j] += de[3 * i + l] * e[3 * j + l];
+            for (int l = 0; l < 3; l++) m[3 * i + j] += de[3 * i + l] * e[3 * j + l];
         }
+    double delta[3];
     delta[0] = m[7] - m[5]; /* exp(w + dw) = exp(J dw) exp(w) */
     delta[1] = m[2] - m[6];
     delta[2] = m[3] - m[1];
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         d[i] = (double)dview[4 * i + 3];
         d[3 + i] = 0;
-        for (j = 0; j < 3; j++) d[3 + i] += jacobian[3 * j + i] * delta[j];
+        for (int j = 0; j < 3; j++) d[3 + i] += jacobian[3 * j + i] * delta[j];
     }
 }
 
@@ -7176,18 +7054,16 @@ static void ssdgs__exposure_task(void *data, int index) {
                  begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
     const ssdgs_real *t = frame->transmittance + begin;
-    ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
-    size_t i;
-    int c;
     ssdgs__photo_planes(job->photo, job->background, begin, begin + n, job->target);
-    for (c = 0; c < 3; c++) {
+    ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    for (int c = 0; c < 3; c++) {
         const size_t at = pixels * (size_t)c + begin;
-        for (i = 0; i < n; i++)
+        for (size_t i = 0; i < n; i++)
             straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
-        for (i = n; i < n + 16; i++) straight[i] = 0;
+        for (size_t i = n; i < n + 16; i++) straight[i] = 0;
         if (frame->settings.transfer == SSDGS_TRANSFER_SRGB)
             frame->context->k->srgb_encode(stored, slope, straight, n);
-        for (i = 0; i < n; i++) {
+        for (size_t i = 0; i < n; i++) {
             const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
             const ssdgs_real rendered = linear ? straight[i] : stored[i],
                              shown = ssdgs__photo_value(job->photo, begin + i, c);
@@ -7206,10 +7082,9 @@ static void ssdgs__exposure_backward_task(void *data, int index) {
     const size_t begin = (size_t)index * SSDGS__PIXELS;
     const size_t end = begin + SSDGS__PIXELS < pixels ? begin + SSDGS__PIXELS : pixels;
     ssdgs_real *gradient = job->frame->pixel_gradient, *transmittance_gradient = gradient + 3 * pixels;
-    size_t i, c;
-    for (i = begin; i < end; i++) transmittance_gradient[i] = 0;
-    for (c = 0; c < 3; c++)
-        for (i = begin; i < end; i++) {
+    for (size_t i = begin; i < end; i++) transmittance_gradient[i] = 0;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = begin; i < end; i++) {
             transmittance_gradient[i] += gradient[pixels * c + i] * job->lift[pixels * c + i];
             gradient[pixels * c + i] *= job->slope[pixels * c + i];
         }
@@ -7229,18 +7104,17 @@ static void ssdgs__normals_task(void *data, int index) {
     const ssdgs_real *depth = ssdgs__layer_plane(frame, 3, 0), *alpha = ssdgs__layer_plane(frame, 3, 2);
     ssdgs_real *rows = job->scratch + (size_t)index * (SSDGS__BAND + 6) * job->stride;
     ssdgs_real *out = rows + (SSDGS__BAND + 2) * job->stride;
-    int y, x, c;
     memset(rows, 0, (SSDGS__BAND + 2) * job->stride * sizeof *rows);
-    for (y = begin > 0 ? begin - 1 : 0; y <= end && y < h; y++)
-        for (x = 0; x < w; x++) {
+    for (int y = begin > 0 ? begin - 1 : 0; y <= end && y < h; y++)
+        for (int x = 0; x < w; x++) {
             const size_t at = (size_t)y * (size_t)w + (size_t)x;
             if (alpha[at] >= SSDGS__SOLID)
                 rows[(size_t)(y - begin + 1) * job->stride + 16 + (size_t)x] = depth[at] / alpha[at];
         }
-    for (y = begin; y < end; y++) {
+    for (int y = begin; y < end; y++) {
         frame->context->k->depth_normals(&frame->camera, rows + (size_t)(y - begin + 1) * job->stride + 16,
                                          job->stride, y, job->weight, out);
-        for (c = 0; c < 4; c++)
+        for (int c = 0; c < 4; c++)
             memcpy(frame->normal_gradient + ((size_t)c * (size_t)h + (size_t)y) * (size_t)w,
                    out + (size_t)c * job->stride, (size_t)w * sizeof *out);
     }
@@ -7252,9 +7126,9 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     ssdgs_context *context = frame->context;
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const int bands = (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND;
-    ssdgs__normals_job job;
     frame->normal_gradient = NULL;
     if (!frame->layer_count || weight <= 0) return SSDGS_OK;
+    ssdgs__normals_job job;
     job.frame = frame;
     job.weight = weight / (ssdgs_real)pixels;
     job.stride = ssdgs__padded_stride(frame->camera.width);
@@ -7275,12 +7149,11 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options = ssdgs_render_options_exact();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
-    ssdgs__exposure_job job;
-    ssdgs_result result;
     options.terms = terms;
-    result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
+    ssdgs_result result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
+    ssdgs__exposure_job job;
     SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 9);
     SSDGS__RESERVE(frame->memory->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
@@ -7323,19 +7196,17 @@ typedef struct ssdgs__adam_job {
 static void ssdgs__finite_task(void *data, int index) {
     const ssdgs__adam_job *job = (const ssdgs__adam_job *)data;
     ssdgs__adam_range *r = ((ssdgs__adam_job *)data)->range + index;
-    size_t i;
     if (job->k->finite(r->gradient, r->n)) return;
-    for (i = 0; i < r->n && !r->bad; i++)
+    for (size_t i = 0; i < r->n && !r->bad; i++)
         if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
 }
 
 static void ssdgs__adam_task(void *data, int index) {
     const ssdgs__adam_job *job = (const ssdgs__adam_job *)data;
     const ssdgs__adam_range *r = job->range;
-    size_t begin, n;
     while (r + 1 < job->range + job->ranges && r[1].first_chunk <= (size_t)index) r++;
-    begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
-    n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
+    const size_t begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
+    const size_t n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
     job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate,
                  r->correct_mean, r->correct_square, r->epsilon);
 }
@@ -7343,8 +7214,7 @@ static void ssdgs__adam_task(void *data, int index) {
 static ssdgs_real ssdgs__bias_correction(double beta,
                                          int steps) { /* 1 / (1 - beta^steps), the power by squaring */
     double power = 1, square = beta;
-    int n;
-    for (n = steps; n; n >>= 1, square *= square)
+    for (int n = steps; n; n >>= 1, square *= square)
         if (n & 1) power *= square;
     return (ssdgs_real)(1 / (1 - power));
 }
@@ -7392,14 +7262,13 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     ssdgs_model *model = trainer->model;
     const double pixels = (double)frame->camera.width * frame->camera.height;
     const double epsilon = (double)trainer->options.adam_epsilon / (255 * 3 * pixels);
-    ssdgs__adam_job job;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
-    int group, c, i;
     ssdgs__global_groups(&model->settings, first);
+    ssdgs__adam_job job;
     job.k = context->k;
     job.ranges = 0;
     job.chunks = 0;
-    for (group = 0; group < SSDGS__GROUPS; group++) {
+    for (int group = 0; group < SSDGS__GROUPS; group++) {
         const int shared = group - SSDGS__PLANE_GROUPS;
         if (!learns[group] || !ssdgs__group_used(group, terms, model->settings.asg)) continue;
         if (shared >= 0) {
@@ -7408,7 +7277,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
                 ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
                                 trainer->global_mean + at, trainer->global_square + at, n, epsilon);
         } else {
-            for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
+            for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
                 ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at,
                                 trainer->mean + at, trainer->square + at, (size_t)model->count, epsilon);
@@ -7416,14 +7285,14 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
         }
     }
     ssdgs__parallel(context, job.ranges, ssdgs__finite_task, &job);
-    for (i = 0; i < job.ranges; i++)
+    for (int i = 0; i < job.ranges; i++)
         if (job.range[i].bad)
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                                "iteration %d refused: the gradient of %s, element %z, is not finite",
                                trainer->iteration, ssdgs__group_names[job.range[i].group],
                                job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
-    for (group = 0; group < SSDGS__GROUPS; group++)
+    for (int group = 0; group < SSDGS__GROUPS; group++)
         trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms, model->settings.asg);
     return SSDGS_OK;
 }
@@ -7438,8 +7307,7 @@ static double ssdgs__view_angle(const ssdgs_camera *camera) {
 static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate,
                                    double unit, double angle) {
     const int steps = ++c->steps[part];
-    int i;
-    for (i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
+    for (int i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double g = gradient[i];
         c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
         c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
@@ -7451,40 +7319,41 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
 
 /* A point (w = 1) or direction (0) of the world in the camera's frame, and c = a x b. */
 static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], double w, double seen[3]) {
-    int i, j;
-    for (i = 0; i < 3; i++)
+    int j;
+    for (int i = 0; i < 3; i++)
         for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++)
             seen[i] += (double)camera->view[4 * i + j] * world[j];
 }
 
 static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
-    int i;
-    for (i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+    for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 /* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common,
    to first order: the scene would follow, and its photographs look the same. */
 static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
-    double centre[3], p[3], x[3], y[3], move[3] = {0, 0, 0}, turn[3] = {0, 0, 0};
-    int i, j, l, pass;
-    for (j = 0; j < 3; j++)
+    double centre[3], move[3] = {0, 0, 0}, turn[3] = {0, 0, 0};
+    for (int j = 0; j < 3; j++)
         centre[j] = 0.5 * ((double)trainer->options.bounds_min[j] + (double)trainer->options.bounds_max[j]);
-    for (pass = 0; pass < 2; pass++)
-        for (i = 0; i < trainer->photo_count; i++) {
+    double x[3];
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < trainer->photo_count; i++) {
             const ssdgs_camera *camera = &trainer->photos[i].camera;
             double *value = trainer->corrections[i].value;
+            double p[3];
             ssdgs__to_camera(camera, centre, 1, p);
             if (pass) {
                 ssdgs__to_camera(camera, move, 0, x);
-                for (j = 0; j < 3; j++) value[j] -= x[j];
+                for (int j = 0; j < 3; j++) value[j] -= x[j];
                 ssdgs__to_camera(camera, turn, 0, x);
-                for (j = 0; j < 3; j++) value[3 + j] -= x[j];
+                for (int j = 0; j < 3; j++) value[3 + j] -= x[j];
+                double y[3];
                 ssdgs__cross(x, p, y);
-                for (j = 0; j < 3; j++) value[j] += y[j];
+                for (int j = 0; j < 3; j++) value[j] += y[j];
             } else {
                 ssdgs__cross(value + 3, p, x);
-                for (j = 0; j < 3; j++)
-                    for (l = 0; l < 3; l++) {
+                for (int j = 0; j < 3; j++)
+                    for (int l = 0; l < 3; l++) {
                         move[j] += (double)camera->view[4 * l + j] * (value[l] + x[l]) / trainer->photo_count;
                         turn[j] += (double)camera->view[4 * l + j] * value[3 + l] / trainer->photo_count;
                     }
@@ -7513,24 +7382,26 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     ssdgs_real **const planes[3] = {&model->gaussians, &trainer->mean, &trainer->square};
-    ssdgs_real *grown[3], *statistics;
     const size_t n = (size_t)model->count, old[3] = {model->capacity, trainer->stride, trainer->stride};
-    size_t capacity, bytes, i, c;
     if (trainer->mean && count <= model->capacity) return SSDGS_OK;
-    capacity = count <= model->capacity
-                   ? model->capacity
-                   : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    const size_t capacity = count <= model->capacity
+                                ? model->capacity
+                                : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    size_t bytes;
     if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
-    statistics = (ssdgs_real *)ssdgs__allocate(context, SSDGS__STATISTICS * capacity * sizeof(ssdgs_real));
-    for (i = 0; i < 3; i++) grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
+    ssdgs_real *statistics =
+        (ssdgs_real *)ssdgs__allocate(context, SSDGS__STATISTICS * capacity * sizeof(ssdgs_real));
+    ssdgs_real *grown[3];
+    for (size_t i = 0; i < 3; i++)
+        grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
     if (!statistics || !grown[0] || !grown[1] || !grown[2]) {
-        for (i = 0; i < 3; i++) ssdgs__release(context, grown[i]);
+        for (size_t i = 0; i < 3; i++) ssdgs__release(context, grown[i]);
         ssdgs__release(context, statistics);
         return SSDGS_ERR_MEMORY;
     }
-    for (i = 0; i < 3; i++) {
-        for (c = 0; c < SSDGS_CHANNELS && *planes[i]; c++)
+    for (size_t i = 0; i < 3; i++) {
+        for (size_t c = 0; c < SSDGS_CHANNELS && *planes[i]; c++)
             memcpy(grown[i] + c * capacity, *planes[i] + c * old[i], n * sizeof(ssdgs_real));
         ssdgs__release(context, *planes[i]);
         *planes[i] = grown[i];
@@ -7547,15 +7418,14 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
 }
 
 static void ssdgs__copy_gaussian(ssdgs_real *planes, size_t stride, size_t to, size_t from) {
-    int c;
-    for (c = 0; c < SSDGS_CHANNELS; c++) planes[(size_t)c * stride + to] = planes[(size_t)c * stride + from];
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
+        planes[(size_t)c * stride + to] = planes[(size_t)c * stride + from];
 }
 
 /* Sum of twelve uniforms less six: normal enough to scatter split Gaussians, the same on every machine. */
 static double ssdgs__normal(uint64_t key, uint64_t counter) {
     double sum = -6;
-    int i;
-    for (i = 0; i < 12; i++) sum += ssdgs__uniform(key, counter * 12 + (uint64_t)i);
+    for (int i = 0; i < 12; i++) sum += ssdgs__uniform(key, counter * 12 + (uint64_t)i);
     return sum;
 }
 
@@ -7587,22 +7457,24 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
     const ssdgs_train_options *o = &trainer->options;
     const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
     const size_t stride = trainer->stride;
-    ssdgs_real *p = trainer->model->gaussians, q[4], raw[4], r[9];
-    int longest = 0, half, c, j;
+    ssdgs_real *p = trainer->model->gaussians;
+    int longest = 0;
     ssdgs__copy_gaussian(p, stride, to, from);
-    for (c = 1; c < 3; c++)
+    for (int c = 1; c < 3; c++)
         if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] >
             p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from])
             longest = c;
     if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <=
                       log(SSDGS__SPLIT_SIZE * trainer->extent))
         return; /* the copy is the clone */
-    for (c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
+    ssdgs_real raw[4];
+    for (int c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
+    ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw, q, r);
-    for (half = 0; half < 2; half++) {
+    for (int half = 0; half < 2; half++) {
         const size_t at = half ? to : from;
         double offset[3] = {0, 0, 0};
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * stride + at;
             if (halve && c != longest) continue;
             offset[c] = (double)ssdgs__exp_scalar(*scale) *
@@ -7610,8 +7482,8 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
                                : ssdgs__normal(key, (uint64_t)(3 * half + c)));
             *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
         }
-        for (c = 0; c < 3; c++)
-            for (j = 0; j < 3; j++)
+        for (int c = 0; c < 3; c++)
+            for (int j = 0; j < 3; j++)
                 p[(size_t)(SSDGS_POSITION + c) * stride + at] +=
                     (ssdgs_real)((double)r[3 * c + j] * offset[j]);
         if (halve) { /* together as opaque as the whole */
@@ -7621,7 +7493,7 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
             *opacity = (ssdgs_real)log(expm1(veil));
         }
     }
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
 }
 
@@ -7642,17 +7514,16 @@ static int ssdgs__several(int photographs, int all, double share) {
 static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent,
                                const ssdgs_real x[3]) {
     const int reach = (camera->width + 127) / 128;
-    ssdgs_real t[3], u, v;
-    int c, i;
-    for (c = 0; c < 3; c++) {
+    ssdgs_real t[3];
+    for (int c = 0; c < 3; c++) {
         const ssdgs_real *row = camera->view + 4 * c;
         t[c] = row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3];
     }
     if (!(t[2] > 0)) return 0;
-    u = camera->fx * t[0] / t[2] + camera->cx;
-    v = camera->fy * t[1] / t[2] + camera->cy;
+    const ssdgs_real u = camera->fx * t[0] / t[2] + camera->cx;
+    const ssdgs_real v = camera->fy * t[1] / t[2] + camera->cy;
     if (!(u >= 0 && v >= 0 && u < (ssdgs_real)camera->width && v < (ssdgs_real)camera->height)) return 0;
-    for (i = 0; i < 5 && transparent; i++) { /* the centre and beside it */
+    for (int i = 0; i < 5 && transparent; i++) { /* the centre and beside it */
         const int px = (int)u + (i == 1   ? reach
                                  : i == 2 ? -reach
                                           : 0),
@@ -7671,13 +7542,11 @@ static void ssdgs__outlines_task(void *data, int chunk) {
     const size_t n = (size_t)trainer->model->count, begin = (size_t)chunk * SSDGS__CHUNK;
     const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     const ssdgs_real *position = trainer->model->gaussians + (size_t)SSDGS_POSITION * trainer->stride;
-    size_t i;
-    int photo;
-    for (i = begin; i < end; i++) {
+    for (size_t i = begin; i < end; i++) {
         const ssdgs_real x[3] = {position[i], position[trainer->stride + i],
                                  position[2 * trainer->stride + i]};
         int seen = 0, outside = 0;
-        for (photo = 0; photo < trainer->photo_count; photo++) {
+        for (int photo = 0; photo < trainer->photo_count; photo++) {
             const int outlines = trainer->transparent[photo] == 2;
             const int side = ssdgs__outline_side(trainer->photos + photo, job->cameras + photo, outlines, x);
             seen += side > 0;
@@ -7690,17 +7559,16 @@ static void ssdgs__outlines_task(void *data, int chunk) {
 /* Marks the Gaussians outside of the object's outlines. */
 static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char *outside) {
     ssdgs_context *context = trainer->context;
-    ssdgs_camera *cameras;
-    ssdgs__outlines_job job;
-    int i;
     memset(outside, 0, (size_t)trainer->model->count);
     if (!(trainer->options.prune_outside > 0) || !trainer->outlines) return SSDGS_OK;
-    cameras = (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
+    ssdgs_camera *cameras =
+        (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
     if (!cameras) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < trainer->photo_count; i++) {
+    for (int i = 0; i < trainer->photo_count; i++) {
         ssdgs_light light;
         ssdgs__correct(trainer->photos + i, trainer->corrections[i].value, cameras + i, &light);
     }
+    ssdgs__outlines_job job;
     job.trainer = trainer;
     job.cameras = cameras;
     job.outside = outside;
@@ -7722,30 +7590,24 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const int before = trainer->iteration - 1,
               last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
     const int recovering = last > before - o->densify_every && ssdgs__resets(o, last);
-    ssdgs__ranked *candidates;
     uint64_t *order;
-    unsigned char *drop;
-    size_t i, kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n),
-              added, room;
+    size_t kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n);
     ssdgs_real *p;
-    ssdgs_result result;
-    int c;
     /* two lists of n candidates; at most 2 n Gaussians' order, a plane of them; what is dropped */
-    candidates = (ssdgs__ranked *)ssdgs__allocate(
+    ssdgs__ranked *candidates = (ssdgs__ranked *)ssdgs__allocate(
         context, n * (2 * sizeof *candidates + 2 * sizeof *order + 2 * sizeof *p + 1) + 1);
     if (!candidates) return SSDGS_ERR_MEMORY;
     order = (uint64_t *)(void *)(candidates + 2 * n);
-    drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
-    result = ssdgs__outlines(trainer, drop);
+    unsigned char *drop = (unsigned char *)((ssdgs_real *)(order + 2 * n) + 2 * n);
+    ssdgs_result result = ssdgs__outlines(trainer, drop);
     if (result) {
         ssdgs__release(context, candidates);
         return result;
     }
     p = model->gaussians;
-    for (i = 0; i < n; i++) {
-        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i], gradient, shadow;
-        int pull;
-        for (c = 1; c < 3; c++) {
+    for (size_t i = 0; i < n; i++) {
+        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
+        for (int c = 1; c < 3; c++) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
         }
@@ -7754,9 +7616,9 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
                   (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
-        gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
-        shadow = trainer->half_shadow[i] / trainer->screen_count[i];
-        pull = !(gradient < o->densify_gradient);
+        const ssdgs_real gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
+        const ssdgs_real shadow = trainer->half_shadow[i] / trainer->screen_count[i];
+        const int pull = !(gradient < o->densify_gradient);
         if (!pull && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
         candidates[wanted].value =
             pull ? gradient : -1 / shadow; /* below 0: to be halved, after the others */
@@ -7769,7 +7631,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
     wanted = wanted - pulled < halved ? wanted : pulled + halved;
-    room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
+    size_t room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
     if (wanted > room || n - dropped > (size_t)o->max_gaussians) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
            at a time */
@@ -7778,14 +7640,14 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
             n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
         const size_t more = wanted > room ? wanted - room : 0;
         size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
-        for (i = 0; i < n; i++)
+        for (size_t i = 0; i < n; i++)
             if (!drop[i]) { /* those of photographs that were not drawn: last */
                 const ssdgs_real seen = trainer->screen_count[i];
                 least[m].value = seen > 0 ? -trainer->contribution[i] / seen : (ssdgs_real)-1e30;
                 least[m++].index = (uint32_t)i;
             }
         qsort(least, m, sizeof *least, ssdgs__ranked_compare);
-        for (i = 0; i < spare && i + 1 < m; i++, dropped++) {
+        for (size_t i = 0; i < spare && i + 1 < m; i++, dropped++) {
             drop[least[i].index] = 1;
             room += i >= over;
         }
@@ -7797,11 +7659,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         return result;
     }
     p = model->gaussians;
+    size_t i, added;
     for (i = 0, added = 0; i < wanted; i++)
         if (!drop[candidates[i].index])
             ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
     for (i = n; i < n + added; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             trainer->mean[(size_t)c * trainer->stride + i] =
                 trainer->square[(size_t)c * trainer->stride + i] = 0;
     for (i = 0; i < n + added; i++)
@@ -7815,8 +7678,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
 static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
     const ssdgs_real most = (ssdgs_real)-4.5951198501345898; /* logit 0.01 */
     ssdgs_real *opacity = trainer->model->gaussians + (size_t)SSDGS_OPACITY * trainer->stride;
-    int i;
-    for (i = 0; i < trainer->model->count; i++) {
+    for (int i = 0; i < trainer->model->count; i++) {
         opacity[i] = opacity[i] < most ? opacity[i] : most;
         trainer->mean[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] =
             trainer->square[(size_t)SSDGS_OPACITY * trainer->stride + (size_t)i] = 0;
@@ -7826,8 +7688,7 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
 static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame, ssdgs_real magnify) {
     const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2,
                      half_h = magnify * (ssdgs_real)frame->camera.height / 2;
-    int i;
-    for (i = 0; i < frame->shaded_count; i++) {
+    for (int i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
         const ssdgs_real lit = frame->terms & SSDGS_SHADOW_TERM ? frame->visibility[g] : 1;
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
@@ -7847,8 +7708,7 @@ SSDGS__SMALL_BEGIN
 /* The bounds' longest side. */
 static double ssdgs__bounds_side(const ssdgs_train_options *o) {
     double longest = 0;
-    int j;
-    for (j = 0; j < 3; j++) {
+    for (int j = 0; j < 3; j++) {
         const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
         longest = side > longest ? side : longest;
     }
@@ -7860,7 +7720,6 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
                                           "frame",    "material", "shadow", "scattering", "camera", "light"};
     const ssdgs_rate *rates = &o->rates.position;
     const ssdgs_real most = (ssdgs_real)1e30;
-    int i;
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "train options: not made by ssdgs_train_options_default()");
@@ -7879,12 +7738,12 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(adam_epsilon, 0, most);
 #undef SSDGS__RANGE
-    for (i = 0; i < 12; i++)
+    for (int i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                "train options: %s = %g, %g: rates must be finite and not negative", names[i],
                                (double)rates[i].start, (double)rates[i].end);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         if (!(o->bounds_min[i] >= -most && o->bounds_max[i] <= most && o->bounds_min[i] < o->bounds_max[i]))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                "train options: bounds_min[%d] = %g, bounds_max[%d] = %g: they "
@@ -7903,8 +7762,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
 
 /* A random place in the bounds, and where it lies between them. */
 static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, double u[3], ssdgs_real x[3]) {
-    int c;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         u[c] = ssdgs__uniform(o->seed, 3 * draw + (uint64_t)c);
         x[c] = (ssdgs_real)((double)o->bounds_min[c] +
                             u[c] * ((double)o->bounds_max[c] - (double)o->bounds_min[c]));
@@ -7918,21 +7776,19 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     enum { PLACES = 2048, FEW = 30 };
     const int photos = trainer->photo_count;
     int *shown =
-            (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos),
-        *refused;
-    int outlined = 0, wrong = 0, first = 0, place, i;
-    unsigned char *side;
+        (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos);
+    int outlined = 0, wrong = 0, first = 0;
     if (!shown) return SSDGS_ERR_MEMORY;
-    refused = shown + photos;
-    side = (unsigned char *)(refused + photos);
+    int *refused = shown + photos;
+    unsigned char *side = (unsigned char *)(refused + photos);
     memset(shown, 0, 2 * (size_t)photos * sizeof *shown);
-    for (i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
-    for (place = 0; place < PLACES && outlined >= 8; place++) {
+    for (int i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
+    for (int place = 0; place < PLACES && outlined >= 8; place++) {
         double u[3];
         ssdgs_real x[3];
         int seen = 0, outside = 0;
         ssdgs__draw_place(&trainer->options, (uint64_t)place, u, x);
-        for (i = 0; i < photos; i++) {
+        for (int i = 0; i < photos; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
             side[i] = trainer->transparent[i] == 2
                           ? (unsigned char)ssdgs__outline_side(photo, &photo->camera, 1, x)
@@ -7941,12 +7797,12 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
             outside += side[i] == 2;
         }
         if (outside > 1 && 10 * outside > seen) continue;
-        for (i = 0; i < photos; i++) {
+        for (int i = 0; i < photos; i++) {
             shown[i] += side[i] > 0;
             refused[i] += side[i] == 2;
         }
     }
-    for (i = photos - 1; i >= 0; i--) {
+    for (int i = photos - 1; i >= 0; i--) {
         if (shown[i] < FEW || 3 * refused[i] <= shown[i]) continue;
         trainer->transparent[i] = 1;
         first = i;
@@ -7970,31 +7826,30 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)(o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians);
-    double volume = 1, u[3];
-    ssdgs_real x[3];
-    ssdgs_result result;
-    unsigned char *outside;
-    uint64_t *draws;
-    size_t stride, kept = 0, i;
-    int round, c;
+    double volume = 1;
+    size_t kept = 0;
     if (o->initial_points < 1)
         return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points",
                            o->initial_points);
-    result = ssdgs__trainer_grow(trainer, n);
+    ssdgs_result result = ssdgs__trainer_grow(trainer, n);
     if (result) return result;
-    draws = (uint64_t *)ssdgs__allocate(trainer->context, n * (sizeof *draws + sizeof(ssdgs_real) + 1));
+    uint64_t *draws =
+        (uint64_t *)ssdgs__allocate(trainer->context, n * (sizeof *draws + sizeof(ssdgs_real) + 1));
     if (!draws) return SSDGS_ERR_MEMORY;
-    outside = (unsigned char *)((ssdgs_real *)(draws + n) + n);
-    stride = model->capacity;
+    unsigned char *outside = (unsigned char *)((ssdgs_real *)(draws + n) + n);
+    const size_t stride = model->capacity;
+    double u[3];
+    ssdgs_real x[3];
+    int round;
     for (round = 0; round < ROUNDS && kept <= n / LEAST && !result; round++) {
-        for (i = kept; i < n; i++) {
+        for (size_t i = kept; i < n; i++) {
             draws[i] = (uint64_t)round * n + i;
             ssdgs__draw_place(o, draws[i], u, x);
-            for (c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_POSITION + c) * stride + i] = x[c];
+            for (int c = 0; c < 3; c++) model->gaussians[(size_t)(SSDGS_POSITION + c) * stride + i] = x[c];
         }
         model->count = (int)n;
         result = ssdgs__outlines(trainer, outside);
-        for (i = kept; i < n; i++)
+        for (size_t i = kept; i < n; i++)
             if (!outside[i]) draws[kept++] = draws[i];
     }
     if (!kept) { /* never none */
@@ -8006,14 +7861,15 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
         kept = n;
         round = 1;
     }
-    for (c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
+    for (int c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
     trainer->start_size = 1.1576 * 0.62035 * pow(volume / ((double)n * round), 1.0 / 3);
-    for (i = 0; i < kept; i++) {
+    for (size_t i = 0; i < kept; i++) {
         ssdgs_real *g = model->gaussians + i;
-        double away[3], length = 0;
+        double length = 0;
         ssdgs__gaussian_reset(model->gaussians, stride, i);
         ssdgs__draw_place(o, draws[i], u, x);
-        for (c = 0; c < 3; c++) {
+        double away[3];
+        for (int c = 0; c < 3; c++) {
             g[(size_t)(SSDGS_POSITION + c) * stride] = x[c];
             g[(size_t)(SSDGS_LOG_SCALE + c) * stride] = (ssdgs_real)log(trainer->start_size);
             away[c] = (u[c] - 0.5) * ((double)o->bounds_max[c] - (double)o->bounds_min[c]);
@@ -8025,10 +7881,10 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             g[(SSDGS_FRAME + 1) * stride] = (ssdgs_real)-away[1];
             g[(SSDGS_FRAME + 2) * stride] = (ssdgs_real)away[0];
             length = sqrt(2 * length * (length + away[2]));
-            for (c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
+            for (int c = 0; c < 3; c++) g[(size_t)(SSDGS_FRAME + c) * stride] /= (ssdgs_real)length;
         }
     }
-    for (i = 0; i < kept; i++) draws[i] = i;
+    for (size_t i = 0; i < kept; i++) draws[i] = i;
     if (!result) ssdgs__reorder(trainer, draws, kept, (ssdgs_real *)(draws + n));
     else model->count = 0;
     ssdgs__release(trainer->context, draws);
@@ -8053,9 +7909,8 @@ static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
 }
 
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
-    ssdgs_context *context;
     if (!trainer || ssdgs__enter(trainer->context, "ssdgs_trainer_destroy")) return;
-    context = trainer->context;
+    ssdgs_context *context = trainer->context;
     context->references++;
     if (!trainer->running) ssdgs__trainer_drop(trainer);
     else
@@ -8065,10 +7920,9 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
 }
 
 static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
-    int j, l;
-    for (j = 0; j < 3; j++) {
+    for (int j = 0; j < 3; j++) {
         centre[j] = 0;
-        for (l = 0; l < 3; l++)
+        for (int l = 0; l < 3; l++)
             centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
     }
 }
@@ -8077,16 +7931,14 @@ static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
    background. */
 static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo *photo, int index,
                                        const ssdgs_real background[3]) {
-    ssdgs_result result;
-    int i;
     context->subject = "photograph";
     context->subject_number = index;
-    result = ssdgs__camera_check(context, &photo->camera);
+    ssdgs_result result = ssdgs__camera_check(context, &photo->camera);
     if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && photo->format != SSDGS_PIXELS_RGBA8 && photo->format != SSDGS_PIXELS_RGBA16)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
-    for (i = 0; i < 3 && !result; i++)
+    for (int i = 0; i < 3 && !result; i++)
         if (!ssdgs__finite(background[i]))
             result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
     context->subject = NULL;
@@ -8107,12 +7959,13 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
     const ssdgs_camera *camera = &photo->camera;
     ssdgs__silhouette s = {0, -1, 0, -1, 0, 0, 0};
     double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
-    int corner, c, x, y;
-    for (corner = 0; corner < 8; corner++) {
-        double world[3], seen[3];
-        for (c = 0; c < 3; c++) world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
+    for (int corner = 0; corner < 8; corner++) {
+        double world[3];
+        for (int c = 0; c < 3; c++)
+            world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
+        double seen[3];
         ssdgs__to_camera(camera, world, 1, seen);
-        for (c = 0; c < 2; c++) {
+        for (int c = 0; c < 2; c++) {
             const double f = (double)(c ? camera->fy : camera->fx),
                          at = (double)(c ? camera->cy : camera->cx);
             const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
@@ -8121,8 +7974,8 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
             high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
         }
     }
-    for (y = 0; y < camera->height; y++)
-        for (x = 0; x < camera->width; x++) {
+    for (int y = 0; y < camera->height; y++)
+        for (int x = 0; x < camera->width; x++) {
             if (ssdgs__photo_alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 32768) continue;
             if (s.right < s.left) s.left = s.right = x, s.top = y;
             s.left = x < s.left ? x : s.left;
@@ -8140,65 +7993,69 @@ static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ss
    middles of the silhouettes meet about where the object is; `within` cameras stand within the bounds. */
 static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
     ssdgs_context *context = trainer->context;
-    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0}, m[9], cross[3],
-           determinant;
-    double shown = 0, outside = 0, half = 0, miss = 0, step;
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0};
+    double shown = 0, outside = 0, half = 0, miss = 0;
     ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(
         trainer->context, (size_t)trainer->photo_count * sizeof *silhouettes);
-    int rays = 0, behind = 0, doubtful, i, j, l;
+    int rays = 0, behind = 0;
     if (!silhouettes) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < trainer->photo_count;
+    int l;
+    for (int i = 0; i < trainer->photo_count;
          i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
         const ssdgs_camera *camera = &trainer->photos[i].camera;
         ssdgs__silhouette *s = silhouettes + i;
-        double eye[3], ray[3], d[3], length;
         if (trainer->transparent[i] != 2) continue;
         *s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
         shown += s->shown;
         outside += s->outside;
         if (!s->whole) continue;
         rays++;
+        double ray[3];
         ray[0] = (0.5 * (s->left + s->right + 1) - (double)camera->cx) / (double)camera->fx;
         ray[1] = (0.5 * (s->top + s->bottom + 1) - (double)camera->cy) / (double)camera->fy;
         ray[2] = 1;
-        length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+        const double length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+        double eye[3];
         ssdgs__camera_centre(camera, eye);
-        for (j = 0; j < 3; j++)
+        double d[3];
+        for (int j = 0; j < 3; j++)
             for (d[j] = 0, l = 0; l < 3; l++) d[j] += (double)camera->view[4 * l + j] * ray[l] / length;
-        for (j = 0; j < 3; j++)
+        for (int j = 0; j < 3; j++)
             for (l = 0; l < 3; l++) {
                 a[3 * j + l] += (j == l) - d[j] * d[l];
                 b[j] += ((j == l) - d[j] * d[l]) * eye[l];
                 miss += ((j == l) - d[j] * d[l]) * eye[j] * eye[l];
             }
     }
+    double cross[3];
     ssdgs__cross(a + 3, a + 6, cross);
-    determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
-    for (j = 0; j < 3 && determinant > 1e-6; j++) { /* Cramer's rule on a symmetric matrix */
+    const double determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
+    for (int j = 0; j < 3 && determinant > 1e-6; j++) { /* Cramer's rule on a symmetric matrix */
+        double m[9];
         memcpy(m, a, sizeof m);
         memcpy(m + 3 * j, b, sizeof b);
         ssdgs__cross(m + 3, m + 6, cross);
         x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
     }
     if (determinant > 1e-6) { /* else they are parallel */
-        for (i = 0; i < trainer->photo_count; i++) {
+        for (int i = 0; i < trainer->photo_count; i++) {
             const ssdgs_camera *camera = &trainer->photos[i].camera;
             const ssdgs__silhouette *s = silhouettes + i;
-            double seen[3], wide, high;
+            double seen[3];
             ssdgs__to_camera(camera, x, 1, seen);
             if (!s->whole) continue;
-            wide = 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx;
-            high = 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy;
+            double wide = 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx;
+            const double high = 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy;
             wide = wide > high ? wide : high;
             half = wide > half ? wide : half;
             behind += wide < 0;
         }
-        for (j = 0; j < 3; j++)
+        for (int j = 0; j < 3; j++)
             for (miss -= 2 * b[j] * x[j], l = 0; l < 3; l++) miss += x[j] * a[3 * j + l] * x[l];
         miss = sqrt(miss > 0 ? miss / rays : 0);
     }
     ssdgs__release(trainer->context, silhouettes);
-    doubtful = determinant > 1e-6 && miss > 0.5 * half;
+    const int doubtful = determinant > 1e-6 && miss > 0.5 * half;
     if (doubtful && behind > rays / 2)
         ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes right?");
     else if (doubtful)
@@ -8217,8 +8074,8 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
                     "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
                     (int)(100 * outside / shown));
     if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return SSDGS_OK;
-    step = pow(10, floor(log10(half)) - 1);
-    for (j = 0; j < 3; j++) x[j] += (double)trainer->model->settings.origin[j];
+    const double step = pow(10, floor(log10(half)) - 1);
+    for (int j = 0; j < 3; j++) x[j] += (double)trainer->model->settings.origin[j];
     ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g",
                 step * floor((x[0] - half) / step), step * floor((x[1] - half) / step),
                 step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
@@ -8245,10 +8102,9 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
     const int w = camera->width, h = camera->height, step = 1 + (w > h ? w : h) / 128; /* some pixels tell */
     double area = 0, light = 0, middle[2] = {0, 0}, square[2] = {0, 0}, bright[2] = {0, 0}, intensity = 0;
     ssdgs_real corner[3];
-    int x, y, c, l;
     ssdgs__photo_pixel(photo, black, 0, corner);
-    for (y = step / 2; y < h; y += step)
-        for (x = step / 2; x < w; x += step) {
+    for (int y = step / 2; y < h; y += step)
+        for (int x = step / 2; x < w; x += step) {
             const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
             const double alpha = ssdgs__photo_alpha(photo, pixel) / 65535.0;
             const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx,
@@ -8256,7 +8112,7 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
             double value = 0, apart = 0;
             ssdgs_real stored[3];
             ssdgs__photo_pixel(photo, black, pixel, stored);
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 value += (double)stored[c] * (double)stored[c]; /* about linear */
                 apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c]))
                                                                       : apart;
@@ -8264,25 +8120,25 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
             if (apart < 0.02) value = 0;
             area += alpha;
             light += value;
-            for (c = 0; c < 2; c++) {
+            for (int c = 0; c < 2; c++) {
                 middle[c] += alpha * at[c];
                 square[c] += alpha * at[c] * at[c];
                 bright[c] += value * at[c];
             }
         }
-    for (c = 0; c < 3; c++) intensity += (double)photo->light.intensity[c] / 3;
+    for (int c = 0; c < 3; c++) intensity += (double)photo->light.intensity[c] / 3;
     if (!(area > 0) || !(light > 0) || !(intensity > 0)) return 0;
-    for (c = 0; c < 2; c++) {
+    for (int c = 0; c < 2; c++) {
         const double variance = square[c] / area - middle[c] / area * (middle[c] / area);
         s->shift[c] = (bright[c] / light - middle[c] / area) / sqrt(variance > 1e-12 ? variance : 1e-12);
     }
     s->brightness = light / area / intensity;
     s->directional = photo->light.kind == SSDGS_LIGHT_DIRECTIONAL;
     ssdgs__camera_centre(camera, s->eye);
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         s->eye[c] -= centre[c];
         s->position[c] = (double)photo->light.position[c];
-        for (l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
+        for (int l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
     }
     return 1;
 }
@@ -8298,15 +8154,14 @@ typedef struct ssdgs__reading {
 static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r, const double centre[3],
                                 double direction[3]) {
     double p[3], distance2 = 0;
-    int c, l;
-    for (c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
+    for (int c = 0; c < 3; c++) {
         direction[c] = r->in_camera ? 0 : p[c];
-        for (l = 0; l < 3 && r->in_camera; l++) direction[c] += s->rotation[3 * l + c] * p[l];
+        for (int l = 0; l < 3 && r->in_camera; l++) direction[c] += s->rotation[3 * l + c] * p[l];
         if (!s->directional) direction[c] += r->from_camera ? s->eye[c] : -centre[c];
         distance2 += direction[c] * direction[c];
     }
-    for (c = 0; c < 3; c++) direction[c] /= sqrt(distance2) + 1e-12;
+    for (int c = 0; c < 3; c++) direction[c] /= sqrt(distance2) + 1e-12;
     return s->directional ? 1 : distance2;
 }
 
@@ -8314,11 +8169,10 @@ static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r
    deviation. */
 static double ssdgs__correlation(const double *a, const double *b, int n, int width, double *spread) {
     double ab = 0, aa = 0, bb = 0;
-    int i, c;
-    for (c = 0; c < width; c++) {
+    for (int c = 0; c < width; c++) {
         double a_mean = 0, b_mean = 0;
-        for (i = 0; i < n; i++) a_mean += a[i * width + c] / n, b_mean += b[i * width + c] / n;
-        for (i = 0; i < n; i++) {
+        for (int i = 0; i < n; i++) a_mean += a[i * width + c] / n, b_mean += b[i * width + c] / n;
+        for (int i = 0; i < n; i++) {
             const double x = a[i * width + c] - a_mean, y = b[i * width + c] - b_mean;
             ab += x * y, aa += x * x, bb += y * y;
         }
@@ -8334,15 +8188,14 @@ static double ssdgs__correlation(const double *a, const double *b, int n, int wi
 static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading,
                                const double centre[3], double *scratch, double *facing) {
     double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
-    double sideways = -2, frontal, spread, brightness = 0, front_mean = 0;
-    int flat, i, c, l;
-    for (flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
-        double lights = 0, shown = 0, r;
+    double sideways = -2, brightness = 0, front_mean = 0;
+    for (int flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
+        double lights = 0, shown = 0;
         int above = 0;
-        for (i = 0; i < n; i++) {
+        for (int i = 0; i < n; i++) {
             double d[3], eye2 = 0, towards_eye = 0;
             const double distance2 = ssdgs__read_light(s + i, reading, centre, d);
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 towards_eye += d[c] * s[i].eye[c];
                 eye2 += s[i].eye[c] * s[i].eye[c];
             }
@@ -8353,21 +8206,23 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
                 above += s[i].eye[flat] > 0;
                 d[flat] = 0;
             }
-            for (c = 0; c < 2; c++) {
+            for (int c = 0; c < 2; c++) {
                 shift[2 * i + c] = s[i].shift[c];
+                int l;
                 for (l = 0, toward[2 * i + c] = 0; l < 3; l++)
                     toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
             }
         }
         if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0))
             continue; /* neither a floor nor a ceiling */
-        r = ssdgs__correlation(toward, shift, n, 2, &shown);
+        const double r = ssdgs__correlation(toward, shift, n, 2, &shown);
         sideways = shown > 0.1 && r > sideways ? r : sideways;
     }
-    for (i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
-    for (i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
+    for (int i = 0; i < n; i++)
         bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
-    frontal = ssdgs__correlation(front, bright, n, 1, &spread);
+    double spread;
+    const double frontal = ssdgs__correlation(front, bright, n, 1, &spread);
     *facing = front_mean + 2 * spread / sqrt((double)n);
     if (!(spread > 0.2))
         return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
@@ -8384,23 +8239,24 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     ssdgs_context *context = trainer->context;
     const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
     ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
-    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, facing_so, agrees_so,
-           best = 0;
-    ssdgs__reading reading, found = as_given;
-    int n = 0, contradicts, behind, i, order, signs, way;
+    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, best = 0;
+    ssdgs__reading found = as_given;
+    int n = 0;
     if (!s) return SSDGS_ERR_MEMORY;
-    for (i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
+    for (int i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
     if (n >= FEW) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
-    for (way = 0; way < 4 && n >= ENOUGH; way++)
-        for (order = 0; order < 6; order++)
-            for (signs = 0; signs < 8; signs++) {
-                for (i = 0; i < 3; i++) {
+    ssdgs__reading reading;
+    for (int way = 0; way < 4 && n >= ENOUGH; way++)
+        for (int order = 0; order < 6; order++)
+            for (int signs = 0; signs < 8; signs++) {
+                for (int i = 0; i < 3; i++) {
                     reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
                     reading.sign[i] = signs >> i & 1 ? -1 : 1;
                 }
                 reading.in_camera = way & 1;
                 reading.from_camera = way >> 1;
-                agrees_so = ssdgs__agreement(s, n, &reading, centre, scratch, &facing_so);
+                double facing_so;
+                const double agrees_so = ssdgs__agreement(s, n, &reading, centre, scratch, &facing_so);
                 /* a place beside the camera mixes in the camera's direction, of which much is right in any
                    reading */
                 if (facing_so < -0.1 ||
@@ -8409,8 +8265,8 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
                 best = agrees_so;
                 found = reading;
             }
-    behind = n >= ENOUGH && agrees < 0.88 && facing < -0.1;
-    contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
+    const int behind = n >= ENOUGH && agrees < 0.88 && facing < -0.1;
+    const int contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
     if (contradicts)
         ssdgs__note(context,
                     "the photographs' shading contradicts their lights: its correlation with their "
@@ -8439,17 +8295,19 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
     const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
     double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
-    int pass, i, j, within = 0, points = 0;
-    for (j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
-    for (pass = 0; pass < 2; pass++)
-        for (i = 0; i < n; i++) {
+    int within = 0, points = 0;
+    for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < n; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
             const int point = photo->light.kind == SSDGS_LIGHT_POINT;
-            double p[3], seen[3], eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
+            double eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
             ssdgs__camera_centre(&photo->camera, eye);
-            for (j = 0; j < 3; j++) p[j] = (double)photo->light.position[j];
+            double p[3];
+            for (int j = 0; j < 3; j++) p[j] = (double)photo->light.position[j];
+            double seen[3];
             ssdgs__to_camera(&photo->camera, p, point, seen);
-            for (j = 0; j < 3; j++) {
+            for (int j = 0; j < 3; j++) {
                 from_mean += (p[j] - mean[j]) * (p[j] - mean[j]);
                 from_held += (seen[j] - held[j]) * (seen[j] - held[j]);
                 to_eye += (eye[j] - centre[j]) * (eye[j] - centre[j]);
@@ -8462,7 +8320,8 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
                 lit_from += (points ? sqrt(to_light) : 1) / n;
                 continue;
             }
-            for (j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
+            for (int j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
+            int j;
             for (j = 0; j < 3 && p[j] > (double)o->bounds_min[j] && p[j] < (double)o->bounds_max[j]; j++) {}
             within += point && j == 3;
             points += point;
@@ -8494,23 +8353,22 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
    the opaque ones beside it lead to, but that times alpha, as stored or as linear light. */
 static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
     double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
-    int i, x, y, c, side;
-    for (i = 0; i < trainer->photo_count; i++) {
+    for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const int w = photo->camera.width, h = photo->camera.height;
-        for (y = 0; y < h && trainer->transparent[i]; y++)
-            for (x = 3; x < w - 3; x++) {
+        for (int y = 0; y < h && trainer->transparent[i]; y++)
+            for (int x = 3; x < w - 3; x++) {
                 const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
                 const int alpha = ssdgs__photo_alpha(photo, pixel);
                 const double a = alpha / 65535.0;
                 if (alpha < 6554 || alpha > 45875) continue; /* 0.1 .. 0.7 */
-                for (side = 0; side < 4; side++) {           /* right and left, next to it and one further */
+                for (int side = 0; side < 4; side++) {       /* right and left, next to it and one further */
                     const int step = 1 + side / 2;
                     const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step,
                                  further = side & 1 ? next - 1 : next + 1;
                     if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880)
                         continue; /* 0.99 */
-                    for (c = 0; c < 3; c++) {
+                    for (int c = 0; c < 3; c++) {
                         const double v = (double)ssdgs__photo_value(photo, pixel, c),
                                      beside = (double)ssdgs__photo_value(photo, next, c);
                         double n = beside + step * (beside - (double)ssdgs__photo_value(photo, further, c));
@@ -8537,16 +8395,15 @@ static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
 static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     const ssdgs_real *background = trainer->options.background;
     double mean[3] = {0, 0, 0}, square[3] = {0, 0, 0}, count = 0, same = 0, spread = 0;
-    int i, x, y, c;
-    for (i = 0; i < trainer->photo_count; i++) {
+    for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const int w = photo->camera.width, h = photo->camera.height;
         if (trainer->transparent[i] == 2) continue;
-        for (y = 0; y < h; y++)
-            for (x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
+        for (int y = 0; y < h; y++)
+            for (int x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
                 ssdgs_real value[3], apart = 0;
                 ssdgs__photo_pixel(photo, background, (size_t)y * (size_t)w + (size_t)x, value);
-                for (c = 0; c < 3; c++) {
+                for (int c = 0; c < 3; c++) {
                     const ssdgs_real d =
                         value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
                     apart = d > apart ? d : apart;
@@ -8557,7 +8414,7 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
                 count++;
             }
     }
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         const double variance = square[c] / count - mean[c] / count * (mean[c] / count);
         spread = variance > spread ? variance : spread;
     }
@@ -8587,7 +8444,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0, i, j;
+    int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0;
     if (result) return result;
     if (model->settings.baked)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
@@ -8596,7 +8453,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL",
                            photo_count);
-    for (i = 0; i < photo_count; i++) {
+    for (int i = 0; i < photo_count; i++) {
         result = ssdgs__photo_check(context, photos + i, i, o->background);
         if (result) return result;
     }
@@ -8613,11 +8470,10 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         return SSDGS_ERR_MEMORY;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
-    for (i = 0; i < photo_count; i++) {
+    for (int i = 0; i < photo_count; i++) {
         const size_t pixels = (size_t)photos[i].camera.width * (size_t)photos[i].camera.height;
-        size_t clear = 0, veiled = 0, at;
-        double lack;
-        for (at = 0; at < pixels; at++) {
+        size_t clear = 0, veiled = 0;
+        for (size_t at = 0; at < pixels; at++) {
             const int alpha = ssdgs__photo_alpha(photos + i, at);
             clear += !alpha;
             veiled += alpha < 65535;
@@ -8625,28 +8481,29 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
         /* the mean loss pulls at a screen's width as little as the object is small in it */
-        lack = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
+        const double lack = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
         trainer->magnify[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
         empty += clear == pixels;
     }
     result = ssdgs__doubt_outlines(trainer);
     if (result) return result;
-    for (i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
+    for (int i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
     trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
     if (empty)
         ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty,
                     photo_count);
     if (!trainer->outlines && empty < photo_count) ssdgs__judge_background(trainer);
-    for (i = 0; i < photo_count; i++) {
+    for (int i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
-        for (j = 0; j < 3; j++) mean[j] += centre[j] / photo_count;
+        for (int j = 0; j < 3; j++) mean[j] += centre[j] / photo_count;
     }
-    for (i = 0; i < photo_count; i++) {
+    for (int i = 0; i < photo_count; i++) {
         double centre[3], d2 = 0;
         ssdgs__camera_centre(&photos[i].camera, centre);
-        for (j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
+        for (int j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
         radius = sqrt(d2) > radius ? sqrt(d2) : radius;
+        int j;
         for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j];
              j++) {}
         within += j == 3;
@@ -8669,11 +8526,10 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         /* the logarithm of I / d^2 at the object averages 0: few strong lights, or one inside of it, must not
            darken all others */
         const double nearest2 = 0.25 * trainer->unit * trainer->unit;
-        double scale;
         if (scaled) model->settings.length_unit = (ssdgs_real)(0.5 * trainer->unit);
-        for (i = 0; i < photo_count; i++) {
+        for (int i = 0; i < photo_count; i++) {
             double d2 = 0, intensity = 0;
-            for (j = 0; j < 3; j++) {
+            for (int j = 0; j < 3; j++) {
                 const double centre = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
                 const double d = (double)photos[i].light.position[j] - centre;
                 d2 += d * d;
@@ -8685,7 +8541,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
             irradiance += log(intensity);
             lit++;
         }
-        scale = lit ? exp(-irradiance / lit) : 1;
+        const double scale = lit ? exp(-irradiance / lit) : 1;
         model->settings.light_scale = (ssdgs_real)(scale < SSDGS__MOST_LIGHT ? scale : SSDGS__MOST_LIGHT);
         ssdgs__globals_reset(model, o->seed);
     }
@@ -8694,16 +8550,13 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
 
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out) {
-    ssdgs_context *context;
-    ssdgs_trainer *trainer;
-    ssdgs_result result;
     if (out) *out = NULL;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    context = model->context;
-    result = ssdgs__enter(context, "ssdgs_trainer_create");
+    ssdgs_context *context = model->context;
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_trainer_create");
     if (result) return result;
     if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_trainer_create", "out"));
-    trainer = (ssdgs_trainer *)ssdgs__allocate(context, sizeof *trainer);
+    ssdgs_trainer *trainer = (ssdgs_trainer *)ssdgs__allocate(context, sizeof *trainer);
     if (!trainer) return ssdgs__leave(context, SSDGS_ERR_MEMORY);
     trainer->context = context;
     trainer->model = model;
@@ -8721,11 +8574,10 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
 static int ssdgs__next_photo(ssdgs_trainer *trainer) {
     const int n = trainer->photo_count, at = trainer->iteration % n;
     const uint64_t pass = (uint64_t)(trainer->iteration / n);
-    int i;
     if (at == 0)
-        for (i = 0; i < n; i++) trainer->order[i] = (uint32_t)i;
+        for (int i = 0; i < n; i++) trainer->order[i] = (uint32_t)i;
     if (at == 0)
-        for (i = n - 1; i > 0; i--) {
+        for (int i = n - 1; i > 0; i--) {
             const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373),
                                                pass * (uint64_t)n + (uint64_t)i) *
                                 (i + 1));
@@ -8744,8 +8596,7 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, s
     const double fade = !trainer->backdrop || trainer->options.prune_outside <= 0 || t >= 30e3
                             ? 0
                             : SSDGS__FADE * (1 - t / 30e3) / pixels;
-    size_t i;
-    for (i = 0; i < n && fade > 0; i++) {
+    for (size_t i = 0; i < n && fade > 0; i++) {
         const double a = 1 / (1 + (double)ssdgs__exp_scalar(-opacity[i]));
         if (a > 0)
             gradient[i] += (ssdgs_real)(fade * a * (1 - a)); /* one that is no number is not drawn either */
@@ -8763,37 +8614,38 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
 
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     const ssdgs_train_options *o = &trainer->options;
-    ssdgs__loss_values values;
-    ssdgs_frame frame;
-    ssdgs_camera camera;
-    ssdgs_light light;
-    ssdgs_result result;
-    ssdgs__correction *correction;
-    ssdgs_real background[3];
-    double t, gradient[9], until;
-    int learns[SSDGS__GROUPS], frozen[2], moves[2], terms, photo, j;
-    result = ssdgs__trainer_check(trainer);
+    ssdgs_result result = ssdgs__trainer_check(trainer);
     if (result) return result;
-    t = ssdgs__schedule_time(o, trainer->iteration);
-    terms = ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
-    photo = ssdgs__next_photo(trainer);
-    correction = trainer->corrections + photo;
-    for (j = 0; j < 3; j++)
+    const double t = ssdgs__schedule_time(o, trainer->iteration);
+    int learns[SSDGS__GROUPS];
+    const int terms =
+        ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
+    const int photo = ssdgs__next_photo(trainer);
+    ssdgs__correction *correction = trainer->corrections + photo;
+    ssdgs_real background[3];
+    for (int j = 0; j < 3; j++)
         background[j] = o->random_background && (trainer->transparent[photo] || trainer->filled)
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
                                                          3 * (uint64_t)trainer->iteration + (uint64_t)j)
                             : o->background[j];
+    ssdgs_camera camera;
+    ssdgs_light light;
     ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    for (j = 0; j < 2; j++)
+    int frozen[2];
+    for (int j = 0; j < 2; j++)
         frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
+    ssdgs__loss_values values;
+    ssdgs_frame frame;
     result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light,
                                    background, terms, frozen, o->dssim, o->normal_weight, &values);
     if (result) return result;
+    double gradient[9];
     ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
-    for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+    for (int j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+    int moves[2];
     moves[0] = (o->refine & SSDGS_REFINE_CAMERA) && t >= 5e3;
     moves[1] = (o->refine & SSDGS_REFINE_LIGHT) && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
-    for (j = 0; j < 9 && !result; j++)
+    for (int j = 0; j < 9 && !result; j++)
         if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s "
@@ -8827,7 +8679,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
             "and the bounds suit each other?");
     ssdgs__model_changed(trainer->model);
     trainer->iteration++;
-    until = ssdgs__schedule_time(o, trainer->iteration);
+    const double until = ssdgs__schedule_time(o, trainer->iteration);
     if (!result && until <= o->densify_until) {
         ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photo]);
         if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0)
@@ -8847,15 +8699,13 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
-    ssdgs_result result;
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
+    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
     return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_step(trainer, stats));
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
-    ssdgs_train_stats stats;
     ssdgs_result result = SSDGS_OK;
     int bad = 0;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
@@ -8864,6 +8714,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
     while (trainer->iteration < trainer->options.iterations) {
+        ssdgs_train_stats stats;
         result = ssdgs_trainer_step(trainer, &stats);
         bad = result ? bad + 1 : 0;
         if ((result && result != SSDGS_ERR_NONFINITE) || bad == 10) break;
@@ -8891,41 +8742,40 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 
 SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
                                     int width, int height) {
-    ssdgs__block_layout layout;
-    size_t layers, per_gaussian, per_instance, fixed, first[SSDGS__GLOBAL_GROUPS + 1], n, points, instances;
-    ssdgs_frame frame;
-    double across, map;
     if (!settings || settings->baked || !options || width < 1 || height < 1 || width > SSDGS__MAX_SIDE ||
         height > SSDGS__MAX_SIDE || ssdgs__settings_check(NULL, settings) ||
         ssdgs__options_check(NULL, options))
         return 0;
+    ssdgs_frame frame;
     memset(&frame, 0, sizeof frame);
     frame.settings = *settings;
     frame.terms = settings->terms;
     frame.training = frame.light_count = 1;
-    layers = settings->asg == SSDGS_ASG_DEFERRED ? SSDGS__LAYERS : 1;
-    layout = ssdgs__layout(&frame);
+    const size_t layers = settings->asg == SSDGS_ASG_DEFERRED ? SSDGS__LAYERS : 1;
+    ssdgs__block_layout layout = ssdgs__layout(&frame);
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(settings, first);
-    n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
-    points = options->initial_points > 0 && (size_t)options->initial_points < n
-                 ? (size_t)options->initial_points
-                 : n;
+    const size_t n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
+    const size_t points = options->initial_points > 0 && (size_t)options->initial_points < n
+                              ? (size_t)options->initial_points
+                              : n;
     /* tiles of random points, six standard deviations wide, where the bounds fill the image; later about
        three */
-    across = 6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
-    instances = (size_t)((double)points * across * across);
+    const double across =
+        6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
+    size_t instances = (size_t)((double)points * across * across);
     instances = 2 * n + (instances > 3 * n ? instances : 3 * n);
-    per_instance = sizeof(ssdgs_real) * (8 + 4 * layers) + sizeof(ssdgs_tile_entry) + 12;
+    const size_t per_instance = sizeof(ssdgs_real) * (8 + 4 * layers) + sizeof(ssdgs_tile_entry) + 12;
     /* parameters and two moments with a quarter of slack, gradients, splat records of two views,
        activations */
-    per_gaussian = sizeof(ssdgs_real) *
-                       (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) + layout.size / SSDGS__BLOCK) +
-                   160;
-    fixed =
+    const size_t per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) +
+                                                      layout.size / SSDGS__BLOCK) +
+                                160;
+    size_t fixed =
         SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
         6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     /* a light's map inside of the scene: the more Gaussians the smaller they are */
-    map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
+    double map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
     if (settings->light_map_size) map = settings->light_map_size;
     if (layers > 1) fixed += 6 * SSDGS__MAP_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
@@ -8938,23 +8788,20 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
                                     ssdgs_metrics *metrics) {
     ssdgs_context *context = model->context;
     ssdgs_render_options options = ssdgs_render_options_exact();
-    ssdgs_image out;
-    ssdgs_real *rendered, *target, *planes;
-    ssdgs_result result;
-    size_t pixels, i;
-    int c;
     if (!metrics) return ssdgs__null(context, "ssdgs_evaluate", "metrics");
     memset(metrics, 0, sizeof *metrics);
     if (!photo || !background) return ssdgs__null(context, "ssdgs_evaluate", photo ? "background" : "photo");
-    result = ssdgs__photo_check(context, photo, -1, background);
+    ssdgs_result result = ssdgs__photo_check(context, photo, -1, background);
     if (result) return result;
-    pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
+    ssdgs_real *rendered;
     if (pixels > SIZE_MAX / 9 / sizeof *rendered)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %z pixels", pixels);
     rendered = (ssdgs_real *)ssdgs__allocate(context, pixels * 9 * sizeof *rendered);
     if (!rendered) return SSDGS_ERR_MEMORY;
-    target = rendered + 3 * pixels;
-    planes = rendered + 6 * pixels;
+    ssdgs_real *target = rendered + 3 * pixels;
+    ssdgs_real *planes = rendered + 6 * pixels;
+    ssdgs_image out;
     memset(&out, 0, sizeof out);
     out.color = rendered;
     out.alpha = planes;
@@ -8962,8 +8809,8 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     if (!result) {
         ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
         ssdgs__photo_planes(photo, background, 0, pixels, planes);
-        for (i = 0; i < pixels; i++)
-            for (c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
+        for (size_t i = 0; i < pixels; i++)
+            for (int c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
         if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);
         result =
             ssdgs__compare(context, rendered, target, photo->camera.width, photo->camera.height, metrics);
@@ -8975,9 +8822,8 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_evaluate");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_evaluate");
     return result ? result
                   : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
 }
@@ -8986,12 +8832,11 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
    box. */
 static double ssdgs__model_unit(const ssdgs_model *model) {
     double unit = 0;
-    int i, c;
     if (ssdgs__has_unit(&model->settings)) return 2 * (double)model->settings.length_unit;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         const ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
         double low = 1e30, high = -1e30;
-        for (i = 0; i < model->count; i++) {
+        for (int i = 0; i < model->count; i++) {
             if (!ssdgs__finite(x[i])) continue;
             low = (double)x[i] < low ? (double)x[i] : low;
             high = (double)x[i] > high ? (double)x[i] : high;
@@ -9004,33 +8849,31 @@ static double ssdgs__model_unit(const ssdgs_model *model) {
 static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                         const ssdgs_real background[3], int iterations) {
     static const int frozen[2] = {1, 1};
-    ssdgs__correction correction;
-    ssdgs__loss_values values;
-    ssdgs_camera camera;
-    ssdgs_light light;
-    ssdgs_frame frame;
-    ssdgs_result result;
-    double unit, angle;
-    int i, j;
     if (!photo || !background)
         return ssdgs__null(model->context, "ssdgs_refine_photo", photo ? "background" : "photo");
     if (iterations < 0)
         return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_refine_photo: %d iterations",
                            iterations);
-    result = ssdgs__photo_check(model->context, photo, -1, background);
+    ssdgs_result result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
+    ssdgs__correction correction;
     memset(&correction, 0, sizeof correction);
-    unit = ssdgs__model_unit(model);
-    angle = ssdgs__view_angle(&photo->camera);
-    for (i = 0; i < iterations; i++) {
-        double gradient[9], rate = 1e-3 * (1 - (double)i / iterations);
+    const double unit = ssdgs__model_unit(model);
+    const double angle = ssdgs__view_angle(&photo->camera);
+    ssdgs_camera camera;
+    ssdgs_light light;
+    for (int i = 0; i < iterations; i++) {
+        double rate = 1e-3 * (1 - (double)i / iterations);
         ssdgs__correct(photo, correction.value, &camera, &light);
+        ssdgs__loss_values values;
+        ssdgs_frame frame;
         result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background,
                                        model->settings.terms, frozen, (ssdgs_real)0.2, 0, &values);
         if (result) return result;
+        double gradient[9];
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
-        for (j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-        for (j = 0; j < 9; j++)
+        for (int j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
+        for (int j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j]))
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
@@ -9046,9 +8889,8 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
 
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations) {
-    ssdgs_result result;
     if (!model) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(model->context, "ssdgs_refine_photo");
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_refine_photo");
     return result ? result
                   : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
 }
@@ -9061,8 +8903,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
     const unsigned char *bytes = (const unsigned char *)data;
-    size_t i;
-    for (i = 0; i < size; i++) hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3);
+    for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3);
     return hash;
 }
 
@@ -9084,25 +8925,26 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     ssdgs_model *model = trainer->model;
     const size_t n = (size_t)model->count * sizeof(ssdgs_real),
                  globals = model->global_count * sizeof(ssdgs_real);
-    ssdgs_real *planes[3], *statistics[SSDGS__STATISTICS], *shared[3];
+    ssdgs_real *planes[3];
     ssdgs_result result = SSDGS_OK;
-    int i, c;
     planes[0] = model->gaussians;
     planes[1] = trainer->mean;
     planes[2] = trainer->square;
+    ssdgs_real *statistics[SSDGS__STATISTICS];
     statistics[0] = trainer->screen_gradient;
     statistics[1] = trainer->screen_count;
     statistics[2] = trainer->contribution;
     statistics[3] = trainer->half_shadow;
+    ssdgs_real *shared[3];
     shared[0] = model->globals;
     shared[1] = trainer->global_mean;
     shared[2] = trainer->global_square;
-    for (i = 0; i < 3 && !result; i++) {
-        for (c = 0; c < SSDGS_CHANNELS && !result; c++)
+    for (int i = 0; i < 3 && !result; i++) {
+        for (int c = 0; c < SSDGS_CHANNELS && !result; c++)
             result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
         if (!result) result = visit(user, shared[i], globals);
     }
-    for (i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
+    for (int i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
     if (!result) result = visit(user, trainer->order, (size_t)trainer->photo_count * sizeof *trainer->order);
     if (!result)
         result =
@@ -9116,7 +8958,6 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
     const ssdgs_settings *s = &trainer->model->settings;
     const ssdgs_train_options *o = &trainer->options;
-    int i;
     memset(head, 0, sizeof *head);
     memcpy(head->magic, SSDGS__CHECKPOINT_MAGIC, 8);
     head->byte_order = SSDGS__BYTE_ORDER;
@@ -9131,7 +8972,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->inputs = ssdgs__fold(head->inputs, &s->terms, SSDGS__SETTINGS_INTS);
     head->inputs =
         ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
-    for (i = 0; i < trainer->photo_count; i++) {
+    for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const ssdgs_camera *camera = &photo->camera;
         const ssdgs_real optics[5] = {camera->fx, camera->fy, camera->cx, camera->cy, camera->near_plane};
@@ -9147,7 +8988,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->count = trainer->model->count;
     head->iteration = trainer->iteration;
     head->skipped = trainer->skipped;
-    for (i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
+    for (int i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
     head->start_size = trainer->start_size;
     head->settings = *s;
 }
@@ -9184,14 +9025,14 @@ static ssdgs_result ssdgs__checkpoint_read(void *user, void *data, size_t size) 
 }
 
 static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char *path) {
-    ssdgs__checkpoint_head head;
-    ssdgs__checkpoint_io io;
-    ssdgs__writer writer;
     if (!path) return ssdgs__null(trainer->context, "ssdgs_trainer_save", "path");
     if (ssdgs__trainer_check(trainer)) return SSDGS_ERR_ARGUMENT;
     if (ssdgs__savable(trainer->model, path)) return SSDGS_ERR_NONFINITE;
+    ssdgs__writer writer;
     ssdgs__writer_open(&writer, trainer->context, path);
+    ssdgs__checkpoint_head head;
     ssdgs__checkpoint_describe(trainer, &head);
+    ssdgs__checkpoint_io io;
     io.writer = &writer;
     io.hash = UINT64_C(0xCBF29CE484222325);
     ssdgs__checkpoint_write(&io, &head, sizeof head);
@@ -9201,9 +9042,8 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
-    ssdgs_result result;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(trainer->context, "ssdgs_trainer_save");
+    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_save");
     return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_save(trainer, path));
 }
 
@@ -9212,27 +9052,25 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
     const size_t planes = (size_t)head->count * SSDGS_CHANNELS, shared = (size_t)head->global_count;
     const size_t sizes[7] = {
         planes, shared, planes, shared, planes, shared, (size_t)head->count * SSDGS__STATISTICS};
-    size_t k;
-    int part, i, j;
-    for (part = 0; part < 7; part++)
-        for (k = 0; k < sizes[part]; k++, at += sizeof(ssdgs_real)) {
+    for (int part = 0; part < 7; part++)
+        for (size_t k = 0; k < sizes[part]; k++, at += sizeof(ssdgs_real)) {
             ssdgs_real x;
             memcpy(&x, at, sizeof x);
             if (part && (!ssdgs__finite(x) || (part / 2 == 2 && x < 0))) return 0; /* 4, 5: second moments */
         }
-    for (i = 0; i < head->photo_count; i++, at += sizeof(uint32_t)) {
+    for (int i = 0; i < head->photo_count; i++, at += sizeof(uint32_t)) {
         uint32_t photo;
         memcpy(&photo, at, sizeof photo);
         if (photo >= (uint32_t)head->photo_count) return 0;
     }
-    for (i = 0; i < head->photo_count; i++, at += sizeof(ssdgs__correction)) {
+    for (int i = 0; i < head->photo_count; i++, at += sizeof(ssdgs__correction)) {
         ssdgs__correction c;
         memcpy(&c, at, sizeof c);
-        for (j = 0; j < 9; j++)
+        for (int j = 0; j < 9; j++)
             if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
                 !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0)
                 return 0;
-        for (j = 0; j < 2; j++)
+        for (int j = 0; j < 2; j++)
             if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
     }
     return 1;
@@ -9240,19 +9078,16 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
 
 static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path) {
     ssdgs_context *context = trainer->context;
-    ssdgs__checkpoint_head head, own;
-    ssdgs__checkpoint_io io;
-    ssdgs_result result;
     unsigned char *bytes = NULL;
-    size_t size = 0, expected;
-    uint64_t hash;
+    size_t size = 0;
     const char *reason = NULL;
-    int i;
     if (!path) return ssdgs__null(context, "ssdgs_trainer_load", "path");
-    result = ssdgs__trainer_check(trainer);
+    ssdgs_result result = ssdgs__trainer_check(trainer);
     if (!result) result = ssdgs__read_file(context, path, &bytes, &size);
     if (result) return result;
+    ssdgs__checkpoint_head own;
     ssdgs__checkpoint_describe(trainer, &own);
+    ssdgs__checkpoint_head head;
     reason = ssdgs__checkpoint_head_of(bytes, size, &head);
     if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
                     head.inputs != own.inputs ||
@@ -9264,13 +9099,14 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
          head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 ||
          head.skipped > head.iteration || !(head.start_size >= 0 && head.start_size < 1e30)))
         reason = "its counts are out of range";
-    for (i = 0; i < SSDGS__GROUPS && !reason; i++)
+    for (int i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
-        expected = sizeof head + 8 +
-                   (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
-                   sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) +
-                                         3 * (size_t)head.global_count);
+        const size_t expected =
+            sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
+            sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) +
+                                  3 * (size_t)head.global_count);
+        uint64_t hash;
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8))
@@ -9293,7 +9129,8 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         trainer->iteration = head.iteration;
         trainer->skipped = head.skipped;
         trainer->start_size = head.start_size;
-        for (i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
+        for (int i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
+        ssdgs__checkpoint_io io;
         io.bytes = bytes + sizeof head;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
         ssdgs__model_changed(trainer->model);
@@ -9304,27 +9141,24 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
-    ssdgs_result result;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(trainer->context, "ssdgs_trainer_load");
+    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_load");
     return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_load(trainer, path));
 }
 
 SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration) {
-    ssdgs__checkpoint_head head;
     unsigned char *bytes = NULL;
     size_t size = 0;
-    ssdgs_result result;
-    const char *reason;
     if (iteration) *iteration = 0;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(context, "ssdgs_checkpoint_iteration");
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_checkpoint_iteration");
     if (result) return result;
     if (!path || !iteration)
         result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
     else result = ssdgs__read_file(context, path, &bytes, &size);
     if (!result) {
-        reason = ssdgs__checkpoint_head_of(bytes, size, &head);
+        ssdgs__checkpoint_head head;
+        const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);
         if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
         else *iteration = head.iteration;
     }
@@ -9537,10 +9371,9 @@ SSDGS__SMALL_END
    instruction sets that fuse products and sums give the same bits, and so do all that do not. */
 SSDGS__FI R F(sum)(const V *v) {
     R lane[16];
-    int n, i;
-    for (i = 0; i < SSDGS__NV; i++) VSTORE(lane + i * SSDGS__VW, v[i]);
-    for (n = 8; n > 0; n /= 2)
-        for (i = 0; i < n; i++) lane[i] += lane[i + n];
+    for (int i = 0; i < SSDGS__NV; i++) VSTORE(lane + i * SSDGS__VW, v[i]);
+    for (int n = 8; n > 0; n /= 2)
+        for (int i = 0; i < n; i++) lane[i] += lane[i + n];
     return lane[0];
 }
 
@@ -9560,9 +9393,8 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     __m256 ab = _mm256_add_ps(_mm256_permute2f128_ps(a1, b1, 0x20), _mm256_permute2f128_ps(a1, b1, 0x31));
     __m256 cd = _mm256_add_ps(_mm256_permute2f128_ps(c1, d1, 0x20), _mm256_permute2f128_ps(c1, d1, 0x31));
     __m256 acbd = _mm256_add_ps(_mm256_unpacklo_ps(ab, cd), _mm256_unpackhi_ps(ab, cd));
-    __m128 abcd;
     acbd = _mm256_add_ps(acbd, _mm256_permute_ps(acbd, 0x4E));
-    abcd = _mm_unpacklo_ps(_mm256_castps256_ps128(acbd), _mm256_extractf128_ps(acbd, 1));
+    const __m128 abcd = _mm_unpacklo_ps(_mm256_castps256_ps128(acbd), _mm256_extractf128_ps(acbd, 1));
     _mm_storeu_ps(out, _mm_add_ps(_mm_loadu_ps(out), abcd));
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
     const __m128 a1 = _mm_add_ps(_mm_add_ps(a[0], a[2]), _mm_add_ps(a[1], a[3]));
@@ -9583,14 +9415,13 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
 
 /* Four rows of four values become columns. */
 SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_stride) {
-    int i;
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
     __m128 r[4];
-    VUNROLL for (i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
+    VUNROLL for (int i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-    VUNROLL for (i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
+    VUNROLL for (int i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
 #else
-    for (i = 0; i < 16; i++)
+    for (int i = 0; i < 16; i++)
         out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] =
             in[(size_t)(i >> 2) * in_stride + (size_t)(i & 3)];
 #endif
@@ -9610,11 +9441,10 @@ SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
 /* 2^x for x < 126, saturating below -126: degree 5 on [-1/2, 1/2], 2.2e-7 relative. */
 SSDGS__FI V F(exp2)(V x) {
-    V whole, f, p;
     x = VMAX(VSET(-126), x);
-    whole = VROUND(x);
-    f = VSUB(x, whole);
-    p = VFMA(f, VSET(1.33908633e-3), VSET(9.67603177e-3));
+    const V whole = VROUND(x);
+    const V f = VSUB(x, whole);
+    V p = VFMA(f, VSET(1.33908633e-3), VSET(9.67603177e-3));
     p = VFMA(p, f, VSET(5.55035695e-2));
     p = VFMA(p, f, VSET(2.40221068e-1));
     p = VFMA(p, f, VSET(6.93147182e-1));
@@ -9624,11 +9454,10 @@ SSDGS__FI V F(exp2)(V x) {
 
 /* e^x, saturating beyond +-87; ln 2 in two parts keeps the error independent of |x|. */
 SSDGS__FI V F(exp)(V x) {
-    V whole, f, p;
     x = VMAX(VSET(-87), VMIN(VSET(87), x));
-    whole = VROUND(VMUL(x, VSET(1.44269504088896341)));
-    f = VFNMA(whole, VSET(-2.12194440e-4), VFNMA(whole, VSET(0.693359375), x));
-    p = VFMA(f, VSET(1.9875691500e-4), VSET(1.3981999507e-3));
+    const V whole = VROUND(VMUL(x, VSET(1.44269504088896341)));
+    const V f = VFNMA(whole, VSET(-2.12194440e-4), VFNMA(whole, VSET(0.693359375), x));
+    V p = VFMA(f, VSET(1.9875691500e-4), VSET(1.3981999507e-3));
     p = VFMA(p, f, VSET(8.3334519073e-3));
     p = VFMA(p, f, VSET(4.1665795894e-2));
     p = VFMA(p, f, VSET(1.6666665459e-1));
@@ -9639,13 +9468,13 @@ SSDGS__FI V F(exp)(V x) {
 
 /* ln x for normal x > 0: 2 atanh((m - 1) / (m + 1)) + e ln 2, m in [sqrt(1/2), sqrt 2). */
 SSDGS__FI V F(log)(V x) {
-    V e = VEXPONENT(x), m = VLDEXP(x, VNEG(e)), t, t2, p;
+    V e = VEXPONENT(x), m = VLDEXP(x, VNEG(e));
     VM big = VLT(VSET(1.41421356), m);
     m = VSEL(big, VMUL(m, VSET(0.5)), m);
     e = VSEL(big, VADD(e, VSET(1)), e);
-    t = VDIV(VSUB(m, VSET(1)), VADD(m, VSET(1)));
-    t2 = VMUL(t, t);
-    p = VFMA(t2, VSET(2.0 / 9), VSET(2.0 / 7));
+    const V t = VDIV(VSUB(m, VSET(1)), VADD(m, VSET(1)));
+    const V t2 = VMUL(t, t);
+    V p = VFMA(t2, VSET(2.0 / 9), VSET(2.0 / 7));
     p = VFMA(p, t2, VSET(2.0 / 5));
     p = VFMA(p, t2, VSET(2.0 / 3));
     p = VFMA(VMUL(p, t2), t, VMUL(t, VSET(2)));
@@ -9654,8 +9483,8 @@ SSDGS__FI V F(log)(V x) {
 
 /* ln(1 + x) for 0 <= x <= 1, accurate near 0. */
 SSDGS__FI V F(log1p)(V x) {
-    V t = VDIV(x, VADD(x, VSET(2))), t2 = VMUL(t, t), p;
-    p = VFMA(t2, VSET(2.0 / 17), VSET(2.0 / 15));
+    V t = VDIV(x, VADD(x, VSET(2))), t2 = VMUL(t, t);
+    V p = VFMA(t2, VSET(2.0 / 17), VSET(2.0 / 15));
     p = VFMA(p, t2, VSET(2.0 / 13));
     p = VFMA(p, t2, VSET(2.0 / 11));
     p = VFMA(p, t2, VSET(2.0 / 9));
@@ -9667,22 +9496,21 @@ SSDGS__FI V F(log1p)(V x) {
 
 /* Good to |x| about 1e5: pi/2 in three parts. */
 SSDGS__FI void F(sincos)(V x, V *s, V *c) {
-    V n = VROUND(VMUL(x, VSET(0.636619772367581))), r, r2, ps, pc, q;
-    VM odd, negative_s, negative_c;
-    r = VFNMA(n, VSET(1.5703125), x);
+    V n = VROUND(VMUL(x, VSET(0.636619772367581)));
+    V r = VFNMA(n, VSET(1.5703125), x);
     r = VFNMA(n, VSET(4.83751296997070e-4), r);
     r = VFNMA(n, VSET(7.54978995489188e-8), r);
-    r2 = VMUL(r, r);
-    ps = VFMA(r2, VSET(-1.9515295891e-4), VSET(8.3321608736e-3));
+    const V r2 = VMUL(r, r);
+    V ps = VFMA(r2, VSET(-1.9515295891e-4), VSET(8.3321608736e-3));
     ps = VFMA(ps, r2, VSET(-1.6666654611e-1));
     ps = VFMA(VMUL(ps, r2), r, r);
-    pc = VFMA(r2, VSET(2.443315711809948e-5), VSET(-1.388731625493765e-3));
+    V pc = VFMA(r2, VSET(2.443315711809948e-5), VSET(-1.388731625493765e-3));
     pc = VFMA(pc, r2, VSET(4.166664568298827e-2));
     pc = VFMA(VMUL(pc, r2), r2, VFNMA(r2, VSET(0.5), VSET(1)));
-    q = VFNMA(VROUND(VFMA(n, VSET(0.25), VSET(-0.375))), VSET(4), n); /* quadrant 0..3 */
-    odd = VLT(VABS(VSUB(VABS(VSUB(q, VSET(2))), VSET(1))), VSET(0.5));
-    negative_s = VGE(q, VSET(1.5));
-    negative_c = VLT(VABS(VSUB(q, VSET(1.5))), VSET(1));
+    const V q = VFNMA(VROUND(VFMA(n, VSET(0.25), VSET(-0.375))), VSET(4), n); /* quadrant 0..3 */
+    const VM odd = VLT(VABS(VSUB(VABS(VSUB(q, VSET(2))), VSET(1))), VSET(0.5));
+    const VM negative_s = VGE(q, VSET(1.5));
+    const VM negative_c = VLT(VABS(VSUB(q, VSET(1.5))), VSET(1));
     *s = VSEL(odd, pc, ps);
     *c = VSEL(odd, ps, pc);
     *s = VSEL(negative_s, VNEG(*s), *s);
@@ -9700,14 +9528,13 @@ SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(
    identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
     V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
-    V least = VSET(1e-37), two = VSET(2), one = VSET(1), norm2;
+    V least = VSET(1e-37), two = VSET(2), one = VSET(1);
     V inverse = VSEL(VLT(largest, least), VSET(0), VDIV(one, VMAX(largest, least)));
-    int i;
-    for (i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++)
         q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
-    norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
+    V norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
     norm2 = VDIV(one, VSQRT(norm2));
-    for (i = 0; i < 4; i++) q[i] = VMUL(q[i], norm2);
+    for (int i = 0; i < 4; i++) q[i] = VMUL(q[i], norm2);
     inverse = VMUL(inverse, norm2);
     r[0] = VFNMA(two, VFMA(q[2], q[2], VMUL(q[3], q[3])), one);
     r[1] = VMUL(two, VFNMA(q[0], q[3], VMUL(q[1], q[2])));
@@ -9723,23 +9550,21 @@ SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
 
 /* draw = d(rotation)/d(raw)^T dr: through the matrix, then projected off the radial direction. */
 SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V d[9]) {
-    V w = q[0], x = q[1], y = q[2], z = q[3], g[4], radial;
+    V w = q[0], x = q[1], y = q[2], z = q[3], g[4];
     V a = VSUB(d[7], d[5]), b = VSUB(d[2], d[6]), c = VSUB(d[3], d[1]);
     V xy = VADD(d[1], d[3]), xz = VADD(d[2], d[6]), yz = VADD(d[5], d[7]);
-    int i;
     g[0] = VDOT3(x, y, z, a, b, c);
     g[1] = VSUB(VFMA(w, a, VFMA(y, xy, VMUL(z, xz))), VMUL(VMUL(VSET(2), x), VADD(d[4], d[8])));
     g[2] = VSUB(VFMA(w, b, VFMA(x, xy, VMUL(z, yz))), VMUL(VMUL(VSET(2), y), VADD(d[0], d[8])));
     g[3] = VSUB(VFMA(w, c, VFMA(x, xz, VMUL(y, yz))), VMUL(VMUL(VSET(2), z), VADD(d[0], d[4])));
-    for (i = 0; i < 4; i++) g[i] = VMUL(VSET(2), g[i]);
-    radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
-    for (i = 0; i < 4; i++) draw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
+    for (int i = 0; i < 4; i++) g[i] = VMUL(VSET(2), g[i]);
+    const V radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
+    for (int i = 0; i < 4; i++) draw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
 }
 
 /* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
 SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
-    size_t i;
-    for (i = 0; i < n; i += SSDGS__VW) {
+    for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
         const VM linear = VLT(x, VSET(0.0031308));
         const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
@@ -9749,8 +9574,7 @@ SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
 }
 
 SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
-    size_t i;
-    for (i = 0; i < n; i += SSDGS__VW) {
+    for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
         const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
         VSTORE(out + i, VSEL(VLT(x, VSET(0.04045)), VMUL(x, VSET(1 / 12.92)), power));
@@ -9772,12 +9596,12 @@ typedef struct F(projection) {
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
 SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, const R *g, size_t stride,
                                 VM off) {
+    for (int i = 0; i < 3; i++)
+        p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
     V raw[4];
-    int i, j;
-    for (i = 0; i < 3; i++) p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
-    for (i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++)
         raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         V log_scale = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
         p->s[i] = VEXP(VMAX(VSET(-20), VMIN(VSET(20), log_scale)));
         p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]),
@@ -9786,19 +9610,20 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
     p->inverse_z = k->orthographic ? VSET(1) : VDIV(VSET(1), VMAX(p->t[2], VSET(k->near_plane)));
-    for (i = 0; i < 2; i++) { /* rows of J W */
+    for (int i = 0; i < 2; i++) { /* rows of J W */
         V focal = VMUL(VSET(i ? k->fy : k->fx), p->inverse_z);
         V slope = k->orthographic ? VSET(0) : VMUL(p->t[i], p->inverse_z);
-        for (j = 0; j < 3; j++)
+        for (int j = 0; j < 3; j++)
             p->row[i][j] = VMUL(focal, VFNMA(slope, VSET(k->view[8 + j]), VSET(k->view[4 * i + j])));
-        for (j = 0; j < 3; j++) /* m = J W R S */
+        for (int j = 0; j < 3; j++) /* m = J W R S */
             p->m[i][j] = VMUL(
                 p->s[j], VDOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
     }
     p->a = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
     p->b = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
     p->c = VDOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
-    for (i = 0; i < 3; i++) { /* difference of products, its rounding error put back by the fused operation */
+    for (int i = 0; i < 3;
+         i++) { /* difference of products, its rounding error put back by the fused operation */
         V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3],
           v1 = p->m[1][(i + 1) % 3];
         V product = VMUL(u1, v1);
@@ -9820,31 +9645,26 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
                           size_t end, R *record, R *depth) {
     const V log2e = VSET(1.44269504088896341);
-    size_t i;
-    for (i = begin; i < end; i += SSDGS__VW) {
+    for (size_t i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
-        V inverse_det, opacity, log2_opacity, reach, x, y, ex, ey, d, field[8];
-        VM drawn;
-        R lane[SSDGS__VW], fields[8][SSDGS__VW];
-        int f, l;
         F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
-        inverse_det = VDIV(VSET(1), p.det);
-        opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, inverse_det))) : p.opacity;
-        log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
-        x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
-        y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
-        reach =
+        const V inverse_det = VDIV(VSET(1), p.det);
+        const V opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, inverse_det))) : p.opacity;
+        const V log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
+        const V x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
+        const V y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
+        const V reach =
             VMAX(VSET(0), VMUL(VSET(2 * 0.69314718055994531), VSUB(log2_opacity, VSET(k->log2_threshold))));
-        ex = VSQRT(VMUL(reach, VADD(p.a, p.h)));
-        ey = VSQRT(VMUL(reach, VADD(p.c, p.h)));
-        d = k->by_distance ? VSQRT(VDOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
+        const V ex = VSQRT(VMUL(reach, VADD(p.a, p.h)));
+        const V ey = VSQRT(VMUL(reach, VADD(p.c, p.h)));
+        const V d = k->by_distance ? VSQRT(VDOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
         /* NaN fails every comparison, so nothing that is not finite is drawn */
-        drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)),
-                     VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
+        VM drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)),
+                        VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
         if (!k->orthographic) {
             V back = VSET(0); /* variance along z, of depths */
-            for (f = 0; f < 3; f++) {
+            for (int f = 0; f < 3; f++) {
                 V axis =
                     VMUL(VMUL(p.s[f], p.inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]),
                                                           VSET(k->view[10]), p.r[f], p.r[3 + f], p.r[6 + f]));
@@ -9856,9 +9676,11 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         }
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
+        R lane[SSDGS__VW];
         VSTORE(lane, VSEL(drawn, d, VSET(-1)));
-        for (l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
+        for (int l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
         if (!VBITS(drawn)) continue;
+        V field[8];
         field[0] = x;
         field[1] = y;
         field[2] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det));
@@ -9867,14 +9689,15 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         field[5] = log2_opacity;
         field[6] = ex;
         field[7] = ey;
-        for (f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
+        R fields[8][SSDGS__VW];
+        for (int f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
-        for (f = 0; f < 8; f += 4)
-            for (l = 0; l < SSDGS__VW; l += 4)
+        for (int f = 0; f < 8; f += 4)
+            for (int l = 0; l < SSDGS__VW; l += 4)
                 F(transpose4)(fields[f] + l, SSDGS__VW, record + (i + (size_t)l) * 8 + f, 8);
 #else
-        for (f = 0; f < 8; f++)
-            for (l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = fields[f][l];
+        for (int f = 0; f < 8; f++)
+            for (int l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = fields[f][l];
 #endif
     }
 }
@@ -9885,38 +9708,38 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                                    size_t begin, size_t end, const R *splat, R *gradient,
                                    size_t gradient_stride, R *view_slot) {
     V view_sum[12][SSDGS__NV];
-    size_t i;
-    int j, l;
-    for (j = 0; j < 12; j++)
-        for (l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
-    for (i = begin; i < end; i += SSDGS__VW) {
-        F(projection) p;
+    for (int j = 0; j < 12; j++)
+        for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
+    for (size_t i = begin; i < end; i += SSDGS__VW) {
         const size_t v = i / SSDGS__VW % SSDGS__NV;
         R lane[8][SSDGS__VW], any = 0;
-        V g[8], total, inverse_det, inverse_det0, ka, kb, kc, half_g, du[2][3], dr[9], dq[4], dt[3];
-        for (l = 0; l < SSDGS__VW; l++)
-            for (j = 0; j < 8; j++) {
+        for (int l = 0; l < SSDGS__VW; l++)
+            for (int j = 0; j < 8; j++) {
                 lane[j][l] = j == 6 ? 0 : splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
                 any = lane[j][l] != 0 ? 1 : any;
             }
         if (any == 0) continue;
-        total = VSET(0);
-        for (j = 0; j < 8; j++) {
+        V total = VSET(0);
+        V g[8];
+        for (int j = 0; j < 8; j++) {
             g[j] = VLOAD(lane[j]);
             total = VADD(total, VABS(g[j]));
         }
+        F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, VGE(VSET(0), total)); /* NaN stays in, to be refused */
-        inverse_det = VDIV(VSET(1), p.det);
-        ka = VMUL(VADD(p.c, p.h), inverse_det);
-        kb = VNEG(VMUL(p.b, inverse_det));
-        kc = VMUL(VADD(p.a, p.h), inverse_det);
-        half_g = VMUL(VSET(0.5), g[3]);
-        inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
-        for (j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
+        const V inverse_det = VDIV(VSET(1), p.det);
+        const V ka = VMUL(VADD(p.c, p.h), inverse_det);
+        const V kb = VNEG(VMUL(p.b, inverse_det));
+        const V kc = VMUL(VADD(p.a, p.h), inverse_det);
+        const V half_g = VMUL(VSET(0.5), g[3]);
+        const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
+        V du[2][3];
+        for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
         /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2
            u_j.G u_j with u = K m. Of a thin Gaussian K G K and K m as products are differences of large
            numbers; u = (h m + (m1 x X, X x m0)) / det with X = m0 x m1 is none. */
-        for (j = 0; j < 3; j++) {
+        V dr[9];
+        for (int j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
             const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
                     across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
@@ -9938,14 +9761,15 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(20)), ds, VSET(0))));
             dm0 = VMUL(dm0, p.s[j]);
             dm1 = VMUL(dm1, p.s[j]);
-            for (l = 0; l < 3; l++) {
+            for (int l = 0; l < 3; l++) {
                 dr[3 * l + j] = VFMA(dm0, p.row[0][l], VMUL(dm1, p.row[1][l]));
                 du[0][l] = VFMA(dm0, p.r[3 * l + j], du[0][l]);
                 du[1][l] = VFMA(dm1, p.r[3 * l + j], du[1][l]);
             }
         }
+        V dq[4];
         F(rotation_backward)(dq, p.q, p.inverse_q, dr);
-        for (j = 0; j < 4; j++) {
+        for (int j = 0; j < 4; j++) {
             R *d = gradient + (size_t)(SSDGS_ROTATION + j) * gradient_stride + i;
             VSTORE(d, VADD(VLOAD(d), dq[j]));
         }
@@ -9955,8 +9779,9 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             V logit = VSEL(VLT(VABS(raw), VSET(20)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
             VSTORE(d, VADD(VLOAD(d), logit));
         }
+        V dt[3];
         dt[2] = g[7];
-        for (l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
+        for (int l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
             V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z),
               slope = VMUL(p.t[l], p.inverse_z);
             V w0 = VSET(k->view[4 * l]), w1 = VSET(k->view[4 * l + 1]), w2 = VSET(k->view[4 * l + 2]);
@@ -9968,20 +9793,20 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             dt[l] = VMUL(dslope, p.inverse_z);
             dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
             dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);
-            for (j = 0; j < 3; j++) {
+            for (int j = 0; j < 3; j++) {
                 view_sum[4 * l + j][v] = VFMA(scaled, du[l][j], view_sum[4 * l + j][v]);
                 view_sum[8 + j][v] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j][v]);
             }
         }
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
             V dx = VDOT3(dt[0], dt[1], dt[2], VSET(k->view[j]), VSET(k->view[4 + j]), VSET(k->view[8 + j]));
             VSTORE(d, VADD(VLOAD(d), dx));
-            for (l = 0; l < 3; l++) view_sum[4 * j + l][v] = VFMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
+            for (int l = 0; l < 3; l++) view_sum[4 * j + l][v] = VFMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
             view_sum[4 * j + 3][v] = VADD(view_sum[4 * j + 3][v], dt[j]);
         }
     }
-    for (j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
+    for (int j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
 }
 
 /* ==== >>bin_kernel  which 4x4 micro-tiles an ellipse touches ==== */
@@ -9994,25 +9819,23 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
                       int end, uint32_t at) {
     const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
     const V zero = VSET(0), side = VSET(3);
-    int g, v;
-    for (g = begin; g < end; g++) {
+    for (int g = begin; g < end; g++) {
         const R *record = view->record + 8 * (size_t)g;
         const uint16_t *box = boxes + 4 * (size_t)g;
         ssdgs_instances *of = view->of_gaussian + g;
         int left = (box[2] - box[0] + 1) * (box[3] - box[1] + 1), tx = box[0], ty = box[1];
-        V a, b, c, best_x, best_y, least;
         of->first = at;
         of->count = 0;
         if (!left) continue;
-        a = VSET(record[2] * margin);
-        b = VSET(record[3]);
-        c = VSET(record[4] * margin);
-        best_x = VSET(-record[3] / (2 * record[2]));
-        best_y = VSET(-record[3] / (2 * record[4]));
-        least = VSET(log2_threshold - record[5] - (R)1e-3);
+        const V a = VSET(record[2] * margin);
+        const V b = VSET(record[3]);
+        const V c = VSET(record[4] * margin);
+        const V best_x = VSET(-record[3] / (2 * record[2]));
+        const V best_y = VSET(-record[3] / (2 * record[4]));
+        const V least = VSET(log2_threshold - record[5] - (R)1e-3);
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])),
                   x1 = VADD(x0, side);
                 V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])),
@@ -10048,24 +9871,23 @@ typedef struct F(batch) {
 
 /* Turns the masks of count entries, micro-tiles per entry, into entries per micro-tile. */
 SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
-    int i, micro;
-    for (micro = 0; micro < 16; micro++) batch->entries[micro] = 0;
+    for (int micro = 0; micro < 16; micro++) batch->entries[micro] = 0;
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
-    for (i = count; i & 15; i++) batch->mask[i] = 0;
-    for (i = 0; i < count; i += 16) {
+    for (int i = count; i & 15; i++) batch->mask[i] = 0;
+    for (int i = 0; i < count; i += 16) {
         const __m128i low = _mm_set1_epi16(255);
         const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)(batch->mask + i));
         const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)(batch->mask + i + 8));
         __m128i half[2];
         half[0] = _mm_packus_epi16(_mm_and_si128(a, low), _mm_and_si128(b, low));
         half[1] = _mm_packus_epi16(_mm_srli_epi16(a, 8), _mm_srli_epi16(b, 8));
-        VUNROLL for (micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
+        VUNROLL for (int micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
             batch->entries[micro] |= (uint64_t)(unsigned)_mm_movemask_epi8(half[micro / 8]) << i;
             half[micro / 8] = _mm_add_epi8(half[micro / 8], half[micro / 8]);
         }
     }
 #else
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         unsigned mask = batch->mask[i];
         for (; mask; mask &= mask - 1) batch->entries[ssdgs__lowest_bit(mask)] |= (uint64_t)1 << i;
     }
@@ -10092,11 +9914,10 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
 
 /* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
 SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy, V *raw, VM *drawn) {
-    V p;
     *dx = VSUB(px, VSET(record[0]));
     *dy = VSUB(py, VSET(record[1]));
-    p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy,
-             VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
+    V p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy,
+               VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
     p = VMIN(VSET(record[5]),
              p); /* of a needle with its centre far away p is a small difference of large terms */
     *drawn = VGE(p, log2_threshold);
@@ -10109,8 +9930,7 @@ SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy
 SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
 
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
-    int v;
-    for (v = 0; v < SSDGS__NV; v++) {
+    for (int v = 0; v < SSDGS__NV; v++) {
         px[v] = VADD(VLOAD(ssdgs__lane_x + v * SSDGS__VW), VSET(tile->x + 4 * (micro & 3)));
         py[v] = VADD(VLOAD(ssdgs__lane_y + v * SSDGS__VW), VSET(tile->y + 4 * (micro >> 2)));
     }
@@ -10123,27 +9943,27 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
     const int thrifty = needed != NULL;
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     const V budget = VSET(tile->max_error), slight = VSET(tile->max_error * SSDGS__SHARE);
-    R transmittance[16][16], passed_over[16][16];
     F(batch) batch;
     uint32_t from = 0;
-    int micro, v;
     unsigned live = 0xFFFF;
     memset(blends, 0, tile->count * sizeof *blends);
     if (thrifty) memset(needed, 0, tile->count);
-    for (micro = 0; micro < 16; micro++)
-        for (v = 0; v < 16; v++) {
+    R transmittance[16][16], passed_over[16][16];
+    for (int micro = 0; micro < 16; micro++)
+        for (int v = 0; v < 16; v++) {
             transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
             passed_over[micro][v] = 0;
         }
     while (from < tile->count && live) {
         F(batch_gather)(&batch, tile, &from);
-        for (micro = 0; micro < 16; micro++) {
+        for (int micro = 0; micro < 16; micro++) {
             uint64_t left = live >> micro & 1u ? batch.entries[micro] : 0;
-            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], over[SSDGS__NV];
             int alive = 0;
             if (!left) continue;
+            V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            V t[SSDGS__NV], over[SSDGS__NV];
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 over[v] = VLOAD(passed_over[micro] + v * SSDGS__VW);
             }
@@ -10151,11 +9971,12 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                 const int index = ssdgs__lowest_bit(left);
                 const uint32_t place = batch.place[index];
                 int any = 0, must = 0;
-                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha;
-                    VM drawn, blended;
-                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    blended = VAND(drawn, VGE(t[v], stop));
+                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw;
+                    VM drawn;
+                    const V alpha =
+                        F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    const VM blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
                     if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget
                                                         needs everything */
@@ -10169,7 +9990,7 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                 blends[place] = (uint16_t)(blends[place] | (unsigned)(any != 0) << micro);
                 if (thrifty) needed[place] = (unsigned char)(needed[place] | (must != 0));
             }
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed_over[micro] + v * SSDGS__VW, over[v]);
                 alive |= VBITS(VGE(t[v], stop));
@@ -10185,28 +10006,23 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
    list, the nearer one leaves what it has met after each of its entries for the other to pick from. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
-    R transmittance[16][16], met[16][16],
-        next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
-    unsigned char steps[16][16];
     const int all = tile->flux || tile->light_map, cue = tile->cue || tile->flux;
-    F(batch) applied, sampled;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
-    int micro, v, i;
-    for (v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
-    for (micro = 0; micro < 16; micro++)
-        for (v = 0; v < 16; v++) {
+    for (int v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
+    R transmittance[16][16], met[16][16],
+        next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
+    for (int micro = 0; micro < 16; micro++)
+        for (int v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
             met[micro][v] = 0;
             next[micro][v] = tile->light_map ? ssdgs__map_level[0] : -1;
         }
+    unsigned char steps[16][16];
     memset(steps, 0, sizeof steps);
+    F(batch) applied, sampled;
     while (sampling < tile->count || (all && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
-        V lanes[SSDGS__BATCH][3][SSDGS__NV],
-            energy[SSDGS__BATCH][SSDGS__NV]; /* the sums before the lanes are added up */
-        R history[2][SSDGS__BATCH]
-                 [16]; /* transmittance and met, before the first applied and after each; 63 at most */
         int samples = 0, applies = 0;
         while (sampling < tile->count || (all && applying < tile->count)) {
             const int sample =
@@ -10229,21 +10045,25 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         }
         F(batch_transpose)(&applied, applies);
         F(batch_transpose)(&sampled, samples);
-        for (i = 0; i < samples; i++)
-            for (v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
-        for (i = 0; cue && i < applies; i++)
-            for (v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
-        for (micro = 0; micro < 16; micro++) {
+        V lanes[SSDGS__BATCH][3][SSDGS__NV]; /* the sums before the lanes are added up */
+        for (int i = 0; i < samples; i++)
+            for (int v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
+        V energy[SSDGS__BATCH][SSDGS__NV];
+        for (int i = 0; cue && i < applies; i++)
+            for (int v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
+        R history[2][SSDGS__BATCH]
+                 [16]; /* transmittance and met, before the first applied and after each; 63 at most */
+        for (int micro = 0; micro < 16; micro++) {
             const uint64_t entries = applied.entries[micro];
-            uint64_t left;
-            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
             if (!(entries | sampled.entries[micro])) continue;
+            V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            V t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 if (cue) {
-                    V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal)), w, cosine2;
-                    w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
-                    cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
+                    V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal));
+                    const V w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
+                    const V cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
                     omega[v] =
                         VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
                 }
@@ -10253,18 +10073,19 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                 b[v] = VLOAD(met[micro] + v * SSDGS__VW);
                 VSTORE(history[1][0] + v * SSDGS__VW, b[v]);
             }
-            for (left = entries; left; left &= left - 1) {
+            for (uint64_t left = entries; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const V distance = VSET(applied.record[index][6]);
-                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V before = t[v];
-                    V dx, dy, raw, alpha;
+                    V dx, dy, raw;
                     VM drawn;
-                    unsigned fell;
-                    alpha = F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    const V alpha =
+                        F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
-                    fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
+                    const unsigned fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW)))
+                                          << v * SSDGS__VW;
                     if (fell) {
                         R from[16];
                         VSTORE(from + v * SSDGS__VW, before);
@@ -10279,12 +10100,12 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                     }
                 }
             }
-            for (left = sampled.entries[micro]; left; left &= left - 1) {
+            for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
                 const V distance = VSET(sampled.record[index][6]);
                 V(*sum)[SSDGS__NV] = lanes[index];
-                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
                     V dx, dy, raw;
                     VM drawn;
@@ -10300,15 +10121,15 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                             sum[2][v]);
                 }
             }
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW,
                        VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
                 if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
             }
         }
-        for (i = 0; i < samples; i++)
+        for (int i = 0; i < samples; i++)
             F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
-        for (i = 0; cue && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
+        for (int i = 0; cue && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
@@ -10319,58 +10140,62 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                                    R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
     F(batch) batch;
-    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], transmittance[16][16];
     uint32_t from = 0;
     const int at_once = SSDGS__NV == 1 ? layers : 1; /* as many sums as there are registers */
-    int which[SSDGS__BATCH], used, micro, v, i, n, layer, l;
     memset(pixels, 0, (size_t)layers * SSDGS__TILE_LAYER * sizeof *pixels);
-    for (micro = 0; micro < 16; micro++) {
-        for (v = 48; v < 64; v++) pixels[micro * 64 + v] = 1;
-        for (v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
+    R transmittance[16][16];
+    for (int micro = 0; micro < 16; micro++) {
+        for (int v = 48; v < 64; v++) pixels[micro * 64 + v] = 1;
+        for (int v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
     }
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16];
+    int which[SSDGS__BATCH];
     while (from < tile->count) {
-        n = F(batch_gather)(&batch, tile, &from);
-        for (layer = 0; layer < layers; layer++)
-            for (i = 0; i < n; i++)
+        int n = F(batch_gather)(&batch, tile, &from);
+        for (int layer = 0; layer < layers; layer++)
+            for (int i = 0; i < n; i++)
                 memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4,
                        4 * sizeof(R));
-        for (micro = 0; micro < 16; micro++) {
+        for (int micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             R *pixel = pixels + micro * 64;
-            V px[SSDGS__NV], py[SSDGS__NV], t[SSDGS__NV], last[SSDGS__NV];
             if (!left) continue;
+            V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            V t[SSDGS__NV], last[SSDGS__NV];
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
+            int used;
             for (used = 0; left; left &= left - 1, used++) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
-                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha;
+                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw;
                     VM drawn, live = VGE(t[v], stop);
-                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    const V alpha =
+                        F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
                 }
             }
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
-            for (layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
+            for (int layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
                 V c[SSDGS__LAYERS][3][SSDGS__NV];
-                VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (v = 0; v < SSDGS__NV; v++)
-                    VUNROLL for (i = 0; i < 3; i++) c[l][i][v] =
+                VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int v = 0; v < SSDGS__NV; v++)
+                    VUNROLL for (int i = 0; i < 3; i++) c[l][i][v] =
                         VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
-                for (n = 0; n < used; n++) VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+                for (n = 0; n < used; n++) VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                         const V w = VLOAD(weight[n] + v * SSDGS__VW);
-                        VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (i = 0; i < 3; i++) c[l][i][v] =
-                            VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
+                        VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int i = 0; i < 3; i++)
+                            c[l][i][v] = VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
                     }
-                VUNROLL for (l = 0; l < at_once; l++) VUNROLL for (v = 0; v < SSDGS__NV; v++)
-                    VUNROLL for (i = 0; i < 3; i++)
+                VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int v = 0; v < SSDGS__NV; v++)
+                    VUNROLL for (int i = 0; i < 3; i++)
                         VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
             }
         }
@@ -10398,62 +10223,65 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
     const int wide = layers == SSDGS__LAYERS,
               width = 4 * layers; /* all layers: sums over pixels with lanes over their values */
     F(batch) batch;
-    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16], passed[16][16], transmittance[16][16];
     uint32_t from = 0;
-    int which[SSDGS__BATCH], used, micro, v, i, n, layer;
-    for (micro = 0; wide && micro < 16; micro++)
-        for (layer = 0; layer < layers; layer++)
-            for (i = 0; i < 16; i += 4) F(transpose4)
+    for (int micro = 0; wide && micro < 16; micro++)
+        for (int layer = 0; layer < layers; layer++)
+            for (int i = 0; i < 16; i += 4) F(transpose4)
     (pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16, scratch + (micro * 16 + i) * width + 4 * layer,
      (size_t)width);
-    for (micro = 0; micro < 16; micro++)
-        for (v = 0; v < 16; v++) {
+    R passed[16][16], transmittance[16][16];
+    for (int micro = 0; micro < 16; micro++)
+        for (int v = 0; v < 16; v++) {
             passed[micro][v] = 0;
             transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
         }
+    R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16];
+    int which[SSDGS__BATCH];
     while (from < tile->count) {
-        n = F(batch_gather)(&batch, tile, &from);
-        for (layer = 0; layer < layers; layer++)
-            for (i = 0; i < n; i++)
+        int n = F(batch_gather)(&batch, tile, &from);
+        for (int layer = 0; layer < layers; layer++)
+            for (int i = 0; i < n; i++)
                 memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4,
                        4 * sizeof(R));
-        for (micro = 0; micro < 16; micro++) {
+        for (int micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
             const R *pixel = pixels + micro * 64, *rows = scratch + micro * 16 * width;
-            V px[SSDGS__NV], py[SSDGS__NV], dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV],
-                before[SSDGS__NV];
             if (!left) continue;
+            V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                VUNROLL for (layer = 0; layer < layers; layer++) VUNROLL for (i = 0; i < 3; i++)
+            V dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                VUNROLL for (int layer = 0; layer < layers; layer++) VUNROLL for (int i = 0; i < 3; i++)
                     dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
                 product[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
             }
+            int used;
             for (used = 0; left; left &= left - 1, used++) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
                 R *out = sums + (size_t)batch.place[index] * stride;
                 V sum[12][SSDGS__NV];
-                VUNROLL for (v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, alpha, w, part[4], shade, behind, g, gx, gy, before_it = t[v];
+                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                    V dx, dy, raw, before_it = t[v];
                     VM drawn;
-                    alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
-                    w = VMUL(alpha, before_it);
+                    const V w = VMUL(alpha, before_it);
+                    V part[4];
                     part[0] = part[1] = part[2] = part[3] =
                         zero; /* one chain of sums would be what all waits for */
-                    VUNROLL for (layer = 0; layer < layers; layer++) VUNROLL for (i = 0; i < 3; i++)
+                    VUNROLL for (int layer = 0; layer < layers; layer++) VUNROLL for (int i = 0; i < 3; i++)
                         part[layer & 3] =
                             VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
-                    shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
+                    const V shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
                     before[v] = VFMA(w, shade, before[v]);
-                    behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
-                    g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
+                    const V behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
+                    V g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
                     g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
-                    gx = VMUL(g, dx);
-                    gy = VMUL(g, dy);
+                    const V gx = VMUL(g, dx);
+                    const V gy = VMUL(g, dy);
                     sum[0][v] = g;
                     sum[1][v] = gx;
                     sum[2][v] = gy;
@@ -10465,7 +10293,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     if (wide) {
                         VSTORE(weight[used] + v * SSDGS__VW, w);
                     } else {
-                        VUNROLL for (i = 0; i < 3; i++) sum[8 + i][v] = VMUL(w, dc[0][i][v]);
+                        VUNROLL for (int i = 0; i < 3; i++) sum[8 + i][v] = VMUL(w, dc[0][i][v]);
                         sum[11][v] = zero;
                     }
                 }
@@ -10476,16 +10304,16 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             for (n = 0; wide && n < used; n++) {
                 R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
                 V sum[4 * SSDGS__LAYERS / SSDGS__VW];
-                VUNROLL for (v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
-                for (i = 0; i < 16; i++) {
+                VUNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
+                for (int i = 0; i < 16; i++) {
                     const V w = VSET(weight[n][i]);
-                    VUNROLL for (v = 0; v < width / SSDGS__VW; v++) sum[v] =
+                    VUNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] =
                         VFMA(w, VLOAD(rows + i * width + v * SSDGS__VW), sum[v]);
                 }
-                VUNROLL for (v = 0; v < width / SSDGS__VW; v++)
+                VUNROLL for (int v = 0; v < width / SSDGS__VW; v++)
                     VSTORE(out + v * SSDGS__VW, VADD(VLOAD(out + v * SSDGS__VW), sum[v]));
             }
-            VUNROLL for (v = 0; v < SSDGS__NV; v++) {
+            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
                 VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
             }
@@ -10504,25 +10332,24 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
    length. Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one
    exponential for the longest l, its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
-    int s, i, k;
-    for (s = 0; s < 16; s += SSDGS__VW) {
+    for (int s = 0; s < 16; s += SSDGS__VW) {
         const V px = VLOAD(x + s), py = VLOAD(x + SSDGS__BLOCK + s), pz = VLOAD(x + 2 * SSDGS__BLOCK + s);
         const V soft = VSET(scale[0]), longest = VSET(scale[1]);
         V sum[SSDGS__LENGTHS];
-        VUNROLL for (k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
-        for (i = 0; i < count; i++) {
+        VUNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
+        for (int i = 0; i < count; i++) {
             const R *source = sources + 4 * i;
             const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])),
                     dz = VSUB(pz, VSET(source[2]));
             const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))),
                     weight = VDIV(VSET(source[3]), r);
             V e = F(exp2)(VMUL(r, longest));
-            VUNROLL for (k = SSDGS__LENGTHS - 1; k >= 0; k--) {
+            VUNROLL for (int k = SSDGS__LENGTHS - 1; k >= 0; k--) {
                 sum[k] = VFMA(weight, e, sum[k]);
                 e = VMUL(e, e);
             }
         }
-        VUNROLL for (k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
+        VUNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
     }
 }
 
@@ -10551,38 +10378,37 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(of
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
     const F(offsets) *const end = depth + p->depth;
-    size_t out[6];
-    int i, v;
-    VUNROLL for (i = 0; i < rows; i++) {
+    VUNROLL for (int i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
-        VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
+        VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
     }
     for (; depth < end; depth++) {
         const size_t at = depth->a;
         const R *b = columns + depth->b;
         V lanes[SSDGS__TV];
-        VUNROLL for (v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
-        VUNROLL for (i = 0; i < rows; i++) {
+        VUNROLL for (int v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
+        VUNROLL for (int i = 0; i < rows; i++) {
             const V weight = VSET(a[i][at]);
-            VUNROLL for (v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
+            VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
         }
     }
-    VUNROLL for (i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
+    size_t out[6];
+    VUNROLL for (int i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
     if (p->accumulate) {
-        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
             VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
     }
     if (p->relu) {
-        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
             VMAX(sum[i][v], VSET(0));
     }
     if (p->mask) {
-        VUNROLL for (i = 0; i < rows; i++) VUNROLL for (v = 0; v < vectors; v++) sum[i][v] =
+        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
             VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
     }
-    VUNROLL for (i = 0; i < rows; i++) {
+    VUNROLL for (int i = 0; i < rows; i++) {
         R *const to = p->out + out[i];
-        VUNROLL for (v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
+        VUNROLL for (int v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
     }
 }
 
@@ -10600,8 +10426,8 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * dept
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
     F(offsets) depth[SSDGS_MAX_WIDTH];
-    int column = 0, k;
-    for (k = 0; k < p->depth; k++) {
+    int column = 0;
+    for (int k = 0; k < p->depth; k++) {
         depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);
         depth[k].b = (uint32_t)(p->depth_list[k] * p->b_stride);
     }
@@ -10615,10 +10441,10 @@ SSDGS__FN void F(dense)(const ssdgs__product *p) {
 /* Which rows of ReLU outputs (count, BLOCK) are not all 0: neurons that live somewhere in the block. Returns
    how many. */
 SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
-    int i, s, n = 0;
-    for (i = 0; i < count; i++) {
+    int n = 0;
+    for (int i = 0; i < count; i++) {
         V most = VLOAD(rows + i * SSDGS__BLOCK);
-        for (s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW)
+        for (int s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW)
             most = VMAX(most, VLOAD(rows + i * SSDGS__BLOCK + s));
         list[n] = (uint16_t)i;
         n += VBITS(VLT(VSET(0), most)) != 0;
@@ -10630,27 +10456,25 @@ SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
 SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stride, R *out) {
     const R *end = rows + count * SSDGS__BLOCK;
     R last[4 * SSDGS__BLOCK];
-    size_t i, s;
-    for (i = 0; i < padded; i += 4, rows += 4 * SSDGS__BLOCK) {
+    for (size_t i = 0; i < padded; i += 4, rows += 4 * SSDGS__BLOCK) {
         const R *from = rows;
         if (end < rows + 4 * SSDGS__BLOCK) {
-            for (s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
+            for (size_t s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
             from = last;
         }
-        for (s = 0; s < SSDGS__BLOCK; s += 4)
+        for (size_t s = 0; s < SSDGS__BLOCK; s += 4)
             F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
     }
 }
 
 /* sums (16 of every stride, per row) += each listed row of rows (., SSDGS__BLOCK) by sixteenths. */
 SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t *list, int count) {
-    int i, j, s;
-    for (i = 0; i < count; i++)
-        for (j = 0; j < 16; j += SSDGS__VW) {
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j < 16; j += SSDGS__VW) {
             const R *row = rows + list[i] * SSDGS__BLOCK + j;
             R *out = sums + list[i] * stride + j;
             V sum = VLOAD(row);
-            for (s = 16; s < SSDGS__BLOCK; s += 16) sum = VADD(sum, VLOAD(row + s));
+            for (int s = 16; s < SSDGS__BLOCK; s += 16) sum = VADD(sum, VLOAD(row + s));
             VSTORE(out, VADD(VLOAD(out), sum));
         }
 }
@@ -10659,14 +10483,13 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
    component ==== in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the others by
    doubling the angle. */
 SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims, int levels) {
-    int d, l, s;
-    for (d = 0; d < dims; d++)
-        for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale)),
-              sine, cosine;
+    for (int d = 0; d < dims; d++)
+        for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale));
             VSTORE(out + d * SSDGS__BLOCK + s, x);
+            V sine, cosine;
             F(sincos)(VMAX(VSET(-1e5), VMIN(VSET(1e5), x)), &sine, &cosine); /* finite however far out */
-            for (l = 0; l < levels; l++) {
+            for (int l = 0; l < levels; l++) {
                 const V twice = VADD(sine, sine);
                 VSTORE(out + (dims * (1 + l) + d) * SSDGS__BLOCK + s, sine);
                 VSTORE(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s, cosine);
@@ -10678,11 +10501,10 @@ SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims
 
 /* din += scale (dv + sum 2^l (dsin cos - dcos sin)), from the encoded values in `out`. */
 SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, int dims, int levels) {
-    int d, l, s;
-    for (d = 0; d < dims; d++)
-        for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (int d = 0; d < dims; d++)
+        for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
             V sum = VLOAD(dout + d * SSDGS__BLOCK + s), power = VSET(1);
-            for (l = 0; l < levels; l++) {
+            for (int l = 0; l < levels; l++) {
                 const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s,
                           cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
                 V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine),
@@ -10700,10 +10522,9 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 /* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
 SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
     V h2 = VDOT3(h[0], h[1], h[2], h[0], h[1], h[2]);
-    int i;
     *half = VGE(h2, VSET(1e-12)); /* wi = -wo has no half vector: no highlight there */
     *inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
-    for (i = 0; i < 3; i++) h[i] = VMUL(h[i], *inverse_h);
+    for (int i = 0; i < 3; i++) h[i] = VMUL(h[i], *inverse_h);
     *missing = VSUB(VSET(1), VDOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
     *missing = VMAX(VSET(0),
                     VMIN(VSET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
@@ -10719,28 +10540,32 @@ typedef struct F(geometry) {
 } F(geometry);
 
 SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, const R *gauss) {
-    V x[3], raw[4], d2, e2, fifth;
-    int i;
-    for (i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
-    for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
+    V x[3];
+    for (int i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
+    V raw[4];
+    for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
     g->inverse_q = F(rotation)(raw, g->q, g->r);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), x[i]);
         g->wo[i] = VSUB(VSET(k->eye[i]), x[i]);
     }
-    d2 = VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
-    e2 = VMAX(VDOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), VSET(k->least_distance2));
+    const V d2 =
+        VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
+    const V e2 =
+        VMAX(VDOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), VSET(k->least_distance2));
     g->irradiance = k->directional ? VSET(1) : VDIV(VSET(1), d2);
     g->inverse_light = k->directional ? VSET(1) : VSQRT(g->irradiance);
     g->inverse_eye = VDIV(VSET(1), VSQRT(e2));
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         g->wi[i] = VMUL(g->wi[i], g->inverse_light);
         g->wo[i] = VMUL(g->wo[i], g->inverse_eye);
         g->h[i] = VADD(g->wi[i], g->wo[i]);
     }
     g->cosine = VDOT3(g->r[2], g->r[5], g->r[8], g->wi[0], g->wi[1], g->wi[2]);
+    V fifth;
     F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &fifth);
-    for (i = 0; i < 3; i++) g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
+    for (int i = 0; i < 3; i++)
+        g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
     g->fresnel = VFMA(VSET(1 - SSDGS__F0), fifth, VSET(SSDGS__F0));
 }
 
@@ -10767,12 +10592,11 @@ SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
 /* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s, which deferred is
    1. */
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
-    int s, i, j;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
         V d = VSET(0);
         F(geometry_lanes)(&g, k, gauss + s);
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             VSTORE(rows + (SSDGS__WI + i) * SSDGS__BLOCK + s, g.wi[i]);
             VSTORE(rows + (SSDGS__WO + i) * SSDGS__BLOCK + s, g.wo[i]);
             VSTORE(rows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s, g.r[3 * i + 2]);
@@ -10780,7 +10604,7 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
         VSTORE(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, g.irradiance);
         VSTORE(rows + SSDGS__COSINE * SSDGS__BLOCK + s, VMAX(VSET(0), g.cosine));
         if (k->specular && !k->deferred)
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+            for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
                 V lobe = F(asg)(k->basis + 12 * j, g.local, NULL, NULL);
                 d = VFMA(weight, lobe, d);
@@ -10794,55 +10618,58 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
    the eye (3) and the bases (8 x 12), each (16 lanes). */
 SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, const R *drows, R *dgauss,
                                    R *lane_sums) {
-    int s, i, j;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
-        V dwi[3], dwo[3], dn[3], dr[9], dlocal[3], dh[3], d = VSET(0), df, dlobe, dwoh, missing2, dcosine,
-                                                          radial, dq[4];
+        V d = VSET(0);
         F(geometry_lanes)(&g, k, gauss + s);
-        for (i = 0; i < 3; i++) {
+        V dwi[3], dwo[3], dn[3], dlocal[3];
+        for (int i = 0; i < 3; i++) {
             dwi[i] = VLOAD(drows + (SSDGS__WI + i) * SSDGS__BLOCK + s);
             dwo[i] = VLOAD(drows + (SSDGS__WO + i) * SSDGS__BLOCK + s);
             dn[i] = VLOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
             dlocal[i] = VSET(0);
         }
-        df = k->deferred ? VSET(0) : VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
-        dlobe = VMUL(df, g.fresnel);
+        const V df =
+            k->deferred ? VSET(0) : VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
+        const V dlobe = VMUL(df, g.fresnel);
         if (k->specular && !k->deferred)
-            for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+            for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
-                  de[3], db[11], lobe, push;
+                  de[3], db[11];
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-                lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
+                const V lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
                 d = VFMA(weight, lobe, d);
                 VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
-                push = VMUL(VMUL(dlobe, weight), lobe);
-                for (i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
-                for (i = 0; i < 11; i++) {
+                const V push = VMUL(VMUL(dlobe, weight), lobe);
+                for (int i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
+                for (int i = 0; i < 11; i++) {
                     R *sum = lane_sums + (6 + 12 * j + i) * 16 + s % 16;
                     VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-        missing2 = VMUL(g.missing, g.missing);
-        dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
-        for (i = 0; i < 3; i++) {
+        V missing2 = VMUL(g.missing, g.missing);
+        const V dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
+        V dr[9], dh[3];
+        for (int i = 0; i < 3; i++) {
             dh[i] = VFMA(dwoh, g.wo[i],
                          VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
             dwo[i] = VFMA(dwoh, g.h[i], dwo[i]);
-            for (j = 0; j < 3; j++) dr[3 * i + j] = VMUL(g.h[i], dlocal[j]);
+            for (int j = 0; j < 3; j++) dr[3 * i + j] = VMUL(g.h[i], dlocal[j]);
         }
         /* f_d = max(0, n.wi) */
-        dcosine = VSEL(VLT(VSET(0), g.cosine), VLOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), VSET(0));
-        radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
-        for (i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
+        const V dcosine =
+            VSEL(VLT(VSET(0), g.cosine), VLOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), VSET(0));
+        V radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+        for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
             const V dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
             dwi[i] = VFMA(dcosine, g.r[3 * i + 2], VADD(dwi[i], dsum));
             dwo[i] = VADD(dwo[i], dsum);
             dr[3 * i + 2] = VADD(dr[3 * i + 2], VFMA(dcosine, g.wi[i], dn[i]));
         }
+        V dq[4];
         F(rotation_backward)(dq, g.q, g.inverse_q, dr);
-        for (i = 0; i < 4; i++) {
+        for (int i = 0; i < 4; i++) {
             R *out = dgauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s;
             VSTORE(out, VADD(VLOAD(out), dq[i]));
         }
@@ -10851,7 +10678,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         radial =
             VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), radial);
         missing2 = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
             const V to_light =
                 k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
@@ -10883,47 +10710,46 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
                                            const V pixel[2], const R *layers) {
     const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
             *normal = more + SSDGS__TILE_LAYER;
-    V at[3], d2;
-    int i, j;
     g->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(more + 32), VSET(SSDGS__THIN)));
     g->depth = VMUL(VLOAD(more), g->inverse_cover);
     g->f0 = VMUL(VLOAD(more + 16), g->inverse_cover);
     g->to_camera[0] = VMUL(VSUB(pixel[0], VSET(k->cx)), VSET(k->inverse_fx));
     g->to_camera[1] = VMUL(VSUB(pixel[1], VSET(k->cy)), VSET(k->inverse_fy));
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         g->ray[i] = VFMA(VSET(k->view[i]), g->to_camera[0],
                          VFMA(VSET(k->view[4 + i]), g->to_camera[1], VSET(k->view[8 + i])));
-    d2 = VDOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
+    V d2 = VDOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
     g->inverse_ray = VDIV(VSET(1), VSQRT(d2));
-    for (i = 0; i < 3; i++) {
+    V at[3];
+    for (int i = 0; i < 3; i++) {
         at[i] = VFMA(g->ray[i], g->depth, VSET(k->eye[i]));
         g->wo[i] = VNEG(VMUL(g->ray[i], g->inverse_ray));
         g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), at[i]);
     }
     d2 = VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
     g->inverse_light = k->directional ? VSET(1) : VDIV(VSET(1), VSQRT(d2));
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         g->wi[i] = VMUL(g->wi[i], g->inverse_light);
         g->h[i] = VADD(g->wi[i], g->wo[i]);
     }
     F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &g->fifth);
     g->fresnel = VFMA(VSUB(VSET(1), g->f0), g->fifth, g->f0);
-    for (i = 0; i < 3; i++) g->n[i] = VLOAD(normal + 16 * i);
+    for (int i = 0; i < 3; i++) g->n[i] = VLOAD(normal + 16 * i);
     d2 = VDOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
     g->half = VAND(g->half,
                    VGE(d2, VSET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
     g->inverse_n = VDIV(VSET(1), VSQRT(VMAX(d2, VSET(SSDGS__THIN * SSDGS__THIN))));
-    for (i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
+    for (int i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
     g->along = VDOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
     g->cosine = VMAX(VSET(0), VDOT3(g->n[0], g->n[1], g->n[2], g->wi[0], g->wi[1], g->wi[2]));
     g->inverse_woh = VDIV(VSET(1), VMAX(VSET(SSDGS__GRAZING), VSUB(VSET(1), g->missing)));
     g->microfacet = VMUL(g->cosine, VMUL(g->inverse_woh, g->inverse_woh));
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         g->p[0][i] = VFNMA(g->n[i], g->along, g->h[i]);
         g->p[1][i] = g->h[i];
     }
-    for (j = 0; j < 2; j++) {
-        for (i = 0; i < 3; i++)
+    for (int j = 0; j < 2; j++) {
+        for (int i = 0; i < 3; i++)
             g->row[j][i] = VMUL(
                 g->inverse_cover,
                 VFMA(VLOAD(q + 16 * i), g->p[j][i],
@@ -10941,8 +10767,7 @@ SSDGS__FI V F(glow_lobe)(const R *basis, const V q[2]) {
 
 SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
     V sum = VSET(0);
-    int j;
-    for (j = 0; j < SSDGS_ASG_COUNT; j++)
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++)
         sum = VFMA(VSET(k->basis[12 * j + 10]), F(glow_lobe)(k->basis + 12 * j, q), sum);
     return sum;
 }
@@ -11000,26 +10825,26 @@ SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, 
 
 /* Adds the light's diffuse and specular terms to layer 0. visibility: visibility, in; S, out. */
 SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R *layers, R *visibility) {
-    int micro, v, c;
-    for (micro = 0; micro < 16; micro++) {
+    for (int micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
           *s = visibility + micro * 64;
         F(pixel_centres)(tile, micro, px, py);
-        for (v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
+        for (int v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            F(highlight_geometry) g;
-            V value, factor;
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
-            factor = arrival.factor;
+            const V factor = arrival.factor;
             VSTORE(s + 16, factor);
-            for (c = 0; c < 3; c++)
+            for (int c = 0; c < 3; c++)
                 VSTORE(at + 16 * c, VFMA(factor, VLOAD(m + SSDGS__TILE_LAYER + 16 * c), VLOAD(at + 16 * c)));
             if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
+            F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
-            value = VMUL(factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0)));
-            for (c = 0; c < 3; c++) VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
+            const V value =
+                VMUL(factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0)));
+            for (int c = 0; c < 3; c++)
+                VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
         }
     }
 }
@@ -11029,28 +10854,26 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
 SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers,
                                      const R *visibility, R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
-    int micro, v, i, j;
-    for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
-        for (v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
-    for (micro = 0; micro < 16; micro++) {
+    for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
+        for (int v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
+    for (int micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
                 *s = visibility + micro * 64;
         R *d = gradient + micro * 64, *dm = d + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
         F(pixel_centres)(tile, micro, px, py);
-        for (v = 0; v < SSDGS__NV;
+        for (int v = 0; v < SSDGS__NV;
              v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            F(highlight_geometry) g;
-            V glow, value, push = VSET(0), dq[2], df0, dwoh, dmicrofacet, dcosine, dh[3], dn[3], dwo[3], dsum,
-                           radial, along, ddepth, dat[3], dray, dcover, to, dfactor = VSET(0);
+            V push = VSET(0), dfactor = VSET(0);
             R *dlayer = d + SSDGS__TILE_LAYER;
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
+            F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
-            glow = F(glow)(k, g.q);
-            value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
-            for (i = 0; i < 3; i++) {
+            const V glow = F(glow)(k, g.q);
+            const V value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
+            for (int i = 0; i < 3; i++) {
                 const V pull = VMUL(VLOAD(d + 16 * i), arrival.factor);
                 VSTORE(dm + 16 * i, VMUL(pull, value));
                 VSTORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
@@ -11059,12 +10882,13 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                     VFMA(VLOAD(d + 16 * i),
                          VFMA(value, VLOAD(m + 16 * i), VLOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
             }
-            dcover = F(arrival_backward)(&arrival, k, dfactor, d);
+            V dcover = F(arrival_backward)(&arrival, k, dfactor, d);
             push = VSEL(g.half, push, VSET(0));
-            dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
+            const V dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
             push = VMUL(push, g.microfacet);
+            V dq[2];
             dq[0] = dq[1] = VSET(0);
-            for (j = 0; j < SSDGS_ASG_COUNT;
+            for (int j = 0; j < SSDGS_ASG_COUNT;
                  j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
                 const R *b = k->basis + 12 * j;
                 const V lobe = VMUL(VMUL(push, g.fresnel), F(glow_lobe)(b, g.q)),
@@ -11081,51 +10905,54 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             }
             /* F = F0 + (1 - F0) (1 - wo.h)^5 */
             push = VMUL(push, glow);
-            df0 = VMUL(push, VSUB(VSET(1), g.fifth));
-            to = VMUL(g.missing, g.missing);
-            dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
+            const V df0 = VMUL(push, VSUB(VSET(1), g.fifth));
+            V to = VMUL(g.missing, g.missing);
+            V dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
             to = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
             dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), to, VSET(0)));
-            dcosine =
+            const V dcosine =
                 VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
-            for (j = 0; j < 2; j++) {
+            for (int j = 0; j < 2; j++) {
                 to = VMUL(dq[j], g.inverse_cover);
-                for (i = 0; i < 3; i++) {
+                for (int i = 0; i < 3; i++) {
                     const V twice = VMUL(VMUL(VSET(2), to), g.p[j][i]);
                     R *cross = dlayer + SSDGS__TILE_LAYER + 16 * i;
                     VSTORE(dlayer + 16 * i, VFMA(VMUL(to, g.p[j][i]), g.p[j][i], VLOAD(dlayer + 16 * i)));
                     VSTORE(cross, VFMA(twice, g.p[j][(i + 1) % 3], VLOAD(cross)));
                 }
             }
-            for (i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
-            along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
-            for (i = 0; i < 3; i++) { /* p = h - n (n.h) */
+            V dh[3];
+            for (int i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
+            V along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
+            V dn[3], dwo[3];
+            for (int i = 0; i < 3; i++) { /* p = h - n (n.h) */
                 dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along))));
                 dh[i] =
                     VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
                 dwo[i] = VMUL(dwoh, g.h[i]);
             }
-            radial = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
-            for (i = 0; i < 3; i++) {
+            V radial = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
+            for (int i = 0; i < 3; i++) {
                 R *out = dlayer + 3 * SSDGS__TILE_LAYER + 16 * i;
                 VSTORE(out, VFMA(VFNMA(g.n[i], radial, dn[i]), g.inverse_n, VLOAD(out)));
             }
             radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
-            for (i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
-                dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
+            for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
+                const V dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
                 dwo[i] = VADD(dwo[i], dsum);
                 dh[i] = VFMA(dcosine, g.n[i], dsum);
             }
             radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
             along = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
-            ddepth = VSET(0);
-            for (i = 0; i < 3;
+            V ddepth = VSET(0);
+            V dat[3];
+            for (int i = 0; i < 3;
                  i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
                 dat[i] = k->directional ? VSET(0) : VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
                 ddepth = VFMA(dat[i], g.ray[i], ddepth);
                 sum[i][v] = VSUB(sum[i][v], dat[i]);
                 sum[3 + i][v] = VADD(sum[3 + i][v], dat[i]);
-                dray = VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along), dwo[i]), g.inverse_ray));
+                const V dray = VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along), dwo[i]), g.inverse_ray));
                 sum[6 + i][v] = VFMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */
                 sum[9 + i][v] = VFMA(dray, g.to_camera[1], sum[9 + i][v]);
                 sum[12 + i][v] = VADD(dray, sum[12 + i][v]);
@@ -11138,7 +10965,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             VSTORE(dlayer + 32, VFNMA(dcover, g.inverse_cover, VLOAD(dlayer + 32)));
         }
     }
-    for (i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
+    for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
 }
 
 /* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on, softness of its logit. */
@@ -11150,19 +10977,20 @@ SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_L
 /* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0,
    softness. */
 SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
-    int s, i, j;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        V raw[4], q[4], r[9], sharp[2];
-        for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        V raw[4];
+        for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        V q[4], r[9];
         F(rotation)(raw, q, r);
-        for (j = 0; j < 2; j++)
+        V sharp[2];
+        for (int j = 0; j < 2; j++)
             sharp[j] = F(sharpness)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
-        for (i = 0; i < 6; i++) {
+        for (int i = 0; i < 6; i++) {
             const int a = 3 * (i % 3), b = i < 3 ? a : (a + 3) % 9;
             VSTORE(rows + i * SSDGS__BLOCK + s,
                    VFMA(VMUL(sharp[0], r[a]), r[b], VMUL(VMUL(sharp[1], r[a + 1]), r[b + 1])));
         }
-        for (i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
+        for (int i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
         VSTORE(rows + 9 * SSDGS__BLOCK + s,
                F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
         VSTORE(rows + 10 * SSDGS__BLOCK + s,
@@ -11172,20 +11000,21 @@ SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
 
 /* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK). */
 SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
-    int s, i, j;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        V raw[4], q[4], r[9], dr[9], dq[4], inverse_q, f0, soft;
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        V raw[4];
         R *out = dgauss + SSDGS_FRAME * SSDGS__BLOCK + s;
-        for (i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
-        inverse_q = F(rotation)(raw, q, r);
-        for (i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
-        for (j = 0; j < 2;
+        for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        V q[4], r[9];
+        const V inverse_q = F(rotation)(raw, q, r);
+        V dr[9];
+        for (int i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
+        for (int j = 0; j < 2;
              j++) { /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
             const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
                     sharp = F(sharpness)(log_sharp);
             R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
             V product = VSET(0);
-            for (i = 0; i < 3; i++) {
+            for (int i = 0; i < 3; i++) {
                 const int next = (i + 1) % 3, before = (i + 2) % 3;
                 const V row =
                     VFMA(VMUL(VSET(2), VLOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
@@ -11197,12 +11026,13 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
             product = VSEL(VLT(VABS(log_sharp), VSET(SSDGS__SHARPEST)), VMUL(product, sharp), VSET(0));
             VSTORE(dsharp, VADD(VLOAD(dsharp), product));
         }
+        V dq[4];
         F(rotation_backward)(dq, q, inverse_q, dr);
-        for (i = 0; i < 4; i++, out += SSDGS__BLOCK) VSTORE(out, VADD(VLOAD(out), dq[i]));
-        f0 = F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
+        for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) VSTORE(out, VADD(VLOAD(out), dq[i]));
+        const V f0 = F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
         out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
         VSTORE(out, VFMA(VFNMA(f0, f0, f0), VLOAD(drows + 9 * SSDGS__BLOCK + s), VLOAD(out)));
-        soft = F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
+        const V soft = F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
         out += SSDGS__BLOCK;
         VSTORE(out, VFMA(VFNMA(soft, soft, soft), VLOAD(drows + 10 * SSDGS__BLOCK + s), VLOAD(out)));
     }
@@ -11264,13 +11094,12 @@ SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
 SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility,
                          const R *shadow, const R *optics, R *out) {
-    int s, c;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
                 factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
         V profile = VSET(0), unit[3];
         R *o = out + s;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             const V power = VMUL(irradiance, VSET(k->intensity[c])), shaded = VMUL(power, factor);
             const V lit = k->deferred ? power : shaded;
             if (k->diffuse) {
@@ -11307,8 +11136,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                                   const R *visibility, const R *shadow, const R *optics, const R *dcolor,
                                   const R *ddiffuse, const R *dspecular, R *dgauss, R *drows, R *dshadow,
                                   R *doptics, R *dvisibility) {
-    int s, c, i;
-    for (s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
                 factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
         const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s),
@@ -11316,8 +11144,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
         const V direct = k->deferred ? VSET(1) : factor;
         V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0),
           profile = VSET(0), unit[3], d[3], dunit[3];
-        for (i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
-        for (c = 0; c < 3; c++) {
+        for (int i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
+        for (int c = 0; c < 3; c++) {
             const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
             if (k->diffuse) { /* (c_d / pi) f_d S */
                 const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
@@ -11346,7 +11174,6 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                         kss = F(softplus)(raw);
                 R *out = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
                 const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
-                V dprofile;
                 if (c == 0 || k->per_channel_optics) {
                     F(optics)(k, optics, c, s, unit);
                     profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
@@ -11356,10 +11183,10 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
                 dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
                 if (k->shadow_on_scattering) dfactor = VFMA(VMUL(g, irradiance), VMUL(kss, profile), dfactor);
-                dprofile = VMUL(lamp, kss);
-                for (i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
+                const V dprofile = VMUL(lamp, kss);
+                for (int i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
                 if (k->per_channel_optics)
-                    for (i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
+                    for (int i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
                         VSTORE(doptics + (3 * i + c) * SSDGS__BLOCK + s,
                                VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
                         dunit[i] = VSET(0);
@@ -11368,7 +11195,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
         }
         if (k->scattering) {
             if (!k->per_channel_optics)
-                for (i = 0; i < 2; i++)
+                for (int i = 0; i < 2; i++)
                     VSTORE(doptics + i * SSDGS__BLOCK + s,
                            VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
             VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
@@ -11394,12 +11221,10 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
 SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
                            R *d_mean, R *d_square, R *d_product, R sums[3]) {
     const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
-    V total[3][SSDGS__NV];
-    int x, t, m;
-    for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
+    for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[5];
-        for (m = 0; m < 5; m++) sum[m] = zero;
-        for (t = -5; t <= 5; t++) {
+        for (int m = 0; m < 5; m++) sum[m] = zero;
+        for (int t = -5; t <= 5; t++) {
             const V w = VSET(ssdgs__window[t + 5]);
             const V i = VLOAD(image + t * (ptrdiff_t)stride + x),
                     j = VLOAD(reference + t * (ptrdiff_t)stride + x);
@@ -11410,46 +11235,46 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
             sum[3] = VFMA(wj, j, sum[3]);
             sum[4] = VFMA(wi, j, sum[4]);
         }
-        for (m = 0; m < 5; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+        for (int m = 0; m < 5; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
     }
-    for (m = 0; m < 3 * SSDGS__NV; m++) total[m / SSDGS__NV][m % SSDGS__NV] = zero;
-    for (x = 0; x < width; x += SSDGS__VW) {
+    V total[3][SSDGS__NV];
+    for (int m = 0; m < 3 * SSDGS__NV; m++) total[m / SSDGS__NV][m % SSDGS__NV] = zero;
+    for (int x = 0; x < width; x += SSDGS__VW) {
         const int v = x / SSDGS__VW % SSDGS__NV;
-        V e[5], mi, mj, vi, vj, cov, a1, a2, b1, b2, inverse, ssim, by_cov, by_var, diff, by_mean;
+        V e[5];
         const VM inside = VLT(VLOAD(ssdgs__count), VSET(width - x));
-        VM varies;
-        for (m = 0; m < 5; m++) {
+        for (int m = 0; m < 5; m++) {
             const R *row = scratch + (size_t)m * stride + 16 + x;
             e[m] = zero;
-            for (t = -5; t <= 5; t++) e[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), e[m]);
+            for (int t = -5; t <= 5; t++) e[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), e[m]);
         }
-        mi = VADD(e[0], half);
-        mj = VADD(e[1], half);
-        vi = VFNMA(e[0], e[0], e[2]);
-        varies = VLT(zero, vi);
+        const V mi = VADD(e[0], half);
+        const V mj = VADD(e[1], half);
+        V vi = VFNMA(e[0], e[0], e[2]);
+        const VM varies = VLT(zero, vi);
         vi = VMAX(vi, zero);
-        vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
-        cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]),
-                   zero); /* what does not vary does so with nothing */
-        a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
-        a2 = VFMA(VSET(2), cov, c2);
-        b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
-        b2 = VADD(VADD(vi, vj), c2);
-        inverse = VDIV(VSET(1), VMUL(b1, b2));
-        ssim = VMUL(VMUL(a1, a2), inverse);
-        by_cov = VMUL(VMUL(VSET(2), a1), inverse);
-        by_var = VSEL(varies, VNEG(VDIV(ssim, b2)), zero);
-        by_mean = VMUL(VSET(2), VFNMA(VMUL(ssim, mi), VDIV(VSET(1), b1), VMUL(VMUL(mj, a2), inverse)));
+        const V vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
+        const V cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]),
+                           zero); /* what does not vary does so with nothing */
+        const V a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
+        const V a2 = VFMA(VSET(2), cov, c2);
+        const V b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
+        const V b2 = VADD(VADD(vi, vj), c2);
+        const V inverse = VDIV(VSET(1), VMUL(b1, b2));
+        const V ssim = VMUL(VMUL(a1, a2), inverse);
+        const V by_cov = VMUL(VMUL(VSET(2), a1), inverse);
+        const V by_var = VSEL(varies, VNEG(VDIV(ssim, b2)), zero);
+        V by_mean = VMUL(VSET(2), VFNMA(VMUL(ssim, mi), VDIV(VSET(1), b1), VMUL(VMUL(mj, a2), inverse)));
         by_mean = VFNMA(by_cov, e[1], VFNMA(VMUL(VSET(2), by_var), e[0], by_mean));
         VSTORE(d_mean + x, VSEL(inside, by_mean, zero));
         VSTORE(d_square + x, VSEL(inside, by_var, zero));
         VSTORE(d_product + x, VSEL(inside, by_cov, zero));
-        diff = VSEL(inside, VSUB(VLOAD(image + x), VLOAD(reference + x)), zero);
+        const V diff = VSEL(inside, VSUB(VLOAD(image + x), VLOAD(reference + x)), zero);
         total[0][v] = VADD(total[0][v], VSEL(inside, ssim, zero));
         total[1][v] = VADD(total[1][v], VABS(diff));
         total[2][v] = VFMA(diff, diff, total[2][v]);
     }
-    for (m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
+    for (int m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
 }
 
 /* gradient = by_l1 sign(i - j) + by_ssim (B[d_mean] + 2 i B[d_square] + j B[d_product]), B the window
@@ -11457,27 +11282,26 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
 SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
                                     const R *d_mean, const R *d_square, const R *d_product, R by_l1,
                                     R by_ssim, R *gradient) {
-    int x, t, m;
-    for (x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
+    for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[3];
-        for (m = 0; m < 3; m++) sum[m] = VSET(0);
-        for (t = -5; t <= 5; t++) {
+        for (int m = 0; m < 3; m++) sum[m] = VSET(0);
+        for (int t = -5; t <= 5; t++) {
             const V w = VSET(ssdgs__window[t + 5]);
             sum[0] = VFMA(w, VLOAD(d_mean + t * (ptrdiff_t)stride + x), sum[0]);
             sum[1] = VFMA(w, VLOAD(d_square + t * (ptrdiff_t)stride + x), sum[1]);
             sum[2] = VFMA(w, VLOAD(d_product + t * (ptrdiff_t)stride + x), sum[2]);
         }
-        for (m = 0; m < 3; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+        for (int m = 0; m < 3; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
     }
-    for (x = 0; x < width; x += SSDGS__VW) {
+    for (int x = 0; x < width; x += SSDGS__VW) {
         const V i = VLOAD(image + x), j = VLOAD(reference + x), diff = VSUB(i, j), zero = VSET(0);
-        V b[3], g;
-        for (m = 0; m < 3; m++) {
+        V b[3];
+        for (int m = 0; m < 3; m++) {
             const R *row = scratch + (size_t)m * stride + 16 + x;
             b[m] = zero;
-            for (t = -5; t <= 5; t++) b[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), b[m]);
+            for (int t = -5; t <= 5; t++) b[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), b[m]);
         }
-        g = VMUL(VSET(by_ssim), VFMA(VMUL(VSET(2), i), b[1], VFMA(j, b[2], b[0])));
+        V g = VMUL(VSET(by_ssim), VFMA(VMUL(VSET(2), i), b[1], VFMA(j, b[2], b[0])));
         g = VADD(g, VSEL(VLT(zero, diff), VSET(by_l1), VSEL(VLT(diff, zero), VSET(-by_l1), zero)));
         VSTORE(gradient + x, g);
     }
@@ -11492,13 +11316,11 @@ SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size
                                 R *out) {
     const V zero = VSET(0), most = VSET(1e12);
     const R focal[2] = {camera->fx, camera->fy};
-    int x, i;
-    for (x = 0; x < camera->width; x += SSDGS__VW) {
+    for (int x = 0; x < camera->width; x += SSDGS__VW) {
         const ptrdiff_t step[2] = {1, (ptrdiff_t)stride};
         const V here = VLOAD(depth + x);
-        V slope[2], least = here, n[3], length, ray;
-        VM known;
-        for (i = 0; i < 2; i++) {
+        V slope[2], least = here;
+        for (int i = 0; i < 2; i++) {
             const V before = VLOAD(depth + x - step[i]), after = VLOAD(depth + x + step[i]);
             const V rise[2] = {VSUB(here, before), VSUB(after, here)};
             const VM nearer = VLT(VABS(rise[0]), VABS(rise[1]));
@@ -11507,14 +11329,16 @@ SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size
                             VMAX(VSEL(nearer, before, after), VSET(1e-30)));
             slope[i] = VMAX(VNEG(most), VMIN(most, slope[i]));
         }
-        known = VLT(zero, least);
-        ray = VDIV(VADD(VADD(VLOAD(ssdgs__count), VSET(x)), VSET((R)0.5 - camera->cx)), VSET(camera->fx));
+        const VM known = VLT(zero, least);
+        const V ray =
+            VDIV(VADD(VADD(VLOAD(ssdgs__count), VSET(x)), VSET((R)0.5 - camera->cx)), VSET(camera->fx));
+        V n[3];
         n[0] = slope[0];
         n[1] = slope[1];
         n[2] = VNEG(
             VFMA(slope[0], ray, VFMA(slope[1], VSET(((R)y + (R)0.5 - camera->cy) / camera->fy), VSET(1))));
-        length = VDIV(VSET(-weight), VSQRT(VDOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
-        for (i = 0; i < 3; i++)
+        const V length = VDIV(VSET(-weight), VSQRT(VDOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
+        for (int i = 0; i < 3; i++)
             VSTORE(out + (size_t)i * stride + x,
                    VSEL(known,
                         VMUL(length, VDOT3(VSET(camera->view[i]), VSET(camera->view[4 + i]),
@@ -11542,10 +11366,10 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
    overflows. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean,
                              R correct_square, R epsilon) {
-    V g = VLOAD(gradient), m, v;
+    V g = VLOAD(gradient);
     g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
-    m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
-    v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
+    V m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
+    V v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
     m = VSEL(VLT(VABS(m), VSET(1e-30)), VSET(0), m);
     v = VSEL(VLT(v, VSET(1e-36)), VSET(0), v);
     VSTORE(mean, m);
@@ -11557,21 +11381,21 @@ SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square
 
 SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean,
                        R correct_square, R epsilon) {
-    R tail[4][SSDGS__VW];
-    size_t i, l;
+    size_t i;
     for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW) {
         F(adam_lanes)
         (parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
     }
     if (i == n) return;
-    for (l = 0; l < SSDGS__VW; l++) {
+    R tail[4][SSDGS__VW];
+    for (size_t l = 0; l < SSDGS__VW; l++) {
         tail[0][l] = i + l < n ? parameter[i + l] : 0;
         tail[1][l] = i + l < n ? gradient[i + l] : 0;
         tail[2][l] = i + l < n ? mean[i + l] : 0;
         tail[3][l] = i + l < n ? square[i + l] : 0;
     }
     F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate, correct_mean, correct_square, epsilon);
-    for (l = 0; i + l < n; l++) {
+    for (size_t l = 0; i + l < n; l++) {
         parameter[i + l] = tail[0][l];
         mean[i + l] = tail[2][l];
         square[i + l] = tail[3][l];

@@ -42,8 +42,9 @@ static void *make(size_t count, size_t size) {
 
 static double now(void) {
 #ifdef _WIN32
-    LARGE_INTEGER ticks, rate;
+    LARGE_INTEGER ticks;
     QueryPerformanceCounter(&ticks);
+    LARGE_INTEGER rate;
     QueryPerformanceFrequency(&rate);
     return (double)ticks.QuadPart / (double)rate.QuadPart;
 #else
@@ -104,9 +105,8 @@ static double *new_row(table *t, const char *name) {
 static const double *add_row(table *t, const char *name, ...) {
     double *values = new_row(t, name);
     va_list arguments;
-    int c;
     va_start(arguments, name);
-    for (c = 0; c < t->column_count; c++) values[c] = va_arg(arguments, double);
+    for (int c = 0; c < t->column_count; c++) values[c] = va_arg(arguments, double);
     va_end(arguments);
     return values;
 }
@@ -126,11 +126,10 @@ static void add_facts(bench *b, const char *keys, ...) {
 }
 
 static void print_table(const table *t) {
-    int r, c;
-    for (r = -1; r < t->row_count; r++) { /* the names of the columns first */
+    for (int r = -1; r < t->row_count; r++) { /* the names of the columns first */
         const char *column = t->columns;
         printf("%s%-30s", r < 0 ? "\n" : "", r < 0 ? t->key : t->rows[r].name);
-        for (c = 0; c < t->column_count; c++) {
+        for (int c = 0; c < t->column_count; c++) {
             const int length = (int)strcspn(column, " "), width = length < 8 ? 9 : length + 1;
             const double x = r < 0 ? none : t->rows[r].value[c], size = fabs(x); /* three digits of it */
             if (x <= none) printf("%*.*s", width, r < 0 ? length : 1, r < 0 ? column : "-");
@@ -155,26 +154,25 @@ static void write_number(FILE *file, const char *key, int length, double x) {
 }
 
 static void write_json(const bench *b, FILE *file) {
-    int i, r, c;
     fprintf(file,
             "{\n \"cpu\": \"%s\",\n \"isa\": \"%s\",\n \"threads\": %d,\n \"compiler\": \"%s\",\n "
             "\"dataset\": \"",
             b->cpu, ssdgs_isa_string((ssdgs_isa)b->best_isa), b->threads[b->thread_count - 1], COMPILER);
-    for (i = 0; b->dataset[i]; i++)
+    for (int i = 0; b->dataset[i]; i++)
         fputc(b->dataset[i] == '\\' || b->dataset[i] == '"' ? '/' : b->dataset[i], file);
     fprintf(file, "\"");
-    for (i = 0; i < b->fact_count; i++) {
+    for (int i = 0; i < b->fact_count; i++) {
         fprintf(file, ",\n ");
         write_number(file, b->facts[i].key, 64, b->facts[i].value);
     }
     fprintf(file, ",\n \"tables\": {");
-    for (i = 0; i < b->table_count; i++) {
+    for (int i = 0; i < b->table_count; i++) {
         const table *t = b->tables + i;
         fprintf(file, "%s\n  \"%s\": [", i ? "," : "", t->key);
-        for (r = 0; r < t->row_count; r++) {
+        for (int r = 0; r < t->row_count; r++) {
             const char *column = t->columns;
             fprintf(file, "%s\n   {\"name\": \"%s\"", r ? "," : "", t->rows[r].name);
-            for (c = 0; c < t->column_count; c++, column += strcspn(column, " ") + 1) {
+            for (int c = 0; c < t->column_count; c++, column += strcspn(column, " ") + 1) {
                 fprintf(file, ", ");
                 write_number(file, column, (int)strcspn(column, " "), t->rows[r].value[c]);
             }
@@ -254,19 +252,18 @@ static ssdgs_real *take(ssdgs_context *context, size_t count) {
 
 static network make_network(ssdgs_model *model) {
     network n;
-    size_t widest = 16, i, at = 0;
-    int l;
+    size_t widest = 16, at = 0;
     memset(&n, 0, sizeof n);
     n.layers = ssdgs__network_sizes(&model->settings, 0, n.sizes);
     n.weights = take(model->context, ssdgs__network_count(&model->settings, 0) + 16);
     n.lists = (ssdgs__row_lists *)make(1, sizeof *n.lists);
     ssdgs__row_lists_fill(n.lists);
-    for (l = 0; l <= n.layers; l++) {
+    for (int l = 0; l <= n.layers; l++) {
         if (l) {
             const size_t products = (size_t)n.sizes[l] * (size_t)n.sizes[l - 1],
                          end = at + products + (size_t)n.sizes[l];
             n.operations += 2.0 * (double)products * SSDGS__BLOCK;
-            for (i = 0; at < end; i++, at++)
+            for (size_t i = 0; at < end; i++, at++)
                 n.weights[at] =
                     i < products ? (ssdgs_real)((ssdgs__uniform(3, at) - 0.5) / n.sizes[l - 1]) : 2;
         }
@@ -279,9 +276,9 @@ static network make_network(ssdgs_model *model) {
     n.inputs = n.transposed + widest * SSDGS__BLOCK;
     n.outputs = n.inputs + widest * SSDGS__BLOCK;
     n.gradient = take(model->context, ssdgs__slot_gradient_size(n.sizes, n.layers));
-    for (i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
+    for (size_t i = 0; i < (size_t)n.sizes[0] * SSDGS__BLOCK; i++) /* as sines and cosines are */
         n.inputs[i] = (ssdgs_real)(2 * ssdgs__uniform(1, i) - 1);
-    for (i = 0; i < (size_t)n.sizes[n.layers] * SSDGS__BLOCK; i++)
+    for (size_t i = 0; i < (size_t)n.sizes[n.layers] * SSDGS__BLOCK; i++)
         n.output_gradient[i] = (ssdgs_real)(2e-3 * ssdgs__uniform(2, i) - 1e-3);
     return n;
 }
@@ -305,11 +302,9 @@ static void kernel_task(void *data, int task) {
     const network *n = job->net;
     const uint64_t *p = job->words + (size_t)task * job->share;
     uint64_t a = 0, b = 0, c = 0, d = 0;
-    size_t i;
-    long r;
     if (job->work == PEAK_RATE) sink = (double)job->peak(job->repeat);
     else
-        for (r = 0; r < job->repeat; r++) switch (job->work) {
+        for (long r = 0; r < job->repeat; r++) switch (job->work) {
             case FORWARD:
                 ssdgs__network_forward(k, n->sizes, n->layers, n->weights, n->lists, n->inputs, n->outputs);
                 break;
@@ -319,7 +314,7 @@ static void kernel_task(void *data, int task) {
                                         n->spare, n->transposed, n->lists, n->sizes[0], n->gradient);
                 break;
             default:
-                for (i = 0; i < job->share; i += 8) {
+                for (size_t i = 0; i < job->share; i += 8) {
                     a += p[i] + p[i + 1], b += p[i + 2] + p[i + 3];
                     c += p[i + 4] + p[i + 5], d += p[i + 6] + p[i + 7];
                 }
@@ -340,18 +335,17 @@ static kernel make_kernel(kind work, ssdgs_context *context, int isa, const netw
 /* All in turn until the seconds are over: what disturbs one disturbs its neighbours too. */
 static void time_kernels(kernel *kernels, int count, double seconds) {
     const double end = now() + seconds;
-    double start, elapsed, rate;
-    int i, round;
-    for (round = 0; round < 4 || now() < end; round++)
-        for (i = 0; i < count; i++) {
+    double elapsed;
+    for (int round = 0; round < 4 || now() < end; round++)
+        for (int i = 0; i < count; i++) {
             kernel *k = kernels + i;
             for (;; k->repeat *= 2) {
-                start = now();
+                const double start = now();
                 ssdgs__parallel(k->context, k->context->threads, kernel_task, k);
                 elapsed = now() - start;
                 if (elapsed > 8e-3) break; /* the processor's clock has settled after the one before */
             }
-            rate = 1e-9 * k->operations * (double)k->repeat / elapsed;
+            const double rate = 1e-9 * k->operations * (double)k->repeat / elapsed;
             k->best = rate > k->best ? rate : k->best;
         }
 }
@@ -389,8 +383,8 @@ STAGES(HOOK)
 static void open_session(const bench *b, session *s, int isa, int threads, int hooks,
                          const ssdgs_allocator *allocator) {
     ssdgs_context_desc desc;
-    ssdgs_gpu_hook gpu;
     memset(&desc, 0, sizeof desc);
+    ssdgs_gpu_hook gpu;
     memset(&gpu, 0, sizeof gpu);
     memset(s, 0, sizeof *s);
     desc.isa = (ssdgs_isa)isa;
@@ -447,8 +441,7 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
     const ssdgs_photo *lit = b->photos + (j->fixed_light ? 0 : view * b->photo_count / j->views);
     ssdgs_camera camera = scaled_camera(&seen->camera, j->width, j->height);
     ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    int i;
-    for (i = 0; j->turned_away && i < 4; i++) { /* half a turn about the camera's y */
+    for (int i = 0; j->turned_away && i < 4; i++) { /* half a turn about the camera's y */
         camera.view[i] = -camera.view[i];
         camera.view[8 + i] = -camera.view[8 + i];
     }
@@ -464,29 +457,28 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
 static void time_jobs(bench *b, job *jobs, int count, double seconds) {
     static double best[MAX_JOBS][MAX_PHOTOS][SSDGS_STAGE_COUNT + 1];
     const double end = now() + seconds * (b->quick ? 0.2 : 1);
-    int i, v, round, stage;
     if (count > MAX_JOBS) die("jobs", "too many");
-    for (round = 0; round < 2 || (round < 40 && now() < end); round++)
-        for (i = 0; i < count; i++) {
+    for (int round = 0; round < 2 || (round < 40 && now() < end); round++)
+        for (int i = 0; i < count; i++) {
             job *j = jobs + i;
-            ssdgs_render_stats stats;
             run(b, j, j->views - 1, NULL); /* what is fixed must have been so in the frame before */
-            for (v = 0; v < j->views; v++) {
-                double took[SSDGS_STAGE_COUNT + 1], start;
+            ssdgs_render_stats stats;
+            for (int v = 0; v < j->views; v++) {
                 memset(j->s->stage, 0, sizeof j->s->stage);
-                start = now();
+                const double start = now();
                 run(b, j, v, round ? NULL : &stats);
+                double took[SSDGS_STAGE_COUNT + 1];
                 took[SSDGS_STAGE_COUNT] = now() - start;
                 if (!round && stats.gaussians) j->shaded += (double)stats.shaded / stats.gaussians / j->views;
                 memcpy(took, j->s->stage, sizeof j->s->stage);
-                for (stage = 0; stage <= SSDGS_STAGE_COUNT; stage++)
+                for (int stage = 0; stage <= SSDGS_STAGE_COUNT; stage++)
                     if (!round || took[stage] < best[i][v][stage]) best[i][v][stage] = took[stage];
             }
         }
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         job *j = jobs + i;
-        for (v = 0; v < j->views; v++) {
-            for (stage = 0; stage < SSDGS_STAGE_COUNT; stage++)
+        for (int v = 0; v < j->views; v++) {
+            for (int stage = 0; stage < SSDGS_STAGE_COUNT; stage++)
                 j->stage_ms[stage] += 1e3 * best[i][v][stage] / j->views;
             j->ms += 1e3 * best[i][v][SSDGS_STAGE_COUNT] / j->views;
         }
@@ -503,13 +495,12 @@ enum { PHASES = sizeof phases / sizeof *phases };
 /* The job as a training job at the model's number of Gaussians, on scaled photographs of its views. */
 static job training_job(const bench *b, job j, ssdgs_trainer *trainer, int phase) {
     ssdgs_train_options options = ssdgs_train_options_default();
-    ssdgs_photo photos[MAX_PHOTOS];
-    int v;
     options.iterations = 60000;
     options.densify_every = 1 << 30;
     options.opacity_reset_every = 0;
     options.max_gaussians = SSDGS__MAX_GAUSSIANS;
-    for (v = 0; v < j.views; v++) photos[v] = b->scaled[v * b->photo_count / j.views];
+    ssdgs_photo photos[MAX_PHOTOS];
+    for (int v = 0; v < j.views; v++) photos[v] = b->scaled[v * b->photo_count / j.views];
     j.trainer = trainer;
     if (!trainer)
         check(j.s->context, ssdgs_trainer_create(j.s->model, photos, j.views, &options, &j.trainer));
@@ -531,32 +522,31 @@ static void render_stored(bench *b, session *s, const ssdgs_photo *photo,
                           const ssdgs_render_options *options) {
     ssdgs_image image = {0, b->color, b->alpha, NULL, NULL, NULL, NULL, NULL, NULL};
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    size_t i;
     check(s->context, ssdgs_render_ex(s->model, &photo->camera, &photo->light, 1, options, &image, NULL));
     ssdgs_compose(b->color, b->alpha, pixels, s->model->settings.transfer, black, b->color);
-    for (i = 0; i < 3 * pixels; i++) b->color[i] = b->color[i] < 0 ? 0 : b->color[i] > 1 ? 1 : b->color[i];
+    for (size_t i = 0; i < 3 * pixels; i++)
+        b->color[i] = b->color[i] < 0 ? 0 : b->color[i] > 1 ? 1 : b->color[i];
 }
 
 static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count,
                             quality *out) {
     const int views = s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
-    ssdgs_real *exact[MAX_PHOTOS], *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
-    int o, v;
+    ssdgs_real *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
     memset(out, 0, (size_t)count * sizeof *out);
-    for (o = 0; o < count; o++) {
-        double squares = 0, values = 0, error;
-        for (v = 0; v < views; v++) {
+    ssdgs_real *exact[MAX_PHOTOS];
+    for (int o = 0; o < count; o++) {
+        double squares = 0, values = 0;
+        for (int v = 0; v < views; v++) {
             const ssdgs_photo *photo = b->photos + v * b->photo_count / views;
             const size_t n = (size_t)photo->camera.width * (size_t)photo->camera.height;
             double photo_squares = 0;
-            size_t i;
             render_stored(b, s, photo, options + o);
             if (!o)
                 exact[v] =
                     (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
             ssdgs__photo_planes(photo, black, 0, n, target);
-            for (i = 0; i < 3 * n; i++) {
-                error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
+            for (size_t i = 0; i < 3 * n; i++) {
+                double error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
                 photo_squares += error * error;
                 error = fabs((double)(b->color[i] - exact[v][i]));
                 squares += error * error;
@@ -567,7 +557,7 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
         }
         out[o].psnr_exact = ssdgs__psnr(squares / values);
     }
-    for (v = 0; v < views; v++) free(exact[v]);
+    for (int v = 0; v < views; v++) free(exact[v]);
     free(target);
 }
 
@@ -594,25 +584,25 @@ static void measure_machine(bench *b) {
     table *t = new_table(b, "machine", "fma_gflops read_gb_per_s");
     const size_t words = (size_t)1 << (b->quick ? 25 : 27); /* 256 MiB, 1 GiB: far beyond the caches */
     uint64_t *memory = (uint64_t *)make(words, sizeof *memory);
-    char name[48];
-    int i, n;
     memset(memory, 1, words * sizeof *memory); /* else all its pages are one of zeros */
-    for (i = 0; i < b->isa_count * b->thread_count; i++) {
+    for (int i = 0; i < b->isa_count * b->thread_count; i++) {
         const int isa = b->isas[i / b->thread_count];
-        kernel kernels[2];
         session s;
         open_session(b, &s, isa, b->threads[i % b->thread_count], 0, NULL);
+        kernel kernels[2];
         kernels[0] = kernels[1] = make_kernel(PEAK_RATE, s.context, isa, NULL);
         kernels[1].work = READ;
         kernels[1].words = memory;
         kernels[1].share = words / (size_t)s.context->threads / 8 * 8;
         kernels[1].operations = 8.0 * (double)kernels[1].share * s.context->threads;
-        n = isa == b->best_isa ? 2 : 1;
+        const int n = isa == b->best_isa ? 2 : 1;
         time_kernels(kernels, n, b->quick ? 0.1 : 0.5);
+        char name[48];
         add_row(t, name_of(name, &s, NULL), kernels[0].best, n > 1 ? kernels[1].best : none);
         close_session(&s);
     }
-    n = t->row_count -
+    const int n =
+        t->row_count -
         b->thread_count; /* no program can gain more from a second thread; near 1 the machine was busy */
     add_facts(b, "threads2_speedup_peak",
               b->thread_count > 1 ? t->rows[n + 1].value[0] / t->rows[n].value[0] : none);
@@ -624,21 +614,18 @@ static void measure_machine(bench *b) {
 static void measure_layers(bench *b) {
     table *t = new_table(b, "layers",
                          "peak forward_gflops backward_gflops forward_of_peak backward_of_peak both_of_peak");
-    int i;
-    for (i = 0; i < b->isa_count; i++) {
-        kernel k[3];
-        const double *v;
+    for (int i = 0; i < b->isa_count; i++) {
         session s;
-        network n;
         open_session(b, &s, b->isas[i], 1, 0, NULL);
-        n = make_network(s.model);
+        network n = make_network(s.model);
+        kernel k[3];
         k[0] = make_kernel(PEAK_RATE, s.context, b->isas[i], NULL);
         k[1] = make_kernel(FORWARD, s.context, b->isas[i], &n);
         k[2] = make_kernel(BACKWARD, s.context, b->isas[i], &n);
         time_kernels(k, 3, b->quick ? 0.5 : 2);
-        v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best,
-                    k[1].best / k[0].best, k[2].best / k[0].best,
-                    3 / (1 / k[1].best + 2 / k[2].best) / k[0].best);
+        const double *v = add_row(t, ssdgs_isa_string((ssdgs_isa)b->isas[i]), k[0].best, k[1].best, k[2].best,
+                                  k[1].best / k[0].best, k[2].best / k[0].best,
+                                  3 / (1 / k[1].best + 2 / k[2].best) / k[0].best);
         if (b->isas[i] == b->best_isa) /* of one thread, all of them */
             add_facts(b,
                       "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
@@ -655,25 +642,24 @@ static void measure_layers(bench *b) {
 
 static void measure_stages(bench *b) {
     table *t[2];
-    char name[48];
-    int i, k, stage;
     t[0] = new_table(b, "stages_frame", "project sort bin walk shade composite other total");
     t[1] =
         new_table(b, "stages_training",
                   "project sort bin walk shade composite composite_back shade_back project_back other total");
-    for (i = 0; i < b->isa_count * b->thread_count; i++) {
+    for (int i = 0; i < b->isa_count * b->thread_count; i++) {
         session s;
-        job jobs[2];
         open_session(b, &s, b->isas[i / b->thread_count], b->threads[i % b->thread_count], 1, NULL);
+        job jobs[2];
         jobs[0] = make_job(b, &s, preset(DEFAULT));
         jobs[0].views = jobs[0].views > 4 ? 4 : jobs[0].views;
         jobs[1] = training_job(b, jobs[0], NULL, PHASES - 1);
-        for (k = 0; k < 2; k++) { /* the frame first: steps change the model */
+        for (int k = 0; k < 2; k++) { /* the frame first: steps change the model */
             const int stages = t[k]->column_count - 2;
+            char name[48];
             double *v = new_row(t[k], name_of(name, &s, NULL));
             time_jobs(b, jobs + k, 1, 1);
             v[stages] = v[stages + 1] = jobs[k].ms;
-            for (stage = 0; stage < stages; stage++) v[stages] -= v[stage] = jobs[k].stage_ms[stage];
+            for (int stage = 0; stage < stages; stage++) v[stages] -= v[stage] = jobs[k].stage_ms[stage];
         }
         ssdgs_trainer_destroy(jobs[1].trainer);
         close_session(&s);
@@ -685,25 +671,25 @@ static void measure_stages(bench *b) {
 static void measure_frames(bench *b) {
     table *t =
         new_table(b, "frames", "ms frames_per_s psnr_exact max_error psnr_photo loss_db shaded_fraction");
-    char name[48];
-    int i, n, p;
-    for (i = 0; i < b->isa_count; i++) {
+    for (int i = 0; i < b->isa_count; i++) {
         ssdgs_render_options options[PRESETS];
         session s[3];
         job jobs[3 * PRESETS], *all = jobs + PRESETS * (b->thread_count - 1);
-        quality q[PRESETS];
-        for (n = 0; n < b->thread_count; n++) {
+        for (int n = 0; n < b->thread_count; n++) {
             open_session(b, s + n, b->isas[i], b->threads[n], 0, NULL);
-            for (p = 0; p < PRESETS; p++) jobs[n * PRESETS + p] = make_job(b, s + n, options[p] = preset(p));
+            for (int p = 0; p < PRESETS; p++)
+                jobs[n * PRESETS + p] = make_job(b, s + n, options[p] = preset(p));
         }
+        quality q[PRESETS];
         measure_quality(b, s + b->thread_count - 1, options, PRESETS, q);
         time_jobs(b, jobs, b->thread_count * PRESETS, b->isas[i] == b->best_isa ? 6 : 2);
-        for (n = 0; n < b->thread_count * PRESETS; n++) {
-            p = n % PRESETS;
+        for (int n = 0; n < b->thread_count * PRESETS; n++) {
+            const int p = n % PRESETS;
+            char name[48];
             add_row(t, name_of(name, jobs[n].s, presets[p]), jobs[n].ms, 1e3 / jobs[n].ms, q[p].psnr_exact,
                     q[p].max_error, q[p].psnr_photo, q[EXACT].psnr_photo - q[p].psnr_photo, jobs[n].shaded);
         }
-        for (n = 0; n < b->thread_count; n++) close_session(s + n);
+        for (int n = 0; n < b->thread_count; n++) close_session(s + n);
         if (b->isas[i] != b->best_isa) continue;
         add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps", 1e3 / all[EXACT].ms,
                   1e3 / all[DEFAULT].ms, 1e3 / all[FAST].ms);
@@ -729,16 +715,13 @@ static void measure_sweep(bench *b) {
     table *t = new_table(b, "sweep", "ms rms_error max_error loss_db shaded_fraction");
     ssdgs_render_options options[MAX_JOBS];
     char names[MAX_JOBS][48];
-    job jobs[MAX_JOBS];
-    quality q[MAX_JOBS];
-    session s;
-    int k, i, count;
+    int count;
     for (count = 0; count < PRESETS; count++) {
         options[count] = preset(count);
         snprintf(names[count], sizeof *names, "%s", presets[count]);
     }
-    for (k = 0; k < KNOBS; k++)
-        for (i = 0; knobs[k].values[i] > 0; i++, count++) {
+    for (int k = 0; k < KNOBS; k++)
+        for (int i = 0; knobs[k].values[i] > 0; i++, count++) {
             ssdgs_render_options *o = options + count;
             ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, &o->stop,
                                                &o->alpha_threshold};
@@ -746,14 +729,17 @@ static void measure_sweep(bench *b) {
             *fields[k] = (ssdgs_real)knobs[k].values[i];
             snprintf(names[count], sizeof *names, "%s %g", knobs[k].name, knobs[k].values[i]);
         }
+    session s;
     open_session(b, &s, b->best_isa, 0, 0, NULL);
-    for (i = 0; i < count; i++) {
+    job jobs[MAX_JOBS];
+    for (int i = 0; i < count; i++) {
         jobs[i] = make_job(b, &s, options[i]);
         jobs[i].views = jobs[i].views > 4 ? 4 : jobs[i].views;
     }
+    quality q[MAX_JOBS];
     measure_quality(b, &s, options, count, q);
     time_jobs(b, jobs, count, 12);
-    for (i = 0; i < count; i++)
+    for (int i = 0; i < count; i++)
         add_row(t, names[i], jobs[i].ms, pow(10, -q[i].psnr_exact / 20), q[i].max_error,
                 q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
     close_session(&s);
@@ -778,11 +764,10 @@ static void measure_skipping(bench *b) {
     enum { KINDS = sizeof kinds / sizeof *kinds };
     table *t =
         new_table(b, "skipping", "exact_ms default_ms fast_ms exact_of_all default_of_all fast_of_all");
-    job jobs[PRESETS * KINDS];
     session s;
-    int i, p;
     open_session(b, &s, b->best_isa, 0, 0, NULL);
-    for (i = 0; i < PRESETS * KINDS; i++) {
+    job jobs[PRESETS * KINDS];
+    for (int i = 0; i < PRESETS * KINDS; i++) {
         jobs[i] = make_job(b, &s, preset(i % PRESETS));
         jobs[i].options.terms &= ~kinds[i / PRESETS].skipped_terms;
         jobs[i].fixed_light = kinds[i / PRESETS].fixed_light;
@@ -790,9 +775,9 @@ static void measure_skipping(bench *b) {
         jobs[i].turned_away = kinds[i / PRESETS].turned_away;
     }
     time_jobs(b, jobs, PRESETS * KINDS, 8);
-    for (i = 0; i < KINDS; i++) {
+    for (int i = 0; i < KINDS; i++) {
         double *v = new_row(t, kinds[i].name);
-        for (p = 0; p < PRESETS; p++) {
+        for (int p = 0; p < PRESETS; p++) {
             v[p] = jobs[PRESETS * i + p].ms;
             v[PRESETS + p] = v[p] / jobs[p].ms;
         }
@@ -806,22 +791,21 @@ static void measure_skipping(bench *b) {
 static void replicate(session *s, int count) {
     ssdgs_model *from = s->model, *to;
     const double times = (double)count / from->count, shrink = 0.5 * log(times);
-    size_t i;
-    int c, k;
     check(s->context, ssdgs_model_create(s->context, &from->settings, count, &to));
     memcpy(to->globals, from->globals, from->global_count * sizeof *to->globals);
-    for (i = 0; i < (size_t)count; i++) {
-        ssdgs_real g[SSDGS_CHANNELS], q[4], axes[9];
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t i = 0; i < (size_t)count; i++) {
+        ssdgs_real g[SSDGS_CHANNELS];
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             g[c] = from->gaussians[(size_t)c * from->capacity + (size_t)((double)i / times)];
+        ssdgs_real q[4], axes[9];
         ssdgs__rotation_scalar(g + SSDGS_ROTATION, q, axes);
-        for (k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++) {
             const double shift =
                 exp((double)g[SSDGS_LOG_SCALE + k]) * (2 * ssdgs__uniform(3, 3 * i + (size_t)k) - 1);
-            for (c = 0; c < 3; c++) g[SSDGS_POSITION + c] += (ssdgs_real)shift * axes[3 * c + k];
+            for (int c = 0; c < 3; c++) g[SSDGS_POSITION + c] += (ssdgs_real)shift * axes[3 * c + k];
             g[SSDGS_LOG_SCALE + k] -= (ssdgs_real)shrink;
         }
-        for (c = 0; c < SSDGS_CHANNELS; c++) to->gaussians[(size_t)c * to->capacity + i] = g[c];
+        for (int c = 0; c < SSDGS_CHANNELS; c++) to->gaussians[(size_t)c * to->capacity + i] = g[c];
     }
     check(s->context, ssdgs_model_sort(to));
     ssdgs_model_destroy(from);
@@ -865,8 +849,7 @@ static void open_metered(const bench *b, session *s, meter *m, int gaussians) {
 /* Slope of the logarithms of column y over those of column x, by least squares. */
 static double exponent(const table *t, int first, int count, int x, int y) {
     double sx = 0, sy = 0, sxx = 0, sxy = 0;
-    int i;
-    for (i = first; i < first + count; i++) {
+    for (int i = first; i < first + count; i++) {
         const double u = log(t->rows[i].value[x]), v = log(t->rows[i].value[y]);
         sx += u, sy += v, sxx += u * u, sxy += u * v;
     }
@@ -881,27 +864,25 @@ static void measure_scaling(bench *b) {
     table *t = new_table(b, "scaling", "gaussians pixels ms frames_per_s mib_held second_frame_allocations");
     const int most = b->quick ? 3 : b->prefix[0] ? 5 : SIZES; /* the published network takes long */
     const row *last = t->rows + (most - 1 < MILLION ? most - 1 : MILLION);
-    int i, k;
-    for (i = 0; i <= SIZES + SCREENS; i++) { /* sizes; both; screens at the model's own size */
-        char name[48];
+    for (int i = 0; i <= SIZES + SCREENS; i++) { /* sizes; both; screens at the model's own size */
+        if ((i >= most && i < SIZES) || (i == SIZES && b->quick)) continue;
         session s;
         meter m;
-        job j;
-        if ((i >= most && i < SIZES) || (i == SIZES && b->quick)) continue;
         open_metered(b, &s, &m, i <= SIZES ? sizes[i] : 0);
-        j = make_job(b, &s, preset(DEFAULT));
+        job j = make_job(b, &s, preset(DEFAULT));
         j.views = 2;
         j.width = screens[i < SIZES ? 2 : i - SIZES][0];
         j.height = screens[i < SIZES ? 2 : i - SIZES][1];
-        for (k = 0; k < 2;
+        for (int k = 0; k < 2;
              k++) { /* the same frame twice; a model that changed in between, so that all is done again */
             const int before = m.allocations;
             ssdgs_model_arrays(s.model);
             run(b, &j, 0, NULL);
             m.allocations -= k ? before : 0;
         }
+        char name[48];
         snprintf(name, sizeof name, "%d at %dx%d", s.model->count, j.width, j.height);
-        k = m.allocations;
+        const int k = m.allocations;
         time_jobs(b, &j, 1, 1);
         add_row(t, name, (double)s.model->count, (double)j.width * j.height, j.ms, 1e3 / j.ms,
                 (double)m.peak / 1048576, (double)k);
@@ -921,39 +902,38 @@ static void measure_scaling(bench *b) {
 static void measure_training(bench *b) {
     table *t = new_table(b, "training", "iterations ms_1_thread ms_all_threads hours_all_threads");
     const int last = b->thread_count - 1, sizes[2] = {20000, b->quick ? 40000 : 60000};
-    double hours[2] = {0, 0}, held[2];
+    double hours[2] = {0, 0};
     session s[3];
     job jobs[3 * PHASES], *all = jobs + PHASES * last;
-    meter m;
-    int n, p;
-    for (n = 0; n <= last; n++) {
+    for (int n = 0; n <= last; n++) {
         open_session(b, s + n, b->best_isa, b->threads[n], 0, NULL);
-        for (p = 0; p < PHASES; p++)
+        for (int p = 0; p < PHASES; p++)
             jobs[n * PHASES + p] =
                 training_job(b, make_job(b, s + n, preset(EXACT)), p ? jobs[n * PHASES].trainer : NULL, p);
     }
     time_jobs(b, jobs, b->thread_count * PHASES, 10);
-    for (p = 0; p < PHASES; p++) {
+    for (int p = 0; p < PHASES; p++) {
         const double iterations = phases[p].to - phases[p].from;
         add_row(t, phases[p].name, iterations, jobs[p].ms, all[p].ms, iterations * all[p].ms / 3.6e6);
         hours[0] += iterations * jobs[p].ms / 3.6e6;
         hours[1] += iterations * all[p].ms / 3.6e6;
     }
     add_row(t, "whole run", 6e4, hours[0] * 60, hours[1] * 60, hours[1]);
-    p = PHASES - 1;
+    const int p = PHASES - 1;
     add_facts(b,
               "train256_ms_per_iteration train256_ms_per_iteration_mean train_60k_hours_projected "
               "threads2_speedup_train",
               all[p].ms /* of the last phase, most of a run */, hours[1] * 60, hours[1],
               last ? jobs[p].ms / jobs[PHASES + p].ms : none);
-    for (n = 0; n <= last; n++) {
+    for (int n = 0; n <= last; n++) {
         ssdgs_trainer_destroy(jobs[n * PHASES].trainer);
         close_session(s + n);
     }
-    for (n = 0; n < 2; n++) {
-        job j;
+    double held[2];
+    for (int n = 0; n < 2; n++) {
+        meter m;
         open_metered(b, s, &m, sizes[n]);
-        j = training_job(b, make_job(b, s, preset(EXACT)), NULL, p);
+        job j = training_job(b, make_job(b, s, preset(EXACT)), NULL, p);
         run(b, &j, 0, NULL);
         held[n] = (double)m.peak;
         ssdgs_trainer_destroy(j.trainer);
@@ -964,9 +944,9 @@ static void measure_training(bench *b) {
 }
 
 static void measure_model(bench *b, const char *prefix, const char *path) {
-    session s;
     b->prefix = prefix;
     b->model = path;
+    session s;
     open_session(b, &s, b->best_isa, 1, 0, NULL);
     printf("\n%s: %d Gaussians, scattering network of %d layers, %d wide\n", path, s.model->count,
            s.model->settings.scattering_layers, s.model->settings.scattering_width);
@@ -1012,17 +992,15 @@ static void draw_axes(const chart *c, const char *title) {
     static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8},
                         levels[] = {1e-5, 1e-4, 1.0 / 255, 1e-3, 1e-2, 1e-1};
     const double bottom = TOP + HIGH;
-    double decade;
-    int i;
     fprintf(c->file, "<text x=\"%.0f\" y=\"%d\" class=\"b\">%s</text>\n<g class=\"g\">\n", c->left, TOP - 12,
             title);
-    for (i = 0; i < 6; i++)
+    for (int i = 0; i < 6; i++)
         fprintf(c->file,
                 "<path d=\"M%.1f %.1fh%d\"%s/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s%g</text>\n",
                 c->left, chart_y(levels[i]), WIDE, i == 2 ? " stroke-dasharray=\"4 4\"" : "", c->left - 6,
                 chart_y(levels[i]) + 4, i == 2 ? "1/" : "", i == 2 ? 255 : levels[i]);
-    for (decade = 1e-3; decade < c->slowest; decade *= 10)
-        for (i = 0; i < 10; i++) {
+    for (double decade = 1e-3; decade < c->slowest; decade *= 10)
+        for (int i = 0; i < 10; i++) {
             const double x = chart_x(c, decade * steps[i]);
             if (x >= c->left && x <= c->left + WIDE)
                 fprintf(c->file,
@@ -1036,9 +1014,8 @@ static void draw_axes(const chart *c, const char *title) {
 
 static void draw_sweep(chart *c, const table *t, const char *title) {
     const double *v = t->rows[EXACT].value, x0 = v[0], y0 = v[1];
-    int r, k, i;
     c->fastest = c->slowest = x0;
-    for (r = 0; r < t->row_count; r++) {
+    for (int r = 0; r < t->row_count; r++) {
         v = t->rows[r].value;
         c->fastest = v[0] < c->fastest ? v[0] : c->fastest;
         c->slowest = v[0] > c->slowest ? v[0] : c->slowest;
@@ -1046,15 +1023,15 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
     c->fastest /= 1.15;
     c->slowest *= 1.15;
     draw_axes(c, title);
-    for (r = PRESETS, k = 0; k < KNOBS; k++) {
+    for (int r = PRESETS, k = 0; k < KNOBS; k++) {
         fprintf(c->file, "<g fill=\"%s\"><path fill=\"none\" stroke=\"%s\" d=\"M%.1f %.1f", looks[k].ink,
                 looks[k].ink, chart_x(c, x0), chart_y(y0));
-        for (i = 0; knobs[k].values[i] > 0; i++) {
+        for (int i = 0; knobs[k].values[i] > 0; i++) {
             v = t->rows[r + i].value;
             fprintf(c->file, "L%.1f %.1f", chart_x(c, v[0]), chart_y(v[1]));
         }
         fprintf(c->file, "\"/>");
-        for (i = 0; knobs[k].values[i] > 0; i++, r++) {
+        for (int i = 0; knobs[k].values[i] > 0; i++, r++) {
             v = t->rows[r].value;
             fprintf(c->file, "<path d=\"M%.1f %.1f%s\"/><text x=\"%.1f\" y=\"%.1f\" class=\"s\">%g</text>",
                     chart_x(c, v[0]), chart_y(v[1]), looks[k].mark, chart_x(c, v[0]) + 7, chart_y(v[1]) + 3,
@@ -1062,7 +1039,7 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
         }
         fprintf(c->file, "</g>\n");
     }
-    for (r = 0; r < PRESETS; r++) {
+    for (int r = 0; r < PRESETS; r++) {
         const double x = chart_x(c, t->rows[r].value[0]), y = chart_y(t->rows[r].value[1]);
         fprintf(
             c->file,
@@ -1074,7 +1051,6 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
 
 static void write_svg(const bench *b, FILE *file) {
     chart c;
-    int i;
     c.file = file;
     c.left = LEFT;
     fprintf(file,
@@ -1086,10 +1062,10 @@ static void write_svg(const bench *b, FILE *file) {
             "error against "
             "exact; 1 is white</text>\n",
             2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
-    for (i = 0; i < KNOBS; i++)
+    for (int i = 0; i < KNOBS; i++)
         fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i,
                 looks[i].mark, looks[i].ink, 410 + 104 * i, knobs[i].name);
-    for (i = 0; i < b->table_count; i++) {
+    for (int i = 0; i < b->table_count; i++) {
         const char *key = b->tables[i].key;
         if (strlen(key) < 5 || strcmp(key + strlen(key) - 5, "sweep")) continue;
         draw_sweep(&c, b->tables + i, key[0] == 's' ? "default model" : "published model");
@@ -1126,9 +1102,8 @@ static void scale_photo(const ssdgs_photo *from, ssdgs_photo *to) {
     const size_t pixel = from->format == SSDGS_PIXELS_RGBA8 ? 4 : 8;
     const int w = from->camera.width, h = from->camera.height;
     unsigned char *pixels = (unsigned char *)make(SIDE * SIDE, pixel);
-    int x, y;
-    for (y = 0; y < SIDE; y++)
-        for (x = 0; x < SIDE; x++) {
+    for (int y = 0; y < SIDE; y++)
+        for (int x = 0; x < SIDE; x++) {
             int u = (int)floor((x + 0.5 - SIDE / 2) * h / SIDE + 0.5 * w), v = (int)((y + 0.5) * h / SIDE);
             u = u < 0 ? 0 : u < w ? u : w - 1;
             memcpy(pixels + pixel * (size_t)(y * SIDE + x),
@@ -1148,24 +1123,23 @@ static void hear(void *user, ssdgs_result code, const char *message) {
    be one of these files. */
 static void look_at_models(const char *dataset, char paths[2][1024], const char *program, double origin[3]) {
     static const char *const endings[2] = {".json", ".svg"};
-    ssdgs_context *context;
-    ssdgs_context_desc desc;
-    ssdgs_model *model;
     olat_guard guard;
     char error[512] = "";
-    int i, c, failed;
     memset(&guard, 0, sizeof guard);
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
+    ssdgs_context *context;
     check(NULL, ssdgs_context_create(&desc, &context));
-    failed = olat_guard_folder(&guard, dataset, "transforms_test.json", error);
-    for (i = 1; i >= 0; i--) {
+    int failed = olat_guard_folder(&guard, dataset, "transforms_test.json", error);
+    for (int i = 1; i >= 0; i--) {
+        ssdgs_model *model;
         check(context, ssdgs_model_load(context, paths[i], &model, NULL));
-        for (c = 0; c < 3; c++) origin[c] = (double)ssdgs_model_settings(model)->origin[c];
+        for (int c = 0; c < 3; c++) origin[c] = (double)ssdgs_model_settings(model)->origin[c];
         ssdgs_model_destroy(model);
         failed = failed || olat_guard_input(&guard, paths[i], error);
     }
-    for (i = 0; i < 2 && !failed; i++) {
+    for (int i = 0; i < 2 && !failed; i++) {
         char *path = path_beside(program, endings[i]);
         failed = olat_guard_output(&guard, path, error);
         free(path);
@@ -1178,16 +1152,14 @@ static void look_at_models(const char *dataset, char paths[2][1024], const char 
 /* The test split, and how much of it is used. */
 static void load_photos(bench *b, const double origin[3]) {
     char error[512] = "";
-    ssdgs_photo *all;
-    int i;
     if (olat_load_at(b->dataset, "transforms_test.json", 0, origin, &b->data, error)) die(b->dataset, error);
     olat_print_notes(&b->data, "bench");
-    all = olat_photos(&b->data);
+    ssdgs_photo *all = olat_photos(&b->data);
     if (!all || b->data.count < 2) die(b->dataset, "needs two test photographs");
     b->photo_count = b->quick ? 4 : MAX_PHOTOS;
     if (b->photo_count > b->data.count) b->photo_count = b->data.count;
     b->views = b->quick ? 2 : b->photo_count < 8 ? b->photo_count : 8;
-    for (i = 0; i < b->photo_count; i++) {
+    for (int i = 0; i < b->photo_count; i++) {
         b->photos[i] = all[i * b->data.count / b->photo_count];
         if (b->photos[i].camera.width * b->photos[i].camera.height > MAX_PIXELS)
             die(b->dataset, "photographs over 1920x1080");
@@ -1200,32 +1172,30 @@ static void load_photos(bench *b, const double origin[3]) {
 static void look_at_machine(bench *b) {
     FILE *file = fopen("/proc/cpuinfo", "rb");
     const char *name = getenv("PROCESSOR_IDENTIFIER"); /* Windows */
-    char line[256];
-    ssdgs_context *context;
-    int i, all;
     snprintf(b->cpu, sizeof b->cpu, "%.100s", name ? name : "unknown");
+    char line[256];
     while (file && fgets(line, sizeof line, file))
         if (!strncmp(line, "model name", 10))
             snprintf(b->cpu, sizeof b->cpu, "%.100s", line + strcspn(line, ":") + 2);
     if (file) fclose(file);
     b->cpu[strcspn(b->cpu, "\r\n\"\\")] = 0;
+    ssdgs_context *context;
     check(NULL, ssdgs_context_create(NULL, &context));
     b->best_isa = (int)ssdgs_context_isa(context);
-    all = ssdgs_context_threads(context);
+    const int all = ssdgs_context_threads(context);
     ssdgs_context_destroy(context);
-    for (i = SSDGS_ISA_SCALAR; i < SSDGS_ISA_COUNT; i++)
+    for (int i = SSDGS_ISA_SCALAR; i < SSDGS_ISA_COUNT; i++)
         if (ssdgs__table(i) && (!b->quick || i == b->best_isa)) b->isas[b->isa_count++] = i;
-    for (i = 1; i <= 2 && i <= all; i++) b->threads[b->thread_count++] = i;
+    for (int i = 1; i <= 2 && i <= all; i++) b->threads[b->thread_count++] = i;
     if (all > 2) b->threads[b->thread_count++] = all;
 }
 
 int main(int argc, char **argv) {
     static bench b;
     const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
-    char paths[2][1024];
-    int i, files = 0;
-    double start = now(), origin[3];
-    for (i = 1; i < argc; i++) {
+    int files = 0;
+    double start = now();
+    for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--quick")) b.quick = 1;
         else if (!strcmp(argv[i], "--models") && i + 1 < argc) folder = argv[++i];
         else if (argv[i][0] != '-' && files < 3) given[files++] = argv[i];
@@ -1236,7 +1206,8 @@ int main(int argc, char **argv) {
                 "usage: bench [--quick] [--models DIR] [DATASET default_model.ply published_model.ply]\n");
         return 2;
     }
-    for (i = 0; i < 2; i++)
+    char paths[2][1024];
+    for (int i = 0; i < 2; i++)
         snprintf(paths[i], sizeof paths[i], "%s%s", given[0] ? given[1 + i] : folder,
                  given[0] ? ""
                  : i      ? "/waxcow_published.ply"
@@ -1246,6 +1217,7 @@ int main(int argc, char **argv) {
     b.model = paths[0];
     b.color = (ssdgs_real *)make(4 * MAX_PIXELS, sizeof *b.color);
     b.alpha = b.color + 3 * MAX_PIXELS;
+    double origin[3];
     look_at_models(b.dataset, paths, argv[0], origin);
     load_photos(&b, origin);
     look_at_machine(&b);
@@ -1257,11 +1229,11 @@ int main(int argc, char **argv) {
     b.prefix = "";
     add_facts(&b, "bench_seconds", now() - start);
     printf("\n");
-    for (i = 0; i < b.fact_count; i++)
+    for (int i = 0; i < b.fact_count; i++)
         if (b.facts[i].value > none) printf("%-46s %.7g\n", b.facts[i].key, b.facts[i].value);
     write_beside(&b, argv[0], ".json", write_json);
     write_beside(&b, argv[0], ".svg", write_svg);
-    for (i = 0; i < b.photo_count; i++) free((void *)(uintptr_t)b.scaled[i].pixels);
+    for (int i = 0; i < b.photo_count; i++) free((void *)(uintptr_t)b.scaled[i].pixels);
     free(b.color);
     olat_free(&b.data);
     return 0;

@@ -48,18 +48,18 @@ int main(int argc, char **argv) {
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, WIDTH, HEIGHT);
     const ssdgs_light light = {SSDGS_LIGHT_POINT, {2, -2, 3}, {140, 140, 140}};
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_image image = {0};
+    ssdgs_image image;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_result result;
     char error[512] = "";
 
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
     settings.shadow_layers = 0; /* nothing here is trained */
     settings.light_bias = 0.2f; /* discs as coarse as these must not shadow their neighbours */
+    memset(&image, 0, sizeof image);
     image.color = color;
 
-    result = ssdgs_context_create(NULL, &context);
+    ssdgs_result result = ssdgs_context_create(NULL, &context);
     if (!result) result = ssdgs_model_create(context, &settings, BALL + FLOOR, &model);
     if (!result) result = fill(model);
     if (!result) result = ssdgs_render(model, &camera, &light, 1, &image);

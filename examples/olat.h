@@ -112,11 +112,11 @@ static const char *olat__tail(const char *path) {
 
 /* Reads a regular file whole and appends a NUL. */
 static int olat__read_file(const char *path, unsigned char **data, size_t *size, char *error) {
-    struct stat info;
     const char *problem = NULL;
     size_t done = 0, total = 0;
     int file = open(path, OLAT__READ_FLAGS);
     if (file < 0) return olat__fail(error, "%s: cannot be opened: %s", olat__tail(path), strerror(errno));
+    struct stat info;
     if (fstat(file, &info) != 0) problem = "cannot be examined";
     else if (!S_ISREG(info.st_mode)) problem = "is not a regular file";
     else if (info.st_size < 0 || info.st_size > OLAT__MAX_FILE) problem = "is larger than 2 GiB";
@@ -138,14 +138,13 @@ static int olat__read_file(const char *path, unsigned char **data, size_t *size,
 /* Writes a file under a temporary name and renames it, so that path never holds half a file. */
 static int olat__write_file(const char *path, const unsigned char *data, size_t size, char *error) {
     size_t done = 0, room = strlen(path) + 40;
-    int file = -1, attempt, reason = 0;
+    int file = -1, reason = 0;
     struct stat info;
-    char *name;
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
         return olat__fail(error, "%s: is not a regular file", olat__tail(path));
-    name = (char *)malloc(room);
+    char *name = (char *)malloc(room);
     if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
-    for (attempt = 0; file < 0 && attempt < 100 && (attempt == 0 || errno == EEXIST); attempt++) {
+    for (int attempt = 0; file < 0 && attempt < 100 && (attempt == 0 || errno == EEXIST); attempt++) {
         snprintf(name, room, "%s.tmp.%ld.%d", path, (long)getpid(), attempt);
         file = open(name, OLAT__WRITE_FLAGS, 0666);
     }
@@ -172,13 +171,13 @@ static int olat__write_file(const char *path, const unsigned char *data, size_t 
 OLAT__API int olat_check_writable(const char *path, char error[512]) {
     const size_t room = strlen(path) + 40;
     char *name = (char *)malloc(room);
-    struct stat info;
-    int file = -1, reason;
+    int file = -1;
     if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
     snprintf(name, room, "%s.tmp.%ld", path, (long)getpid());
+    struct stat info;
     if (stat(path, &info) != 0 || S_ISREG(info.st_mode)) file = open(name, OLAT__WRITE_FLAGS, 0666);
     else errno = EISDIR;
-    reason = errno;
+    const int reason = errno;
     if (file >= 0) close(file), remove(name);
     free(name);
     return file < 0 ? olat__fail(error, "%s: cannot be written: %s", olat__tail(path), strerror(reason)) : 0;
@@ -217,8 +216,7 @@ static uint32_t olat__be32(const unsigned char *p) {
 }
 
 static void olat__put_be32(unsigned char *p, uint32_t value) {
-    int i;
-    for (i = 0; i < 4; i++) p[i] = (unsigned char)(value >> (24 - 8 * i) & 255);
+    for (int i = 0; i < 4; i++) p[i] = (unsigned char)(value >> (24 - 8 * i) & 255);
 }
 
 #define OLAT__FAST_BITS 9
@@ -248,12 +246,12 @@ static int olat__bad(olat__inflater *z, const char *problem) {
    code. */
 static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsigned char *lengths, int count,
                                 const char *problem) {
-    unsigned code[16] = {0}, offset[16] = {0}, slot;
-    int i, left = 1, used = 0;
+    unsigned code[16] = {0}, offset[16] = {0};
+    int left = 1, used = 0;
     memset(h, 0, sizeof *h);
-    for (i = 0; i < count; i++) h->count[lengths[i]]++;
+    for (int i = 0; i < count; i++) h->count[lengths[i]]++;
     h->count[0] = 0;
-    for (i = 1; i < 16; i++) {
+    for (int i = 1; i < 16; i++) {
         left = 2 * left - h->count[i];
         if (left < 0) break;
         code[i] = (code[i - 1] + h->count[i - 1]) << 1;
@@ -264,11 +262,11 @@ static void olat__huffman_build(olat__inflater *z, olat__huffman *h, const unsig
         olat__bad(z, problem);
         return;
     }
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         int length = lengths[i];
         if (length == 0) continue;
         h->symbol[offset[length]++] = (uint16_t)i;
-        slot = olat__reverse(code[length]++, length);
+        unsigned slot = olat__reverse(code[length]++, length);
         for (; length <= OLAT__FAST_BITS && slot < 1 << OLAT__FAST_BITS; slot += 1u << length) {
             h->fast[slot] = (uint16_t)(i | length << 9);
         }
@@ -293,12 +291,11 @@ static int olat__take(olat__inflater *z, int n) {
 }
 
 static int olat__symbol(olat__inflater *z, const olat__huffman *h) {
-    int length, code = 0, first = 0, index = 0;
-    unsigned entry;
+    int code = 0, first = 0, index = 0;
     olat__refill(z);
-    entry = h->fast[z->bits & ((1 << OLAT__FAST_BITS) - 1)];
+    const unsigned entry = h->fast[z->bits & ((1 << OLAT__FAST_BITS) - 1)];
     if (entry) return olat__drop(z, (int)(entry >> 9), (int)(entry & 511));
-    for (length = 1; length < 16; length++) {
+    for (int length = 1; length < 16; length++) {
         code |= (int)(z->bits >> (length - 1) & 1);
         if (code - first < h->count[length]) return olat__drop(z, length, h->symbol[index + code - first]);
         index += h->count[length];
@@ -336,12 +333,12 @@ static void olat__stored(olat__inflater *z) {
 static void olat__dynamic(olat__inflater *z) {
     static const unsigned char order[19] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
     unsigned char lengths[320] = {0};
-    int literals = 257 + olat__take(z, 5), distances = 1 + olat__take(z, 5), codes = 4 + olat__take(z, 4), i;
+    int literals = 257 + olat__take(z, 5), distances = 1 + olat__take(z, 5), codes = 4 + olat__take(z, 4);
     if (literals > 286 || distances > 30) olat__bad(z, "too many codes");
-    for (i = 0; i < codes && !z->problem; i++) lengths[order[i]] = (unsigned char)olat__take(z, 3);
+    for (int i = 0; i < codes && !z->problem; i++) lengths[order[i]] = (unsigned char)olat__take(z, 3);
     if (z->problem) return;
     olat__huffman_build(z, &z->literals, lengths, 19, "bad lengths of code lengths");
-    for (i = 0; i < literals + distances && !z->problem;) {
+    for (int i = 0; i < literals + distances && !z->problem;) {
         int symbol = olat__symbol(z, &z->literals), value = symbol < 16 ? symbol : 0, repeat = 1;
         if (symbol == 16) {
             if (i == 0) olat__bad(z, "a repeat before the first code length");
@@ -370,8 +367,7 @@ static void olat__fixed(olat__inflater *z) {
 
 static void olat__compressed(olat__inflater *z) {
     while (!z->problem) {
-        int symbol = olat__symbol(z, &z->literals), length;
-        size_t distance;
+        int symbol = olat__symbol(z, &z->literals);
         if (symbol == 256) return;
         if (symbol < 256) {
             if (z->length == z->capacity) olat__bad(z, "more data than the image needs");
@@ -383,13 +379,14 @@ static void olat__compressed(olat__inflater *z) {
             olat__bad(z, "a bad length code");
             return;
         }
-        length = olat__length_base[symbol] + olat__take(z, olat__length_extra(symbol));
+        int length = olat__length_base[symbol] + olat__take(z, olat__length_extra(symbol));
         symbol = olat__symbol(z, &z->distances);
         if (symbol > 29) {
             olat__bad(z, "a bad distance code");
             return;
         }
-        distance = (size_t)(olat__distance_base[symbol] + olat__take(z, olat__distance_extra(symbol)));
+        const size_t distance =
+            (size_t)(olat__distance_base[symbol] + olat__take(z, olat__distance_extra(symbol)));
         if (distance > z->length) olat__bad(z, "a distance reaches before the data");
         if ((size_t)length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
         for (; length > 0 && !z->problem; length--, z->length++)
@@ -406,9 +403,8 @@ static const char *olat__inflate(olat__inflater *z) {
         return "a bad zlib header";
     }
     for (z->at = 2; !last && !z->problem;) {
-        int type;
         last = olat__take(z, 1);
-        type = olat__take(z, 2);
+        const int type = olat__take(z, 2);
         if (z->problem) break;
         if (type == 3) olat__bad(z, "a block of unknown type");
         else if (type == 0) olat__stored(z);
@@ -457,17 +453,17 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
     olat__put(&z, 0x0178, 16);
     olat__put(&z, 3, 3); /* last block, fixed codes */
     while (i < size) {
-        size_t best = 2, distance = 0, step;
+        size_t best = 2, distance = 0;
         uint32_t candidate = i + 3 <= size ? table[olat__hash(in + i)] : 0;
-        int tries, s;
-        for (tries = 0; tries < 48 && candidate && i - (candidate - 1) <= 32768; tries++) {
+        for (int tries = 0; tries < 48 && candidate && i - (candidate - 1) <= 32768; tries++) {
             size_t from = candidate - 1, length = 0;
             while (length < 258 && i + length < size && in[from + length] == in[i + length]) length++;
             if (length > best) best = length, distance = i - from;
             candidate = table[32768 + (from & 32767)];
         }
-        step = distance ? best : 1;
+        size_t step = distance ? best : 1;
         if (distance) {
+            int s;
             for (s = 28; olat__length_base[s] > best; s--) {}
             olat__put_symbol(&z, 257 + s);
             olat__put(&z, best - olat__length_base[s], olat__length_extra(s));
@@ -519,9 +515,9 @@ typedef struct olat__png {
 } olat__png;
 
 static uint32_t olat__crc32(const unsigned char *data, size_t size) {
-    uint32_t table[16], crc = 0xFFFFFFFFu, i,
-                        k; /* half a byte at a time: a table this small is made on the spot */
-    for (i = 0; i < 16; i++) {
+    uint32_t table[16], crc = 0xFFFFFFFFu; /* half a byte at a time: a table this small is made on the spot */
+    for (uint32_t i = 0; i < 16; i++) {
+        uint32_t k;
         for (table[i] = i, k = 0; k < 4; k++) table[i] = (table[i] & 1 ? 0xEDB88320u : 0) ^ table[i] >> 1;
     }
     for (; size > 0; size--) {
@@ -534,11 +530,10 @@ static uint32_t olat__crc32(const unsigned char *data, size_t size) {
 
 static const char *olat__png_header(olat__png *png, const unsigned char *data, size_t length) {
     static const unsigned char depths[7] = {31, 0, 24, 15, 24, 0, 24}; /* bit k: depth 2^k is allowed */
-    uint32_t width, height;
     int k = 0;
     if (length != 13) return "IHDR is not 13 bytes long";
-    width = olat__be32(data);
-    height = olat__be32(data + 4);
+    const uint32_t width = olat__be32(data);
+    const uint32_t height = olat__be32(data + 4);
     while (k < 5 && data[8] != 1 << k) k++;
     if (width < 1 || height < 1) return "the image has no pixels";
     if (width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE) return "a side is longer than 32768 pixels";
@@ -557,26 +552,24 @@ static const char *olat__png_header(olat__png *png, const unsigned char *data, s
 }
 
 static const char *olat__png_palette(olat__png *png, const unsigned char *data, size_t length) {
-    size_t i;
     if (length % 3 != 0 || length < 3 || length > 768) return "PLTE has a bad length";
     if (png->color == 3 && length / 3 > (size_t)1 << png->depth)
         return "PLTE is longer than the bit depth allows";
     png->palette_size = (int)(length / 3);
-    for (i = 0; i < 4 * (length / 3); i++)
+    for (size_t i = 0; i < 4 * (length / 3); i++)
         png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
     return NULL;
 }
 
 static const char *olat__png_transparency(olat__png *png, const unsigned char *data, size_t length) {
-    size_t i;
     if (png->color & 4) return "tRNS in an image with alpha";
     if (png->color == 3 ? length < 1 || length > (size_t)png->palette_size
                         : length != 2 * (size_t)png->channels) {
         return "tRNS has a bad length";
     }
     png->has_key = 1;
-    for (i = 0; png->color == 3 && i < length; i++) png->palette[i][3] = data[i];
-    for (i = 0; png->color != 3 && i < length / 2; i++) { /* bits beyond the depth mean nothing */
+    for (size_t i = 0; png->color == 3 && i < length; i++) png->palette[i][3] = data[i];
+    for (size_t i = 0; png->color != 3 && i < length / 2; i++) { /* bits beyond the depth mean nothing */
         png->key[i] = (unsigned)(data[2 * i] << 8 | data[2 * i + 1]) & ((1u << png->depth) - 1);
     }
     return NULL;
@@ -599,8 +592,7 @@ static const char *olat__png_foreign(const unsigned char *bytes, size_t size) {
                  {0, 23, "version https://git-lfs",
                   "this is a Git LFS pointer, not the image itself: run git lfs pull"}};
 #undef OLAT__FOREIGN
-    size_t i;
-    for (i = 0; i < sizeof kinds / sizeof *kinds; i++)
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (size >= kinds[i].at + kinds[i].length &&
             !memcmp(bytes + kinds[i].at, kinds[i].bytes, kinds[i].length))
             return kinds[i].problem;
@@ -631,15 +623,14 @@ static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, 
         const unsigned char *chunk = bytes + png->at, *data = chunk + 8;
         size_t left = size - png->at, length = left < 12 ? 0 : olat__be32(chunk);
         const char *problem = NULL;
-        uint32_t type;
-        int tells_curve, intact;
         if (left < 12 || length > left - 12) return "the file ends early";
-        type = olat__be32(chunk + 4);
+        const uint32_t type = olat__be32(chunk + 4);
         if (stage == START && type != OLAT__IHDR) return "the first chunk is not IHDR";
-        tells_curve = stage == HEADER && !png->palette_size &&
-                      (type == OLAT__GAMA || type == OLAT__SRGB || type == OLAT__ICCP || type == OLAT__CICP);
-        intact = ((chunk[4] & 32) && type != OLAT__TRNS && !tells_curve) ||
-                 olat__be32(data + length) == olat__crc32(chunk + 4, length + 4);
+        const int tells_curve =
+            stage == HEADER && !png->palette_size &&
+            (type == OLAT__GAMA || type == OLAT__SRGB || type == OLAT__ICCP || type == OLAT__CICP);
+        const int intact = ((chunk[4] & 32) && type != OLAT__TRNS && !tells_curve) ||
+                           olat__be32(data + length) == olat__crc32(chunk + 4, length + 4);
         if (!intact && !tells_curve) return "the chunk's CRC is wrong";
         if (intact && tells_curve) olat__png_curve(png, type, data, length);
         if (stage == DATA && type != OLAT__IDAT) stage = AFTER;
@@ -695,10 +686,9 @@ static const char *olat__png_row(const olat__png *png, const unsigned char *row,
     const unsigned opaque = (1u << png->depth) - 1;
     const int second = png->color & 2 ? 1 : 0, third = 2 * second;
     size_t i = 0;
-    int c;
     for (; count > 0; count--, to += step) {
-        unsigned s[4] = {0, 0, 0, 0}, rgba[4];
-        for (c = 0; c < png->channels; c++, i++) {
+        unsigned s[4] = {0, 0, 0, 0};
+        for (int c = 0; c < png->channels; c++, i++) {
             size_t bit = i * (size_t)png->depth;
             if (png->depth == 16) s[c] = (unsigned)(row[2 * i] << 8 | row[2 * i + 1]);
             else s[c] = (unsigned)row[bit >> 3] >> (8 - png->depth - (int)(bit & 7)) & opaque;
@@ -708,6 +698,7 @@ static const char *olat__png_row(const olat__png *png, const unsigned char *row,
             memcpy(png->out + 4 * to, png->palette[s[0]], 4);
             continue;
         }
+        unsigned rgba[4];
         rgba[0] = s[0];
         rgba[1] = s[second];
         rgba[2] = s[third];
@@ -715,7 +706,7 @@ static const char *olat__png_row(const olat__png *png, const unsigned char *row,
         if (png->has_key && s[0] == png->key[0] && s[second] == png->key[second] &&
             s[third] == png->key[third])
             rgba[3] = 0;
-        for (c = 0; c < 4; c++) {
+        for (int c = 0; c < 4; c++) {
             uint16_t wide = (uint16_t)rgba[c];
             if (png->depth == 16) memcpy(png->out + 8 * to + 2 * c, &wide, 2);
             else png->out[4 * to + (size_t)c] = (unsigned char)(rgba[c] * (255 / opaque));
@@ -729,15 +720,15 @@ static const char *olat__png_unfilter(olat__png *png) {
     const size_t back = (size_t)(png->channels * png->depth + 7) / 8;
     unsigned char *row = png->raw;
     const char *problem = NULL;
-    int pass, width, height, y;
-    for (pass = png->first_pass; pass < png->end_pass; pass++) {
+    for (int pass = png->first_pass; pass < png->end_pass; pass++) {
         const unsigned char *p = olat__passes[pass], *above = NULL;
-        size_t bytes = olat__png_pass(png, pass, &width, &height), i;
-        for (y = 0; y < height && !problem; y++, above = row, row += bytes) {
+        int width, height;
+        size_t bytes = olat__png_pass(png, pass, &width, &height);
+        for (int y = 0; y < height && !problem; y++, above = row, row += bytes) {
             int filter = *row++;
             png->at = (size_t)(row - png->raw) - 1;
             if (filter > 4) return "unknown filter";
-            for (i = 0; filter && i < bytes; i++) {
+            for (size_t i = 0; filter && i < bytes; i++) {
                 row[i] = (unsigned char)((row[i] + olat__predict(filter, row, above, i, back)) & 255);
             }
             problem =
@@ -749,18 +740,17 @@ static const char *olat__png_unfilter(olat__png *png) {
 
 /* Leaves the pixels in png->out; returns NULL or what is wrong. */
 static const char *olat__png_read(olat__png *png, const unsigned char *bytes, size_t size) {
-    olat__inflater z;
-    const char *problem;
-    uint64_t raw_size = 0, out_size;
-    int pass, width, height;
+    uint64_t raw_size = 0;
     png->unit = "byte";
     if ((png->packed = (unsigned char *)malloc(size + 1)) == NULL) return "out of memory";
+    const char *problem;
     if ((problem = olat__png_chunks(png, bytes, size)) != NULL) return problem;
-    for (pass = png->first_pass; pass < png->end_pass; pass++) {
+    for (int pass = png->first_pass; pass < png->end_pass; pass++) {
+        int width, height;
         size_t row = olat__png_pass(png, pass, &width, &height);
         raw_size += (uint64_t)height * (row + 1);
     }
-    out_size = (uint64_t)png->width * (uint64_t)png->height * (png->depth == 16 ? 8 : 4);
+    const uint64_t out_size = (uint64_t)png->width * (uint64_t)png->height * (png->depth == 16 ? 8 : 4);
     png->unit = "byte of the compressed data";
     png->at = png->packed_size;
     if (raw_size / 1032 > png->packed_size)
@@ -769,6 +759,7 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
     png->raw = (unsigned char *)malloc((size_t)raw_size);
     png->out = (unsigned char *)malloc((size_t)out_size);
     if (!png->raw || !png->out) return "out of memory";
+    olat__inflater z;
     memset(&z, 0, sizeof z);
     z.in = png->packed;
     z.size = png->packed_size;
@@ -784,9 +775,8 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
 static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width,
                             int *height, ssdgs_pixels *format, void **pixels, uint32_t *gamma, char *error) {
     olat__png png;
-    const char *problem;
     memset(&png, 0, sizeof png);
-    problem = olat__png_read(&png, bytes, size);
+    const char *problem = olat__png_read(&png, bytes, size);
     free(png.packed);
     free(png.raw);
     if (problem) free(png.out);
@@ -804,10 +794,9 @@ static int olat__png_file(const char *path, int *width, int *height, ssdgs_pixel
                           uint32_t *gamma, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
-    int failed;
     *pixels = NULL;
-    failed = olat__read_file(path, &bytes, &size, error) ||
-             olat__png_decode(path, bytes, size, width, height, format, pixels, gamma, error);
+    const int failed = olat__read_file(path, &bytes, &size, error) ||
+                       olat__png_decode(path, bytes, size, width, height, format, pixels, gamma, error);
     free(bytes);
     return failed;
 }
@@ -832,12 +821,11 @@ OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pix
 static void olat__filter_row(const unsigned char *row, const unsigned char *above, size_t bytes, size_t back,
                              unsigned char *out) {
     uint64_t best = UINT64_MAX;
-    int turn, chosen = 0;
-    for (turn = 0; turn < 6; turn++) { /* five to measure, one to write */
+    int chosen = 0;
+    for (int turn = 0; turn < 6; turn++) { /* five to measure, one to write */
         uint64_t sum = 0;
-        size_t i;
         out[0] = (unsigned char)(turn < 5 ? turn : chosen);
-        for (i = 0; i < bytes; i++) {
+        for (size_t i = 0; i < bytes; i++) {
             out[1 + i] = (unsigned char)((row[i] - olat__predict(out[0], row, above, i, back)) & 255);
             sum += out[1 + i] < 128 ? out[1 + i] : 256u - out[1 + i];
         }
@@ -858,24 +846,23 @@ static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t le
 OLAT__API int olat_write_png(const char *path, int width, int height, int channels,
                              const unsigned char *pixels, char error[512]) {
     const size_t row = (size_t)width * (size_t)channels, raw_size = (size_t)height * (row + 1);
-    unsigned char *raw, *file, *p;
-    uint32_t *table;
-    int y, failed;
     if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE ||
         height > OLAT__MAX_PIXELS / width || (channels != 1 && channels != 3 && channels != 4)) {
         return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels", olat__tail(path), width,
                           height, channels);
     }
-    raw = (unsigned char *)malloc(raw_size);
-    file = (unsigned char *)malloc(raw_size + raw_size / 8 + 128); /* nine bits a byte, and the chunks */
-    table = (uint32_t *)calloc(65536, sizeof *table);
+    unsigned char *raw = (unsigned char *)malloc(raw_size);
+    unsigned char *file =
+        (unsigned char *)malloc(raw_size + raw_size / 8 + 128); /* nine bits a byte, and the chunks */
+    uint32_t *table = (uint32_t *)calloc(65536, sizeof *table);
+    int failed;
     if (raw && file && table) {
-        for (y = 0; y < height; y++) {
+        for (int y = 0; y < height; y++) {
             const unsigned char *from = pixels + (size_t)y * row;
             olat__filter_row(from, y ? from - row : NULL, row, (size_t)channels, raw + (size_t)y * (row + 1));
         }
         memcpy(file, olat__signature, 8);
-        p = file + 8;
+        unsigned char *p = file + 8;
         memset(p + 16, 0, 5);
         olat__put_be32(p + 8, (uint32_t)width);
         olat__put_be32(p + 12, (uint32_t)height);
@@ -925,18 +912,19 @@ typedef struct olat__json {
    pass on. */
 OLAT__PRINTF(3, 4)
 static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
-    const olat__node *chain[OLAT__MAX_DEPTH + 1], *n;
-    char keys[160] = "", what[240];
+    char keys[160] = "";
     size_t used = 0;
     int depth = 0;
-    va_list list;
     if (j->failed) return 0;
+    va_list list;
     va_start(list, format);
+    char what[240];
     vsnprintf(what, sizeof what, format, list);
     va_end(list);
-    for (n = node; n->parent >= 0; n = &j->nodes[n->parent]) chain[depth++] = n;
+    const olat__node *chain[OLAT__MAX_DEPTH + 1];
+    for (const olat__node *n = node; n->parent >= 0; n = &j->nodes[n->parent]) chain[depth++] = n;
     while (depth-- > 0 && used < sizeof keys) {
-        n = chain[depth];
+        const olat__node *n = chain[depth];
         if (n->key) snprintf(keys + used, sizeof keys - used, "%s%.60s", used ? "." : "", n->key);
         else snprintf(keys + used, sizeof keys - used, "[%d]", n->index);
         used = strlen(keys);
@@ -959,11 +947,11 @@ static int olat__same_letters(const char *text, const char *lower, size_t length
    decide every double: of those beyond 780 it matters only whether one is not zero. */
 static size_t olat__parse_number(const char *text, double *value) {
     enum { KEPT = 780 };
-    char digits[KEPT + 32];
     const char *p = text + (*text == '-');
-    int kept = 0, sticky = 0, point = 0, negative;
+    int kept = 0, sticky = 0, point = 0;
     int64_t exponent = 0, written = 0;
     if (!olat__is_digit(*p) || (*p == '0' && olat__is_digit(p[1]))) return 0;
+    char digits[KEPT + 32];
     for (; olat__is_digit(*p) || (*p == '.' && !point && olat__is_digit(p[1])); p++) {
         if (*p == '.') point = 1;
         else if (kept < KEPT) {
@@ -976,7 +964,7 @@ static size_t olat__parse_number(const char *text, double *value) {
     }
     if (*p == '.') return 0;
     if (*p == 'e' || *p == 'E') {
-        negative = p[1] == '-';
+        const int negative = p[1] == '-';
         p += p[1] == '-' || p[1] == '+' ? 2 : 1;
         if (!olat__is_digit(*p)) return 0;
         for (; olat__is_digit(*p); p++)
@@ -1007,9 +995,8 @@ static int olat__utf8_length(const char *p) {
 /* The value of "\uXXXX" at p, 0xFFFFFFFF if there is none. */
 static uint32_t olat__hex_escape(const char *p) {
     uint32_t code = 0;
-    int i;
     if (p[0] != '\\' || p[1] != 'u') return 0xFFFFFFFFu;
-    for (i = 2; i < 6; i++) {
+    for (int i = 2; i < 6; i++) {
         char letter = (char)(p[i] | 32);
         if (!olat__is_digit(p[i]) && (letter < 'a' || letter > 'f')) return 0xFFFFFFFFu;
         code = code << 4 | (uint32_t)(olat__is_digit(p[i]) ? p[i] - '0' : letter - 'a' + 10);
@@ -1021,10 +1008,10 @@ static uint32_t olat__hex_escape(const char *p) {
 static int olat__escape(const char *p, uint32_t *code) {
     static const char names[] = "\"\\/bfnrt", values[] = "\"\\/\b\f\n\r\t";
     const char *name = p[1] ? strchr(names, p[1]) : NULL;
-    uint32_t low;
     *code = name ? (uint32_t)values[name - names] : olat__hex_escape(p);
     if (name) return 2;
     if (*code < 0xD800 || (*code > 0xDFFF && *code <= 0xFFFF)) return 6;
+    uint32_t low;
     if (*code > 0xDBFF || (low = olat__hex_escape(p + 6)) < 0xDC00 || low > 0xDFFF) return 0;
     *code = 0x10000 + ((*code - 0xD800) << 10) + (low - 0xDC00);
     return 12;
@@ -1059,19 +1046,19 @@ static const char *olat__json_string(olat__json *j, const char **text, size_t *l
 static const char *olat__json_scalar(olat__json *j, olat__node *node) {
     static const char *const words[] = {"null", "false", "true"};
     const char *letters = j->at + (*j->at == '-');
-    size_t i, length;
-    uint64_t bits;
     node->type = OLAT__STRING;
     if (*j->at == '"') return olat__json_string(j, &node->text, &node->text_length);
-    for (i = 0; i < 3; i++) {
+    for (size_t i = 0; i < 3; i++) {
         if (strncmp(j->at, words[i], strlen(words[i])) != 0) continue;
         node->type = (olat__type)i;
         j->at += strlen(words[i]);
         return NULL;
     }
     node->type = OLAT__NUMBER;
+    size_t length;
     if ((length = olat__parse_number(j->at, &node->number)) > 0) {
         j->at += length;
+        uint64_t bits;
         memcpy(&bits, &node->number, sizeof bits); /* -ffast-math takes infinity for impossible */
         return (bits >> 52 & 0x7ff) == 0x7ff ? "the number is too large" : NULL;
     }
@@ -1089,16 +1076,16 @@ static void olat__skip_space(olat__json *j) {
 /* Appends a node to the container, after its child `last` (0: none yet); returns its index, -1 when no more
    fit. */
 static int olat__json_add(olat__json *j, int container, int last) {
-    olat__node *node;
     if (j->count == j->capacity) {
         int capacity = j->capacity ? 2 * j->capacity : 256;
-        node = capacity > OLAT__MAX_NODES ? NULL
-                                          : (olat__node *)realloc(j->nodes, (size_t)capacity * sizeof *node);
+        olat__node *node = capacity > OLAT__MAX_NODES
+                               ? NULL
+                               : (olat__node *)realloc(j->nodes, (size_t)capacity * sizeof *node);
         if (!node) return -1;
         j->nodes = node;
         j->capacity = capacity;
     }
-    node = &j->nodes[j->count];
+    olat__node *node = &j->nodes[j->count];
     memset(node, 0, sizeof *node);
     node->parent = container;
     if (container >= 0) node->index = j->nodes[container].size++;
@@ -1112,14 +1099,13 @@ static const char *olat__json_values(olat__json *j) {
     int last[OLAT__MAX_DEPTH + 1] = {0}, depth = 0,
                                container = -1; /* last: the newest child of every open container */
     for (;;) {                                 /* a value each time */
-        const char *problem;
-        olat__node *node;
-        int self, is_member = container >= 0 && j->nodes[container].type == OLAT__OBJECT;
+        int is_member = container >= 0 && j->nodes[container].type == OLAT__OBJECT;
         if (is_member && *j->at != '"') return "a key was expected";
-        self = olat__json_add(j, container, last[depth]);
+        const int self = olat__json_add(j, container, last[depth]);
         if (self < 0) return "out of memory, or more than 2^24 values";
         last[depth] = self;
-        node = &j->nodes[self];
+        olat__node *node = &j->nodes[self];
+        const char *problem;
         if (is_member) {
             j->where = container;
             if ((problem = olat__json_string(j, &node->key, &node->key_length)) != NULL) return problem;
@@ -1158,11 +1144,11 @@ static const char *olat__json_values(olat__json *j) {
 /* Parses j->text .. j->end, NUL-terminated; j->failed tells. */
 static void olat__json_parse(olat__json *j) {
     const unsigned char *text = (const unsigned char *)j->text;
-    const char *problem;
     j->line = 1;
     j->at = j->text +
             (strncmp(j->text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0); /* some editors write a byte order mark */
     olat__skip_space(j);
+    const char *problem;
     if (j->end - j->text > 1 &&
         (text[0] + text[1] == 0xFF + 0xFE || !text[0] != !text[1])) { /* a mark, or a letter */
         problem = "the file is UTF-16: save it as UTF-8";
@@ -1180,8 +1166,7 @@ static void olat__json_parse(olat__json *j) {
 static const olat__node *olat__find(const olat__json *j, const olat__node *object, const char *key) {
     const olat__node *found = NULL, *node;
     size_t length = strlen(key);
-    int i;
-    for (i = object->child; i; i = node->next) {
+    for (int i = object->child; i; i = node->next) {
         node = &j->nodes[i];
         if (node->key_length == length && !memcmp(node->key, key, length)) found = node;
     }
@@ -1192,12 +1177,11 @@ static const olat__node *olat__find(const olat__json *j, const olat__node *objec
    arithmetic finite. */
 static int olat__numbers(olat__json *j, const olat__node *node, int count, double *out) {
     const olat__node *n = node->type == OLAT__ARRAY && node->child ? &j->nodes[node->child] : node;
-    int i;
     if (node->type == OLAT__ARRAY ? node->size != count : count != 1) {
         return olat__json_fail(j, node, "%d number%s expected", count,
                                count == 1 ? " was" : "s in an array were");
     }
-    for (i = 0; i < count; i++, n = &j->nodes[n->next]) {
+    for (int i = 0; i < count; i++, n = &j->nodes[n->next]) {
         if (n->type != OLAT__NUMBER) return olat__json_fail(j, n, "a number was expected");
         if (fabs(n->number) > 1e15) return olat__json_fail(j, n, "the number is out of range");
         out[i] = n->number;
@@ -1218,19 +1202,18 @@ static double olat__dot(const double *a, const double *b) { return a[0] * b[0] +
    shears no image. */
 static int olat__get_pose(olat__json *j, const olat__node *object, const char *key, int any_scale,
                           double axes[3][3], double origin[3]) {
-    const olat__node *node = olat__find(j, object, key), *row;
-    double y[3], scale2 = 1, along, x_length, z_length;
-    int columns, i, k;
+    const olat__node *node = olat__find(j, object, key);
+    double scale2 = 1;
     if (!node) return 0;
-    row = &j->nodes[node->child];
-    columns = row->size;
+    const olat__node *row = &j->nodes[node->child];
+    const int columns = row->size;
     if (node->type != OLAT__ARRAY || columns < 3 || columns > 4 || node->size < 3 || node->size > columns) {
         return olat__json_fail(j, node, "a matrix of 3 x 3, 3 x 4 or 4 x 4 numbers was expected");
     }
-    for (i = 0; i < node->size; i++, row = &j->nodes[row->next]) {
+    for (int i = 0; i < node->size; i++, row = &j->nodes[row->next]) {
         double v[4] = {0, 0, 0, 0};
         if (!olat__numbers(j, row, columns, v)) return 0;
-        for (k = 0; k < 3 && i < 3; k++) axes[k][i] = v[k];
+        for (int k = 0; k < 3 && i < 3; k++) axes[k][i] = v[k];
         if (i < 3) origin[i] = v[3];
         else if (olat__dot(v, v) > 1e-12 || fabs(v[3] - 1) > 1e-6)
             return olat__json_fail(j, row, "this row must be 0 0 0 1");
@@ -1238,19 +1221,20 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
     if (any_scale)
         scale2 =
             (olat__dot(axes[0], axes[0]) + olat__dot(axes[1], axes[1]) + olat__dot(axes[2], axes[2])) / 3;
-    for (i = 0; i < 9; i++) {
+    for (int i = 0; i < 9; i++) {
         if (scale2 > 1e-12 && fabs(olat__dot(axes[i / 3], axes[i % 3]) / scale2 - (i % 4 == 0)) <= 5e-3)
             continue;
         return olat__json_fail(j, node, "the 3 x 3 part is not a rotation%s",
                                any_scale ? " times a scale" : "");
     }
-    z_length = sqrt(olat__dot(axes[2], axes[2]));
-    for (k = 0; k < 3; k++) axes[2][k] /= z_length;
-    along = olat__dot(axes[0], axes[2]);
-    for (k = 0; k < 3; k++) axes[0][k] -= along * axes[2][k];
-    x_length = sqrt(olat__dot(axes[0], axes[0]));
-    for (k = 0; k < 3; k++) axes[0][k] /= x_length;
-    for (k = 0; k < 3; k++)
+    const double z_length = sqrt(olat__dot(axes[2], axes[2]));
+    for (int k = 0; k < 3; k++) axes[2][k] /= z_length;
+    const double along = olat__dot(axes[0], axes[2]);
+    for (int k = 0; k < 3; k++) axes[0][k] -= along * axes[2][k];
+    const double x_length = sqrt(olat__dot(axes[0], axes[0]));
+    for (int k = 0; k < 3; k++) axes[0][k] /= x_length;
+    double y[3];
+    for (int k = 0; k < 3; k++)
         y[k] = axes[2][(k + 1) % 3] * axes[0][(k + 2) % 3] - axes[2][(k + 2) % 3] * axes[0][(k + 1) % 3];
     if (olat__dot(y, axes[1]) < 0)
         return olat__json_fail(j, node, "the matrix mirrors: its determinant is negative");
@@ -1270,8 +1254,8 @@ static int olat__is_word(const olat__node *node, const char *word) {
 
 /* Is there anything in it but 0, false, null and empty texts? */
 static int olat__nonzero(const olat__json *j, const olat__node *node) {
-    int i, found = node->type == OLAT__TRUE || node->text_length > 0 || fabs(node->number) > 0;
-    for (i = node->child; i && !found; i = j->nodes[i].next) found = olat__nonzero(j, &j->nodes[i]);
+    int found = node->type == OLAT__TRUE || node->text_length > 0 || fabs(node->number) > 0;
+    for (int i = node->child; i && !found; i = j->nodes[i].next) found = olat__nonzero(j, &j->nodes[i]);
     return found;
 }
 
@@ -1320,15 +1304,14 @@ static void olat__check_lens(olat__json *j, const olat__node *object) {
                                        "distortion_params",
                                        "distortion_coefficients",
                                        "rolling_shutter"};
-    size_t i, m;
-    for (i = 0; i < sizeof keys / sizeof *keys; i++) {
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         const olat__node *node = olat__find(j, object, keys[i]);
-        const char *value;
         int fine = !node || !olat__nonzero(j, node);
-        for (m = 0; !fine && i == 0 && node->type == OLAT__STRING && m < sizeof models / sizeof *models; m++)
+        for (size_t m = 0;
+             !fine && i == 0 && node->type == OLAT__STRING && m < sizeof models / sizeof *models; m++)
             fine = olat__is_word(node, models[m]);
         if (fine) continue;
-        value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
+        const char *value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
         olat__json_fail(j, node,
                         "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
                         " image_undistorter or Metashape's Export > Undistort, say",
@@ -1340,9 +1323,9 @@ static void olat__check_lens(olat__json *j, const olat__node *object) {
 static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens *lens) {
     static const char *const focal[4] = {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"};
     double v[4] = {0, 0, 0, 0};
-    int i, given = 0, has_cx, has_cy;
+    int given = 0;
     olat__check_lens(j, object);
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         const char *key = i ? "h" : "w";
         double side;
         if (!olat__get(j, object, key, 1, &side)) continue;
@@ -1351,7 +1334,7 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
         else if (i) lens->h = (int)side;
         else lens->w = (int)side;
     }
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         if (!olat__get(j, object, focal[i], 1, &v[i])) continue;
         given = 1;
         if (i < 2 && !(v[i] > 0)) olat__json_fail(j, object, "%s is not positive", focal[i]);
@@ -1359,8 +1342,8 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
             olat__json_fail(j, object, "%s is not between 0 and pi", focal[i]);
     }
     if (given) memcpy(lens->focal, v, sizeof v); /* a frame's camera is another one than the top's */
-    has_cx = olat__get(j, object, "cx", 1, &lens->centre[0]);
-    has_cy = olat__get(j, object, "cy", 1, &lens->centre[1]);
+    int has_cx = olat__get(j, object, "cx", 1, &lens->centre[0]);
+    const int has_cy = olat__get(j, object, "cy", 1, &lens->centre[1]);
     if (has_cx != has_cy) olat__json_fail(j, object, "cx and cy come in pairs");
     if (olat__get(j, object, "camera_intrinsics", 4, v)) {
         if (!(v[2] > 0 && v[3] > 0))
@@ -1375,17 +1358,17 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
 /* The frame's pose as a view matrix in our axes, of coordinates relative to origin. */
 static void olat__read_pose(olat__json *j, const olat__node *node, const double origin[3], double view[12]) {
     double axes[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, place[3] = {0, 0, 0}, t[3] = {0, 0, 0};
-    int refined = olat__find(j, node, "R_opt") != NULL, i, k;
+    int refined = olat__find(j, node, "R_opt") != NULL;
     if (refined) {
         olat__get_pose(j, node, "R_opt", 0, axes, place);
         if (!olat__get(j, node, "T_opt", 3, t)) olat__json_fail(j, node, "T_opt is missing");
     } else if (!olat__get_pose(j, node, "transform_matrix", 1, axes, place)) {
         olat__json_fail(j, node, "transform_matrix or R_opt is missing");
     }
-    for (i = 0; i < 3; i++) place[i] -= origin[i];
-    for (i = 0; i < 3; i++) { /* transform_matrix has y up and z backward, R_opt has our axes */
+    for (int i = 0; i < 3; i++) place[i] -= origin[i];
+    for (int i = 0; i < 3; i++) { /* transform_matrix has y up and z backward, R_opt has our axes */
         const double sign = i > 0 && !refined ? -1 : 1;
-        for (k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++) {
             view[4 * i + k] = sign * axes[i][k];
             if (fabs(origin[k]) > 0) t[i] += axes[i][k] * origin[k];
         }
@@ -1398,28 +1381,29 @@ static void olat__read_pose(olat__json *j, const olat__node *node, const double 
    tell how large the scene is: they must be further away than millimetres can explain. What is wrong with a
    frame is told when it is read. */
 static void olat__find_origin(olat__json *j, const olat__node *frames, double origin[3]) {
-    double sum[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, radius = 0, length;
-    int turn, i, k, light, places = 0;
-    for (turn = 0; turn < 2; turn++) {
+    double sum[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, radius = 0;
+    int places = 0;
+    for (int turn = 0; turn < 2; turn++) {
         const olat__node *node = &j->nodes[frames->child];
-        for (i = 0; i < frames->size && !j->failed; i++, node = &j->nodes[node->next])
-            for (light = 0; light < 2; light++) {
-                double view[12], place[3] = {0, 0, 0};
+        for (int i = 0; i < frames->size && !j->failed; i++, node = &j->nodes[node->next])
+            for (int light = 0; light < 2; light++) {
+                double place[3] = {0, 0, 0};
                 if (light && !olat__get(j, node, "pl_pos", 3, place)) continue;
+                double view[12];
                 if (!light) olat__read_pose(j, node, mean, view);
-                for (k = 0; k < 3; k++) {
+                for (int k = 0; k < 3; k++) {
                     if (light) place[k] -= mean[k];
                     else place[k] = -(view[k] * view[3] + view[4 + k] * view[7] + view[8 + k] * view[11]);
                     sum[k] += place[k];
                 }
                 places += turn == 0;
-                length = sqrt(olat__dot(place, place));
+                const double length = sqrt(olat__dot(place, place));
                 if (turn == 1 && length > radius) radius = length;
             }
-        for (k = 0; k < 3 && turn == 0; k++) mean[k] = sum[k] / (places ? places : 1);
+        for (int k = 0; k < 3 && turn == 0; k++) mean[k] = sum[k] / (places ? places : 1);
     }
-    length = sqrt(olat__dot(mean, mean));
-    for (k = 0; k < 3; k++)
+    const double length = sqrt(olat__dot(mean, mean));
+    for (int k = 0; k < 3; k++)
         origin[k] = length > 64 * radius && length > 1000 && !j->failed ? (double)(float)mean[k] : 0;
     j->failed = 0;
 }
@@ -1428,15 +1412,15 @@ static void olat__find_origin(olat__json *j, const olat__node *frames, double or
 static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens,
                               const double origin[3], ssdgs_camera *camera) {
     const double w = camera->width, h = camera->height;
-    double view[12], focal[2];
-    int i, in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
+    int in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
     if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
                   : lens->w && lens->h &&
                         fabs(w * lens->h - h * lens->w) >
                             (w > h ? w : h)) { /* an angle allows another size alone */
         olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
     }
-    for (i = 0; i < 2; i++) {
+    double focal[2];
+    for (int i = 0; i < 2; i++) {
         const double angle = lens->focal[2 + i];
         focal[i] = lens->focal[i] > 0 ? lens->focal[i] : angle > 0 ? 0.5 * (i ? h : w) / tan(0.5 * angle) : 0;
     }
@@ -1446,15 +1430,16 @@ static void olat__read_camera(olat__json *j, const olat__node *node, const olat_
     camera->fy = (ssdgs_real)(focal[1] > 0 ? focal[1] : focal[0]);
     camera->cx = (ssdgs_real)(lens->has_centre ? lens->centre[0] : 0.5 * w);
     camera->cy = (ssdgs_real)(lens->has_centre ? lens->centre[1] : 0.5 * h);
+    double view[12];
     olat__read_pose(j, node, origin, view);
-    for (i = 0; i < 12; i++) camera->view[i] = (ssdgs_real)view[i];
+    for (int i = 0; i < 12; i++) camera->view[i] = (ssdgs_real)view[i];
 }
 
 static void olat__read_light(olat__json *j, const olat__node *node, const double origin[3],
                              ssdgs_light *light) {
     const olat__node *intensity = olat__find(j, node, "pl_intensity");
     double v[3] = {0, 0, 0}, rgb[3] = {1, 1, 1}, length = 1;
-    int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v), i;
+    int is_point = olat__get(j, node, "pl_pos", 3, v), is_far = olat__get(j, node, "pl_dir", 3, v);
     if (is_point == is_far)
         olat__json_fail(j, node, is_far ? "both pl_pos and pl_dir" : "pl_pos or pl_dir is missing");
     if (is_far) length = sqrt(olat__dot(v, v));
@@ -1464,7 +1449,7 @@ static void olat__read_light(olat__json *j, const olat__node *node, const double
     else if (intensity && olat__numbers(j, intensity, 1, rgb)) rgb[1] = rgb[2] = rgb[0];
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
     light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
-    for (i = 0; i < 3 && !j->failed; i++) {
+    for (int i = 0; i < 3 && !j->failed; i++) {
         light->position[i] = (ssdgs_real)(is_far ? v[i] / length : v[i] - origin[i]);
         light->intensity[i] = (ssdgs_real)rgb[i];
     }
@@ -1473,14 +1458,14 @@ static void olat__read_light(olat__json *j, const olat__node *node, const double
 /* What is wrong with a path out of a file, on any system; NULL if nothing. */
 static const char *olat__path_problem(const char *path, size_t length, int allow_parent) {
     static const char *const devices[] = {"con", "prn", "aux", "nul", "com", "lpt"};
-    size_t i, start, end, stem, d;
     if (length == 0 || length > OLAT__MAX_PATH) return length ? "the path is too long" : "the path is empty";
     if (path[0] == '/' || path[0] == '\\' || (length > 1 && path[1] == ':'))
         return "the path is not relative";
-    for (i = 0; i < length; i++) {
+    for (size_t i = 0; i < length; i++) {
         if ((unsigned char)path[i] < 32 || path[i] == 127) return "the path holds a control character";
     }
-    for (start = 0; start <= length; start = end + 1) {
+    size_t end;
+    for (size_t start = 0; start <= length; start = end + 1) {
         const char *name = path + start;
         for (end = start; end < length && path[end] != '/' && path[end] != '\\'; end++) {}
         if (end == start) return "the path holds an empty name";
@@ -1491,8 +1476,9 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
         }
         if (path[end - 1] == '.' || path[end - 1] == ' ')
             return "a name in the path ends in a dot or a space";
+        size_t stem;
         for (stem = 0; stem < end - start && name[stem] != '.'; stem++) {}
-        for (d = 0; d < 6; d++) { /* com and lpt take a digit */
+        for (size_t d = 0; d < 6; d++) { /* com and lpt take a digit */
             if (stem != (d < 4 ? 3 : 4) || !olat__same_letters(name, devices[d], 3)) continue;
             if (d < 4 || (name[3] >= '1' && name[3] <= '9')) return "the path names a device";
         }
@@ -1508,8 +1494,7 @@ static int olat__other_image(olat__json *j, const olat__node *name) {
                                            {".gif", "GIF"},   {".heic", "HEIC"},   {".avif", "AVIF"},
                                            {".dng", "DNG"},   {".ppm", "PPM"}};
     const size_t size = name->text_length;
-    size_t i;
-    for (i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         const size_t length = strlen(kinds[i][0]);
         if (size < length || !olat__same_letters(name->text + size - length, kinds[i][0], length)) continue;
         olat__json_fail(
@@ -1528,8 +1513,6 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
                         int whole, int flags) {
     const char *problem, *suffix = ext ? ext->text : ".png";
     const size_t used = strlen(folder);
-    size_t room, i;
-    char *file;
     if (path->type != OLAT__STRING) olat__json_fail(j, path, "a string was expected");
     else if ((problem = olat__path_problem(path->text, path->text_length, flags & OLAT_ALLOW_PARENT)) !=
              NULL) {
@@ -1539,13 +1522,14 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
     if (whole ||
         (path->text_length >= 4 && olat__same_letters(path->text + path->text_length - 4, ".png", 4)))
         suffix = "";
-    room = used + path->text_length + 8;
+    const size_t room = used + path->text_length + 8;
+    char *file;
     if ((file = (char *)malloc(room)) == NULL) {
         olat__json_fail(j, path, "out of memory");
         return NULL;
     }
     snprintf(file, room, "%s%s%s%s", folder, used ? "/" : "", path->text, suffix);
-    for (i = used; file[i]; i++) {
+    for (size_t i = used; file[i]; i++) {
         if (file[i] == '\\') file[i] = '/'; /* datasets made on Windows */
     }
     return file;
@@ -1578,14 +1562,13 @@ static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
     uint16_t *out = (uint16_t *)malloc(count * sizeof *out),
              *curve = (uint16_t *)malloc((top + 1) * sizeof *curve);
     const int failed = !out || !curve;
-    size_t i;
-    for (i = 0; !failed && i <= top; i++) {
+    for (size_t i = 0; !failed && i <= top; i++) {
         const double light = pow((double)i / top, 1e5 / gamma);
         curve[i] =
             (uint16_t)(65535 * (light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055) +
                        0.5);
     }
-    for (i = 0; !failed && i < count; i++) {
+    for (size_t i = 0; !failed && i < count; i++) {
         const unsigned value = olat__sample(frame->pixels, frame->format, i);
         out[i] = i % 4 == 3 ? (uint16_t)(value * (65535 / top)) : curve[value];
     }
@@ -1603,7 +1586,6 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
     ssdgs_pixels format;
     char problem[512];
     void *mask;
-    size_t i;
     if (olat_read_png(frame->mask, &width, &height, &format, &mask, problem)) {
         return olat__fail(error, "mask_path: %s", problem);
     }
@@ -1612,10 +1594,10 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
             error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
             olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
     }
-    for (i = 0; !failed && i < (size_t)width * (size_t)height; i++) {
+    for (size_t i = 0; !failed && i < (size_t)width * (size_t)height; i++) {
         const uint64_t top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255, one = top * top;
-        uint64_t value = 0, c;
-        for (c = 0; c < 3; c++) {
+        uint64_t value = 0;
+        for (uint64_t c = 0; c < 3; c++) {
             const unsigned v = olat__sample(mask, format, 4 * i + (size_t)c);
             if (v > value) value = v;
         }
@@ -1640,8 +1622,8 @@ static int olat__read_photo(olat_frame *frame, uint32_t *gamma, char *error) {
 /* Adds a line to the notes. */
 OLAT__PRINTF(2, 3) static void olat__note(olat_dataset *set, const char *format, ...) {
     const size_t used = strlen(set->notes), more = used > 0 && used + 1 < sizeof set->notes;
-    va_list list;
     if (more) set->notes[used] = '\n';
+    va_list list;
     va_start(list, format);
     vsnprintf(set->notes + used + more, sizeof set->notes - used - more, format, list);
     va_end(list);
@@ -1654,10 +1636,10 @@ static int olat__side(double middle) {
 
 static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin,
                               olat_dataset *out) {
-    const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames"), *node;
-    int i, masked = 0, curved = 0, oblong = 0;
+    const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames");
+    int masked = 0, curved = 0, oblong = 0;
     uint32_t gamma = 0, first_gamma = 0;
-    olat__lens top, lens;
+    olat__lens top;
     memset(&top, 0, sizeof top);
     olat__read_lens(j, root, &top);
     if (root->type != OLAT__OBJECT || !frames) olat__json_fail(j, root, "frames is missing");
@@ -1673,12 +1655,14 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
     out->count = frames->size;
     if (origin) memcpy(out->origin, origin, sizeof out->origin);
     else olat__find_origin(j, frames, out->origin);
+    const olat__node *node;
+    int i;
     for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed;
          i++, node = &j->nodes[node->next]) {
         olat_frame *frame = &out->frames[i];
         ssdgs_camera *camera = &frame->camera;
         if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
-        lens = top;
+        olat__lens lens = top;
         olat__read_lens(j, node, &lens);
         olat__read_light(j, node, out->origin, &frame->light);
         olat__read_paths(j, node, folder, flags, &frame->file, &frame->mask);
@@ -1711,8 +1695,7 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
 
 /* Frees what olat_load made. */
 OLAT__API void olat_free(olat_dataset *set) {
-    int i;
-    for (i = 0; i < set->count; i++) {
+    for (int i = 0; i < set->count; i++) {
         free(set->frames[i].file);
         free(set->frames[i].mask);
         free(set->frames[i].pixels);
@@ -1751,8 +1734,8 @@ static void olat__json_close(olat__json *j) {
    away. */
 OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin,
                            olat_dataset *out, char error[512]) {
-    olat__json j;
     memset(out, 0, sizeof *out);
+    olat__json j;
     olat__json_open(&j, folder, split_json, error);
     if (!j.failed) olat__read_frames(&j, folder, flags, origin, out);
     if (j.failed) olat_free(out);
@@ -1805,21 +1788,19 @@ static int olat__separates(char c) { return c && strchr(OLAT__SEPARATORS, c) != 
 /* The place that a file has or would have: the nearest folder that exists, and what comes below it in small
    letters and without names that mean nothing. `name` holds the path, and then the latter. */
 static void olat__place(char *name, uint64_t id[2]) {
-    size_t cut = strlen(name), from;
+    size_t cut = strlen(name);
     char *to = name;
     id[0] = id[1] = 0;
     for (;;) {
-        char c;
-        int found;
         while (cut > 0 && !olat__separates(name[cut - 1])) cut--;
-        c = name[cut];
+        const char c = name[cut];
         name[cut] = 0;
-        found = olat__identify(cut ? name : ".", id);
+        const int found = olat__identify(cut ? name : ".", id);
         name[cut] = c;
         if (found || cut == 0) break;
         while (cut > 0 && olat__separates(name[cut - 1])) cut--;
     }
-    for (from = cut; name[from]; from++) {
+    for (size_t from = cut; name[from]; from++) {
         const char c = name[from], next = name[from + 1];
         const int starts = to == name || to[-1] == '/';
         if (starts && c == '.' && (olat__separates(next) || !next)) continue;
@@ -1833,9 +1814,8 @@ static void olat__place(char *name, uint64_t id[2]) {
 static olat__known *olat__slot(const olat_guard *guard, const olat__known *file) {
     uint64_t hash = (file->id[0] * 31 + file->id[1]) * UINT64_C(0x9E3779B97F4A7C15);
     const size_t last = guard->room - 1;
-    const char *c;
+    for (const char *c = file->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001B3);
     size_t at;
-    for (c = file->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001B3);
     for (at = (size_t)(hash ^ hash >> 32) & last; guard->slots[at].path; at = (at + 1) & last) {
         const olat__known *other = &guard->slots[at];
         if (other->id[0] == file->id[0] && other->id[1] == file->id[1] && !strcmp(other->name, file->name))
@@ -1849,30 +1829,29 @@ static olat__known *olat__slot(const olat_guard *guard, const olat__known *file)
 static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *id, int is_output,
                            char *error) {
     const size_t size = strlen(path) + 1;
-    olat__known file, *slot;
-    olat_guard grown;
-    char *name;
-    size_t i;
     if (2 * (guard->count + 1) > guard->room) {
+        olat_guard grown;
         grown.count = guard->count;
         grown.room = guard->room ? 2 * guard->room : 64;
         if ((grown.slots = (olat__known *)calloc(grown.room, sizeof *grown.slots)) == NULL) {
             return olat__fail(error, "%s: out of memory", olat__tail(path));
         }
-        for (i = 0; i < guard->room; i++)
+        for (size_t i = 0; i < guard->room; i++)
             if (guard->slots[i].path) *olat__slot(&grown, &guard->slots[i]) = guard->slots[i];
         free(guard->slots);
         *guard = grown;
     }
+    olat__known file;
     if ((file.path = (char *)malloc(2 * size)) == NULL)
         return olat__fail(error, "%s: out of memory", olat__tail(path));
     memcpy(file.path, path, size);
+    char *name;
     file.name = name = file.path + size;
     file.is_output = is_output;
     memcpy(name, path, size);
     if (id) memcpy(file.id, id, sizeof file.id), *name = 0;
     else olat__place(name, file.id);
-    slot = olat__slot(guard, &file);
+    olat__known *slot = olat__slot(guard, &file);
     if (!slot->path) {
         *slot = file;
         guard->count++;
@@ -1898,8 +1877,8 @@ OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[5
    case. */
 OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
     olat__known file;
-    const olat__known *input;
     file.name = "";
+    const olat__known *input;
     if (guard->room && olat__identify(path, file.id) && (input = olat__slot(guard, &file))->path) {
         return olat__fail(error, "%s: would replace an input, %s: choose another output folder",
                           olat__tail(path), olat__tail(input->path));
@@ -1910,20 +1889,17 @@ OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[
 /* A dataset as input: the JSON, and the images and masks that it names as far as it can be read. */
 OLAT__API int olat_guard_folder(olat_guard *guard, const char *folder, const char *split_json,
                                 char error[512]) {
-    const olat__node *frames, *node;
     char problem[512] = "";
     olat__json j;
-    int i, failed;
     olat__json_open(&j, folder, split_json, problem);
-    failed = j.path && olat_guard_input(guard, j.path, error);
-    frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
-    node = frames ? &j.nodes[frames->child] : NULL;
-    for (i = 0; frames && i < frames->size && !failed; i++, node = &j.nodes[node->next]) {
+    int failed = j.path && olat_guard_input(guard, j.path, error);
+    const olat__node *frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
+    const olat__node *node = frames ? &j.nodes[frames->child] : NULL;
+    for (int i = 0; frames && i < frames->size && !failed; i++, node = &j.nodes[node->next]) {
         char *files[2] = {NULL, NULL};
-        int k;
         j.failed = 0; /* what is wrong with one frame does not expose another's files */
         olat__read_paths(&j, node, folder, OLAT_NO_IMAGES | OLAT_ALLOW_PARENT, &files[0], &files[1]);
-        for (k = 0; k < 2; k++) {
+        for (int k = 0; k < 2; k++) {
             if (files[k] && !failed) failed = olat_guard_input(guard, files[k], error);
             free(files[k]);
         }
@@ -1935,8 +1911,7 @@ OLAT__API int olat_guard_folder(olat_guard *guard, const char *folder, const cha
 }
 
 OLAT__API void olat_guard_free(olat_guard *guard) {
-    size_t i;
-    for (i = 0; i < guard->room; i++) free(guard->slots[i].path);
+    for (size_t i = 0; i < guard->room; i++) free(guard->slots[i].path);
     free(guard->slots);
     memset(guard, 0, sizeof *guard);
 }
@@ -1975,8 +1950,8 @@ static int olat__writer_end(olat__writer *w, const char *path, char *error) {
 
 /* A JSON string, with its quotes. */
 static void olat__write_string(olat__writer *w, const char *text) {
-    char escape[8];
     olat__write(w, "\"");
+    char escape[8];
     for (; *text; text++) {
         if ((unsigned char)*text < 32) snprintf(escape, sizeof escape, "\\u%04x", (unsigned)*text);
         else snprintf(escape, sizeof escape, "%s%c", *text == '"' || *text == '\\' ? "\\" : "", *text);
@@ -1988,12 +1963,11 @@ static void olat__write_string(olat__writer *w, const char *text) {
 /* The numbers, with so many digits and a point in every locale, between two texts. */
 static void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count, int digits,
                                 const char *after) {
-    char text[64];
-    int i, k;
     olat__write(w, before);
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
+        char text[64];
         snprintf(text, sizeof text, "%s%.*g", i ? ", " : "", digits, v[i]);
-        for (k = i ? 2 : 0; text[k]; k++) {
+        for (int k = i ? 2 : 0; text[k]; k++) {
             if (!strchr("+-.0123456789einfa", text[k])) text[k] = '.';
         }
         olat__write(w, text);
@@ -2015,17 +1989,17 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
     static const double last_row[4] = {0, 0, 0, 1};
     const ssdgs_camera *camera = &frame->camera;
     const int is_point = frame->light.kind == SSDGS_LIGHT_POINT;
-    double v[4];
-    int k, m;
     olat__write_path(w, "\"file_path\": ", frame->file, folder);
     olat__write_path(w, "\"mask_path\": ", frame->mask, folder);
+    double v[4];
     v[0] = camera->width, v[1] = camera->height;
     olat__write_numbers(w, "\"w\": ", v, 1, 9, ", ");
     olat__write_numbers(w, "\"h\": ", v + 1, 1, 9, ",\n  ");
     v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx,
     v[3] = (double)camera->fy;
     olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, 9, "],\n  \"transform_matrix\": [");
-    for (k = 0; k < 3; k++) { /* camera to world, y up and z backward */
+    for (int k = 0; k < 3; k++) { /* camera to world, y up and z backward */
+        int m;
         for (m = 0, v[3] = origin[k]; m < 3; m++) {
             v[m] = (double)camera->view[4 * m + k];
             v[3] -= v[m] * (double)camera->view[4 * m + 3];
@@ -2035,9 +2009,9 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
         olat__write_numbers(w, "", v + 3, 1, 16, "], ");
     }
     olat__write_numbers(w, "[", last_row, 4, 9, "]],\n  ");
-    for (k = 0; k < 3; k++) v[k] = (double)frame->light.position[k] + (is_point ? origin[k] : 0);
+    for (int k = 0; k < 3; k++) v[k] = (double)frame->light.position[k] + (is_point ? origin[k] : 0);
     olat__write_numbers(w, is_point ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, is_point ? 16 : 9, "], ");
-    for (k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
+    for (int k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
     olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]}");
 }
 
@@ -2045,10 +2019,9 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
    poses, say. */
 OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset *set, char error[512]) {
     olat__writer w;
-    int i;
     olat__writer_start(&w);
     olat__write(&w, "{\"frames\": [");
-    for (i = 0; i < set->count; i++) {
+    for (int i = 0; i < set->count; i++) {
         olat__write(&w, i ? ",\n {" : "\n {");
         olat__write_frame(&w, &set->frames[i], set->origin, folder);
     }
@@ -2070,8 +2043,7 @@ OLAT__API void olat_print_notes(const olat_dataset *set, const char *program) {
    memory. */
 OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
     ssdgs_photo *photos = (ssdgs_photo *)calloc((size_t)set->count, sizeof *photos);
-    int i;
-    for (i = 0; photos && i < set->count; i++) {
+    for (int i = 0; photos && i < set->count; i++) {
         photos[i].camera = set->frames[i].camera;
         photos[i].light = set->frames[i].light;
         photos[i].pixels = set->frames[i].pixels;
@@ -2086,19 +2058,18 @@ OLAT__API void olat_compose(const olat_frame *frame, const ssdgs_real background
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const ssdgs_real unit =
         frame->format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
-    size_t i, k;
-    for (i = 0; i < pixels; i++) {
+    for (size_t i = 0; i < pixels; i++) {
         ssdgs_real v[4] = {0, 0, 0, 0};
-        for (k = 0; frame->pixels && k < 4; k++)
+        for (size_t k = 0; frame->pixels && k < 4; k++)
             v[k] = unit * (ssdgs_real)olat__sample(frame->pixels, frame->format, 4 * i + k);
-        for (k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * background[k];
+        for (size_t k = 0; k < 3; k++) out[3 * i + k] = v[3] * v[k] + (1 - v[3]) * background[k];
     }
 }
 
 /* Where a camera stands. */
 OLAT__API void olat_eye(const ssdgs_camera *camera, ssdgs_real eye[3]) {
-    int i, k;
-    for (i = 0; i < 3; i++)
+    int k;
+    for (int i = 0; i < 3; i++)
         for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
 }
 

@@ -66,16 +66,16 @@ typedef struct job {
 } job;
 
 static int parse(job *j, int argc, char **argv) {
-    int i, option, isa = 0;
-    const char *value;
+    int isa = 0;
     char *end = NULL;
-    for (i = 1; i < argc; i++) {
+    for (int i = 1; i < argc; i++) {
         if (argv[i][0] != '-') {
             if (j->dataset) return usage("a third file:", argv[i]);
             if (j->model_path) j->dataset = argv[i];
             else j->model_path = argv[i];
             continue;
         }
+        int option;
         for (option = 0; option < OPTION_COUNT && strcmp(argv[i], option_names[option]); option++) {}
         if (option == OPTION_COUNT) return usage("no such option:", argv[i]);
         if (option < TRAJECTORY && i + 1 == argc) return usage("a value is missing after", argv[i]);
@@ -83,7 +83,7 @@ static int parse(job *j, int argc, char **argv) {
     }
     j->out = j->given[OUT_FOLDER];
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
-    value = j->given[SPLIT];
+    const char *value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
     else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid"))
         return usage("no such split:", value);
@@ -110,8 +110,7 @@ static int parse(job *j, int argc, char **argv) {
 /* Makes the folder and those above it; what goes wrong shows when files are written. */
 static void make_folders(const char *path) {
     char *part = (char *)malloc(strlen(path) + 1);
-    size_t i;
-    for (i = 0; part; i++) {
+    for (size_t i = 0; part; i++) {
         if (i > 0 && (path[i] == '/' || path[i] == '\\' || !path[i])) {
             memcpy(part, path, i);
             part[i] = 0;
@@ -160,13 +159,13 @@ static int check_outputs(job *j) {
                                           "transforms_valid.json"};
     char error[512] = "";
     const char *const models[2] = {j->model_path, j->given[NETWORKS]};
-    int i, output, ok = 1;
-    for (i = 0; i < 3; i++)
+    int ok = 1;
+    for (int i = 0; i < 3; i++)
         if ((i < 2 && models[i] && olat_guard_input(&j->guard, models[i], error)) ||
             olat_guard_folder(&j->guard, j->dataset, splits[i], error))
             return !fail(error);
-    for (i = 0; i < j->data.count && ok; i++)
-        for (output = IMAGE; output < (j->given[COMPONENTS] ? OUTPUT_COUNT : IMAGE + 1) && ok; output++) {
+    for (int i = 0; i < j->data.count && ok; i++)
+        for (int output = IMAGE; output < (j->given[COMPONENTS] ? OUTPUT_COUNT : IMAGE + 1) && ok; output++) {
             char *path = output_path(j, &j->data.frames[i], suffixes[output]);
             ok = check_output(j, path);
             free(path);
@@ -187,15 +186,14 @@ static void write_numbers(olat__writer *w, const ssdgs_metrics *m) {
 
 static int write_metrics(const job *j, const ssdgs_metrics *mean) {
     char *path = output_path(j, NULL, ""), error[512] = "";
-    olat__writer w;
     const char *separator = "";
-    int i, failed;
     if (!path) return 0;
+    olat__writer w;
     olat__writer_start(&w);
     olat__write(&w, "{\n \"mean\": {");
     write_numbers(&w, mean);
     olat__write(&w, ",\n \"views\": [");
-    for (i = 0; i < j->data.count; i++) {
+    for (int i = 0; i < j->data.count; i++) {
         if (!j->data.frames[i].has_image) continue;
         olat__write(&w, separator);
         olat__write(&w, "\n  {\"file\": ");
@@ -205,7 +203,7 @@ static int write_metrics(const job *j, const ssdgs_metrics *mean) {
         separator = ",";
     }
     olat__write(&w, "\n ]\n}\n");
-    failed = olat__writer_end(&w, path, error);
+    const int failed = olat__writer_end(&w, path, error);
     if (failed) fail(error);
     free(path);
     return !failed;
@@ -220,8 +218,8 @@ typedef struct orbit {
 
 static void orbit_add(orbit *o, double axes[3][3], const ssdgs_real point[3], double share, int is_first) {
     double local[3];
-    int i, k;
-    for (i = 0; i < 3; i++)
+    int k;
+    for (int i = 0; i < 3; i++)
         for (k = 0, local[i] = 0; k < 3; k++) local[i] += axes[i][k] * ((double)point[k] - o->centre[k]);
     o->radius += share * sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2]);
     o->height += share * local[2];
@@ -232,10 +230,9 @@ static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real 
     double angle = o->azimuth + turn * PI / 180,
            around = sqrt(fmax(0, o->radius * o->radius - o->height * o->height));
     double local[3] = {around * cos(angle), around * sin(angle), o->height};
-    int i, k;
-    for (k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++) {
         double sum = o->centre[k];
-        for (i = 0; i < 3; i++) sum += local[i] * axes[i][k];
+        for (int i = 0; i < 3; i++) sum += local[i] * axes[i][k];
         point[k] = (ssdgs_real)sum;
     }
 }
@@ -243,14 +240,14 @@ static void orbit_at(const orbit *o, double axes[3][3], double turn, ssdgs_real 
 /* World axes with up last: z, unless the cameras' mean upward direction lies clearly along another one. */
 static void find_axes(const olat_dataset *data, double axes[3][3]) {
     double up[3] = {0, 0, 0};
-    int i, k, best = 2, sign;
-    for (i = 0; i < data->count; i++)
-        for (k = 0; k < 3; k++) up[k] -= (double)data->frames[i].camera.view[4 + k] / data->count;
-    for (k = 0; k < 3; k++)
+    int best = 2;
+    for (int i = 0; i < data->count; i++)
+        for (int k = 0; k < 3; k++) up[k] -= (double)data->frames[i].camera.view[4 + k] / data->count;
+    for (int k = 0; k < 3; k++)
         if (fabs(up[k]) > 1.5 * fabs(up[best]) && fabs(up[k]) > 0.2) best = k;
-    sign = up[best] < -0.2 ? -1 : 1;
-    for (i = 0; i < 3; i++)
-        for (k = 0; k < 3; k++) axes[i][k] = k == (best + 1 + i) % 3 ? (i > 0 ? sign : 1) : 0;
+    const int sign = up[best] < -0.2 ? -1 : 1;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) axes[i][k] = k == (best + 1 + i) % 3 ? (i > 0 ? sign : 1) : 0;
 }
 
 /* Replaces the frames of data, from which it takes its measures, by those of the path: the light goes round
@@ -258,40 +255,40 @@ static void find_axes(const olat_dataset *data, double axes[3][3]) {
    returns. */
 static int make_trajectory(job *j) {
     olat_dataset *data = &j->data;
-    olat_frame *frames;
-    ssdgs_camera first;
-    ssdgs_light light;
-    double axes[3][3], intensity[3] = {0, 0, 0};
-    orbit camera_orbit, light_orbit;
-    ssdgs_real eye[3], centre[3], up[3];
+    double intensity[3] = {0, 0, 0};
     ssdgs_model_view model = ssdgs_model_arrays(j->model);
-    int i, k, count = 2 * (150 + 90);
+    int count = 2 * (150 + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
-    first = data->frames[0].camera;
-    light = data->frames[0].light;
+    ssdgs_camera first = data->frames[0].camera;
+    const ssdgs_light light = data->frames[0].light;
+    double axes[3][3];
     find_axes(data, axes);
+    orbit camera_orbit;
     memset(&camera_orbit, 0, sizeof camera_orbit);
+    orbit light_orbit;
     memset(&light_orbit, 0, sizeof light_orbit);
-    for (k = 0; k < 3; k++) {
+    ssdgs_real centre[3], up[3];
+    for (int k = 0; k < 3; k++) {
         double sum = 0;
-        for (i = 0; i < model.count; i++)
+        for (int i = 0; i < model.count; i++)
             sum += (double)model.gaussians[(size_t)(SSDGS_POSITION + k) * model.stride + (size_t)i];
         centre[k] = (ssdgs_real)(model.count ? sum / model.count : 0);
         up[k] = (ssdgs_real)axes[2][k];
         camera_orbit.centre[k] = (double)centre[k];
         light_orbit.centre[k] = light.kind == SSDGS_LIGHT_POINT ? (double)centre[k] : 0;
     }
-    for (i = 0; i < data->count; i++) {
+    ssdgs_real eye[3];
+    for (int i = 0; i < data->count; i++) {
         const ssdgs_light *l = &data->frames[i].light;
         olat_eye(&data->frames[i].camera, eye);
         orbit_add(&camera_orbit, axes, eye, 1.0 / data->count, i == 0);
         orbit_add(&light_orbit, axes, l->position, 1.0 / data->count, 0);
-        for (k = 0; k < 3; k++) intensity[k] += (double)l->intensity[k] / data->count;
+        for (int k = 0; k < 3; k++) intensity[k] += (double)l->intensity[k] / data->count;
     }
     light_orbit.azimuth = camera_orbit.azimuth; /* starts at the viewer */
-    frames = (olat_frame *)calloc((size_t)count, sizeof *frames);
+    olat_frame *frames = (olat_frame *)calloc((size_t)count, sizeof *frames);
     if (!frames) return !fail("out of memory");
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         int half = i / 240, step = i % 240 + 1;
         double light_turn = step < 150 ? 2.4 * step : 0,
                camera_turn = (step > 150 ? 2.0 * (step - 150) : 0) + 180 * half;
@@ -303,7 +300,7 @@ static int make_trajectory(job *j) {
         camera->fy = first.fy;
         frames[i].light = light;
         orbit_at(&light_orbit, axes, light_turn, frames[i].light.position);
-        for (k = 0; k < 3; k++) frames[i].light.intensity[k] = (ssdgs_real)intensity[k];
+        for (int k = 0; k < 3; k++) frames[i].light.intensity[k] = (ssdgs_real)intensity[k];
     }
     olat_free(data);
     data->frames = frames;
@@ -314,17 +311,17 @@ static int make_trajectory(job *j) {
 /* ---- one view ---- */
 
 static int make_planes(job *j) {
-    ssdgs_real *next;
-    size_t most = 0, pixels;
-    int i, width = 0, height = 0;
-    for (i = 0; i < j->data.count; i++) {
+    size_t most = 0;
+    int width = 0, height = 0;
+    for (int i = 0; i < j->data.count; i++) {
         const ssdgs_camera *camera = &j->data.frames[i].camera;
         if (camera->width > width) width = camera->width;
         if (camera->height > height) height = camera->height;
-        pixels = (size_t)camera->width * (size_t)camera->height;
+        const size_t pixels = (size_t)camera->width * (size_t)camera->height;
         if (pixels > most) most = pixels;
     }
     j->metrics = (ssdgs_metrics *)calloc((size_t)j->data.count + 1, sizeof *j->metrics);
+    ssdgs_real *next;
     j->memory = next = (ssdgs_real *)malloc(most * 24 * sizeof *next + 1);
     j->bytes = (unsigned char *)malloc(most * 3 + 1);
     if (j->given[SHEET] && j->data.count > 0) {
@@ -374,16 +371,16 @@ static ssdgs_result render(job *j, int index, int components) {
     const ssdgs_render_options options =
         frame->has_image ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     ssdgs_image planes = j->planes;
-    ssdgs_render_stats stats;
-    ssdgs_result result;
-    size_t i;
     if (!components) {
         memset(&planes, 0, sizeof planes);
         planes.color = j->planes.color;
         planes.alpha = j->planes.alpha;
     }
-    result = ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, &stats);
+    ssdgs_render_stats stats;
+    const ssdgs_result result =
+        ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, &stats);
     if (result) return result;
+    size_t i;
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
     if (i == 3 * pixels) tell_black(j, frame, &stats);
     ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background,
@@ -397,7 +394,7 @@ static ssdgs_result render(job *j, int index, int components) {
 /* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as
    they are. */
 static void show(job *j, const olat_frame *frame, int output) {
-    size_t i, pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
+    size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     const ssdgs_image *p = &j->planes;
     ssdgs_real *out = p->color, nearest = (ssdgs_real)1e30, farthest = 0;
     int transfer = SSDGS_TRANSFER_NONE;
@@ -409,20 +406,21 @@ static void show(job *j, const olat_frame *frame, int output) {
     } else if (output == IMAGE) {
         out = j->image;
     } else if (output == NORMAL) { /* -1 .. 1 to 0 .. 1, nothing to black */
-        for (i = 0; i < 3 * pixels; i++) out[i] = (p->normal[i] + p->alpha[i / 3]) / 2;
+        for (size_t i = 0; i < 3 * pixels; i++) out[i] = (p->normal[i] + p->alpha[i / 3]) / 2;
     } else if (output == DEPTH) { /* nearest white, farthest dark, nothing black */
-        for (i = 0; i < pixels; i++) {
+        for (size_t i = 0; i < pixels; i++) {
             ssdgs_real depth = p->depth[i] / (p->alpha[i] + (ssdgs_real)1e-6);
             if (p->alpha[i] < (ssdgs_real)0.5) continue;
             if (depth < nearest) nearest = depth;
             if (depth > farthest) farthest = depth;
         }
-        for (i = 0; i < 3 * pixels; i++) {
+        for (size_t i = 0; i < 3 * pixels; i++) {
             ssdgs_real a = p->alpha[i / 3], depth = p->depth[i / 3] / (a + (ssdgs_real)1e-6);
             out[i] = a * (1 - (ssdgs_real)0.8 * (depth - nearest) / (farthest - nearest + (ssdgs_real)1e-6));
         }
     } else {
-        for (i = 0; i < 3 * pixels; i++) out[i] = output == SHADOW ? p->shadow[i / 3] : p->alpha[i / 3];
+        for (size_t i = 0; i < 3 * pixels; i++)
+            out[i] = output == SHADOW ? p->shadow[i / 3] : p->alpha[i / 3];
     }
     ssdgs_to_bytes(out, 3 * pixels, transfer, j->bytes);
 }
@@ -430,10 +428,10 @@ static void show(job *j, const olat_frame *frame, int output) {
 /* Puts the bytes, shrunk, into a cell of the sheet, which holds the largest frame. */
 static void paste(job *j, const olat_frame *frame, int row, int column) {
     const int n = j->shrink;
-    int x, y, c, k, sum;
-    for (y = 0; y < j->cell_height && (y + 1) * n <= frame->camera.height; y++)
-        for (x = 0; x < j->cell_width && (x + 1) * n <= frame->camera.width; x++)
-            for (c = 0; c < 3; c++) {
+    for (int y = 0; y < j->cell_height && (y + 1) * n <= frame->camera.height; y++)
+        for (int x = 0; x < j->cell_width && (x + 1) * n <= frame->camera.width; x++)
+            for (int c = 0; c < 3; c++) {
+                int k, sum;
                 for (sum = 0, k = 0; k < n * n; k++)
                     sum += j->bytes[3 * ((size_t)(y * n + k / n) * (size_t)frame->camera.width +
                                          (size_t)(x * n + k % n)) +
@@ -453,9 +451,9 @@ static int compare_names(const void *a, const void *b) {
 
 /* Whether one frame's name is another's with the suffix of an output. */
 static int names_overlap(const char *const *names, int count) {
-    int i, output, overlap = 0;
-    for (i = 0; i < count; i++)
-        for (output = DIFFUSE; output < OUTPUT_COUNT; output++) {
+    int overlap = 0;
+    for (int i = 0; i < count; i++)
+        for (int output = DIFFUSE; output < OUTPUT_COUNT; output++) {
             const char *end = strstr(names[i], suffixes[output]);
             char other[256];
             const char *key = other;
@@ -471,15 +469,15 @@ static int names_overlap(const char *const *names, int count) {
    another: they are numbered. */
 static int name_frames(olat_dataset *data) {
     const char **names = (const char **)malloc((size_t)data->count * sizeof *names + 1);
-    int i, named = 0, repeated = 0;
+    int named = 0, repeated = 0;
     if (!names) return !fail("out of memory");
-    for (i = 0; i < data->count; i++)
+    for (int i = 0; i < data->count; i++)
         if (data->frames[i].file) names[named++] = base_name(&data->frames[i]);
     qsort(names, (size_t)named, sizeof *names, compare_names);
-    for (i = 1; i < named; i++) repeated |= !compare_names(&names[i - 1], &names[i]);
+    for (int i = 1; i < named; i++) repeated |= !compare_names(&names[i - 1], &names[i]);
     repeated |= names_overlap(names, named);
     free(names);
-    for (i = 0; i < data->count; i++) {
+    for (int i = 0; i < data->count; i++) {
         olat_frame *frame = &data->frames[i];
         if (frame->file && !repeated) continue;
         free(frame->file);
@@ -493,18 +491,18 @@ static int name_frames(olat_dataset *data) {
 static int load_frames(job *j) {
     const ssdgs_real *from = ssdgs_model_settings(j->model)->origin;
     const double origin[3] = {(double)from[0], (double)from[1], (double)from[2]};
-    char error[512] = "", name[64], *path = (char *)malloc(strlen(j->dataset) + 64);
+    char error[512] = "", *path = (char *)malloc(strlen(j->dataset) + 64);
     const char *split = j->given[SPLIT];
     int valid = !strcmp(split, "valid"), path_wanted = j->given[TRAJECTORY] != NULL;
-    FILE *file;
     if (!path) return !fail("out of memory");
     if (valid) { /* the dataset's own path, or the one made here */
         sprintf(path, "%s/transforms_valid.json", j->dataset);
-        file = fopen(path, "rb");
+        FILE *file = fopen(path, "rb");
         if (file) fclose(file);
         else path_wanted = 1;
     }
     free(path);
+    char name[64];
     snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
     if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &j->data, error))
         return !fail(error);
@@ -515,7 +513,7 @@ static int load_frames(job *j) {
 static int relight(job *j) {
     ssdgs_metrics mean = {0, 0, 0};
     ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
-    int i, output, row = 0, scored = 0;
+    int row = 0, scored = 0;
     char error[512] = "";
     if (result) return fail(ssdgs_result_string(result));
     if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL))
@@ -532,12 +530,12 @@ static int relight(job *j) {
     if (!load_frames(j)) return 1;
     make_folders(j->out); /* so that paths can be told apart by what they are */
     if (!check_outputs(j) || !make_planes(j)) return 1;
-    for (i = 0; i < j->data.count; i++) {
+    for (int i = 0; i < j->data.count; i++) {
         const olat_frame *frame = &j->data.frames[i];
         int components = j->given[COMPONENTS] != NULL;
         int on_sheet = row < j->sheet_rows && i == (2 * row + 1) * j->data.count / (2 * j->sheet_rows);
         if (render(j, i, components || on_sheet)) return fail(ssdgs_error_message(j->context));
-        for (output = PHOTO; output < OUTPUT_COUNT; output++) {
+        for (int output = PHOTO; output < OUTPUT_COUNT; output++) {
             int written = output == IMAGE || (components && output != PHOTO),
                 pasted = on_sheet && output < SHEET_COLUMNS;
             if (!written && !pasted) continue;
@@ -571,9 +569,8 @@ static int relight(job *j) {
 
 int main(int argc, char **argv) {
     job j;
-    int status;
     memset(&j, 0, sizeof j);
-    status = parse(&j, argc, argv);
+    int status = parse(&j, argc, argv);
     if (!status) status = relight(&j);
     ssdgs_model_destroy(j.model);
     ssdgs_context_destroy(j.context);

@@ -129,17 +129,17 @@ static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *opti
                              const char *text) {
     unsigned char *const places[3] = {(unsigned char *)settings, (unsigned char *)options,
                                       (unsigned char *)bounds};
-    size_t length = strcspn(text, "="), i;
+    size_t length = strcspn(text, "=");
     const char *p = text + length, *problem = "--set knows no such number:";
-    int count = 0, n;
-    for (i = length; text[i]; i++) count += text[i] == '=' || text[i] == ',';
-    for (i = 0; i < sizeof fields / sizeof *fields; i++) {
+    int count = 0;
+    for (size_t i = length; text[i]; i++) count += text[i] == '=' || text[i] == ',';
+    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
         const field *f = fields + i;
         unsigned char *to = places[f->in] + f->at;
         if (strlen(f->name) != length || strncmp(text, f->name, length)) continue;
         problem = "cannot set (rates take START,END, corners X,Y,Z)";
         if (f->count != count) continue;
-        for (n = 0; n < count; n++) {
+        for (int n = 0; n < count; n++) {
             char *end;
             double value = strtod(p + 1, &end);
             ssdgs_real real = (ssdgs_real)value;
@@ -176,10 +176,9 @@ static int choose(const char *const *given, int option, const char *list, int *v
 }
 
 static int number(const char *const *given, int option, int least, int *value) {
-    char *end;
-    long parsed;
     if (!given[option]) return 1;
-    parsed = strtol(given[option], &end, 10);
+    char *end;
+    const long parsed = strtol(given[option], &end, 10);
     if (end == given[option] || *end || parsed < least || parsed > 2000000000) {
         char problem[64];
         snprintf(problem, sizeof problem, "%s needs a number from %d up, not", option_names[option], least);
@@ -227,7 +226,6 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
     int done = stats->iteration, total = r->iterations;
     int percent = (int)(100.0 * done / total), finished = done >= total;
     double now = seconds_now();
-    char left[32];
     r->done = done;
     if (r->first < 0) { /* the first step also allocates: time starts after it */
         r->first = r->drawn_at = done;
@@ -236,6 +234,7 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
         r->psnr = stats->psnr;
     }
     r->psnr += 0.02 * (stats->psnr - r->psnr);
+    char left[32];
     if (done == r->first + 50) {
         r->speed = 50 / (now - r->start + 1e-9);
         fprintf(stderr, "at this speed %s for the %d iterations left; it falls as Gaussians are added\n",
@@ -281,15 +280,15 @@ static void hear(void *user, ssdgs_result code, const char *message) {
 }
 
 static int parse(job *j, int argc, char **argv) {
-    const char **given = j->given, *terms;
-    const char *problem;
-    int i, option, sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
-    for (i = 1; i < argc; i++) {
+    const char **given = j->given;
+    int sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
+    for (int i = 1; i < argc; i++) {
         if (argv[i][0] != '-') {
             if (j->dataset) return usage("a second dataset:", argv[i]);
             j->dataset = argv[i];
             continue;
         }
+        int option;
         for (option = 0; option < OPTION_COUNT && strcmp(argv[i], option_names[option]); option++) {}
         if (option == OPTION_COUNT) return usage("no such option:", argv[i]);
         if (option < RESUME && i + 1 == argc) return usage("a value is missing after", argv[i]);
@@ -307,7 +306,7 @@ static int parse(job *j, int argc, char **argv) {
         return usage("no such transfer:", given[TRANSFER]);
     if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))
         return usage("no such schedule:", given[SCHEDULE]);
-    terms = given[TERMS];
+    const char *terms = given[TERMS];
     if (terms) j->settings.terms = 0;
     while (terms) {
         size_t length = strcspn(terms, ",");
@@ -329,11 +328,12 @@ static int parse(job *j, int argc, char **argv) {
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
     if (given[REFINE]) j->options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
         j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
     }
-    for (i = 0; i < sets; i++)
+    const char *problem;
+    for (int i = 0; i < sets; i++)
         if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL)
             return usage(problem, argv[i]);
     j->desc.isa = (ssdgs_isa)isa;
@@ -351,8 +351,8 @@ static int fail(const char *message) {
 static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps,
                              const char *label) {
     ssdgs_metrics m, mean = {0, 0, 0};
-    int i, count = (all + step - 1) / step;
-    for (i = 0; i < count; i++) {
+    int count = (all + step - 1) / step;
+    for (int i = 0; i < count; i++) {
         ssdgs_photo photo = photos[i * step];
         ssdgs_result result =
             fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
@@ -368,12 +368,12 @@ static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int ste
 
 static void print_peak_memory(void) {
 #ifndef _WIN32
-    struct rusage used;
 #ifdef __APPLE__
     double unit = 1; /* bytes there, KiB elsewhere */
 #else
     double unit = 1024;
 #endif
+    struct rusage used;
     if (!getrusage(RUSAGE_SELF, &used))
         printf(", peak memory %.0f MiB", (double)used.ru_maxrss * unit / 1048576);
 #endif
@@ -383,13 +383,12 @@ static void print_peak_memory(void) {
    training. */
 static int check_outputs(job *j, const char *train_json, char error[512]) {
     const char *const outputs[3] = {j->given[OUTPUT], j->checkpoint, j->refined};
-    int i;
     if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_train.json", error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_valid.json", error))
         return 1;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         if (outputs[i] &&
             (olat_guard_output(&j->guard, outputs[i], error) || olat_check_writable(outputs[i], error)))
             return 1;
@@ -399,9 +398,9 @@ static int check_outputs(job *j, const char *train_json, char error[512]) {
 /* A run that is further than this one must not be lost for it. */
 static int check_checkpoint(job *j, char error[512]) {
     FILE *file = fopen(j->checkpoint, "rb");
-    int done;
     if (!file) return 0;
     fclose(file);
+    int done;
     if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done))
         return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o",
                        ssdgs_error_message(j->context)),
@@ -420,14 +419,13 @@ static int check_checkpoint(job *j, char error[512]) {
 /* The training photographs' cameras and lights as refined, for what follows and in a file beside the
    model. */
 static int save_refined(job *j, char error[512]) {
-    int i, failed;
-    for (i = 0; i < j->train_set.count; i++) {
+    for (int i = 0; i < j->train_set.count; i++) {
         olat_frame *frame = &j->train_set.frames[i];
         ssdgs_trainer_refined(j->trainer, i, &frame->camera, &frame->light);
         j->photos[i].camera = frame->camera;
         j->photos[i].light = frame->light;
     }
-    failed = olat_save(j->refined, j->dataset, &j->train_set, error);
+    const int failed = olat_save(j->refined, j->dataset, &j->train_set, error);
     if (!failed)
         printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n",
                j->refined);
@@ -437,13 +435,10 @@ static int save_refined(job *j, char error[512]) {
 static int train(job *j) {
     const char *output = j->given[OUTPUT],
                *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
-    char error[512] = "", text[32], *test_json = (char *)malloc(strlen(j->dataset) + 32);
-    int i, width = 0, height = 0, has_test;
+    char error[512] = "", *test_json = (char *)malloc(strlen(j->dataset) + 32);
+    int width = 0, height = 0;
     const int refines = j->options.refine != 0;
     double start = seconds_now();
-    ssdgs_result result;
-    FILE *file;
-
     j->checkpoint = (char *)malloc(strlen(output) + 8);
     if (refines) j->refined = (char *)malloc(strlen(output) + 16);
     if (!j->checkpoint || !test_json || (refines && !j->refined))
@@ -451,8 +446,8 @@ static int train(job *j) {
     sprintf(j->checkpoint, "%s.ckpt", output);
     if (refines) sprintf(j->refined, "%s.refined.json", output);
     sprintf(test_json, "%s/transforms_test.json", j->dataset);
-    file = fopen(test_json, "rb");
-    has_test = file != NULL;
+    FILE *file = fopen(test_json, "rb");
+    const int has_test = file != NULL;
     if (file) fclose(file);
     free(test_json);
     if (check_outputs(j, train_json, error)) return fail(error);
@@ -463,18 +458,18 @@ static int train(job *j) {
         return fail(error);
     olat_print_notes(&j->train_set, "train");
     if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         j->settings.origin[i] = (ssdgs_real)j->train_set.origin[i];
         j->options.bounds_min[i] = (ssdgs_real)(j->bounds.bounds_min[i] - j->train_set.origin[i]);
         j->options.bounds_max[i] = (ssdgs_real)(j->bounds.bounds_max[i] - j->train_set.origin[i]);
     }
     j->photos = olat_photos(&j->train_set);
     if (!j->photos) return fail("out of memory");
-    for (i = 0; i < j->train_set.count; i++) {
+    for (int i = 0; i < j->train_set.count; i++) {
         if (j->photos[i].camera.width > width) width = j->photos[i].camera.width;
         if (j->photos[i].camera.height > height) height = j->photos[i].camera.height;
     }
-    result = ssdgs_context_create(&j->desc, &j->context);
+    ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
     if (!j->given[RESUME] && check_checkpoint(j, error)) return fail(error);
     if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
@@ -515,6 +510,7 @@ static int train(job *j) {
         return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
                fail(error);
     }
+    char text[32];
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_arrays(j->model).count,
            clock_text(seconds_now() - start, text));
     print_peak_memory();
@@ -539,9 +535,8 @@ static int train(job *j) {
 
 int main(int argc, char **argv) {
     job j;
-    int status;
     memset(&j, 0, sizeof j);
-    status = parse(&j, argc, argv);
+    int status = parse(&j, argc, argv);
     if (!status) status = train(&j);
     ssdgs_trainer_destroy(j.trainer);
     ssdgs_model_destroy(j.model);

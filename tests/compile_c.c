@@ -57,7 +57,6 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_checkpoint_iteration)};
 
 int main(void) {
-    size_t i;
-    for (i = 0; i < sizeof functions / sizeof functions[0]; i++) CHECK(functions[i] != NULL);
+    for (size_t i = 0; i < sizeof functions / sizeof functions[0]; i++) CHECK(functions[i] != NULL);
     TEST_END();
 }

@@ -38,17 +38,15 @@ static void make_photos(void) {
 static ssdgs_result train(ssdgs_model *model, uint64_t *hash) {
     ssdgs_train_options options = ssdgs_train_options_default();
     ssdgs_trainer *trainer = NULL;
-    ssdgs_model_view v;
-    ssdgs_result result;
     options.iterations = 50;
     options.schedule = SSDGS_SCHEDULE_JOINT;
     options.initial_points = 500;
     options.densify_every = options.densify_from = 20;
     options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
-    result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
+    ssdgs_result result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
     if (!result) result = ssdgs_trainer_run(trainer, NULL, NULL);
     ssdgs_trainer_destroy(trainer);
-    v = ssdgs_model_arrays(model);
+    ssdgs_model_view v = ssdgs_model_arrays(model);
     for (size_t c = 0; c < SSDGS_CHANNELS; c++)
         *hash = hash_bytes(*hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     *hash = hash_bytes(*hash, v.scattering, v.scattering_count * sizeof(ssdgs_real));
@@ -88,10 +86,9 @@ int main(void) {
             ssdgs_context_desc desc = {0};
             ssdgs_context *context = NULL;
             ssdgs_model *model = NULL;
-            ssdgs_result result;
             desc.isa = (ssdgs_isa)isa;
             if (ssdgs_context_create(&desc, &context)) continue;
-            result = ssdgs_model_create(context, &settings, 0, &model);
+            ssdgs_result result = ssdgs_model_create(context, &settings, 0, &model);
             if (!result) result = train(model, &trained);
             if (!result) result = render(model, &rendered);
             printf("%s %s %s: trained %016llx rendered %016llx%s%s\n",

@@ -11,20 +11,19 @@ int main(void) {
     enum { SIZE = 16, STEPS = 5 };
     static unsigned char pixels[SIZE * SIZE * 4]; /* a grey disc on nothing */
     static ssdgs_real eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-    char name[] = "manual", path[] = "build/manual_model.ply", missing[] = "build/manual_missing.ply",
-         *arguments[3];
+    char name[] = "manual", path[] = "build/manual_model.ply", missing[] = "build/manual_missing.ply";
     ssdgs_photo photo;
-    int x, y, c;
     memset(&photo, 0, sizeof photo);
     photo.camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIZE, SIZE);
     photo.light.position[2] = 3;
-    for (c = 0; c < 3; c++) photo.light.intensity[c] = 9;
-    for (y = 0; y < SIZE; y++)
-        for (x = 0; x < SIZE; x++)
-            for (c = 0; c < 4; c++)
+    for (int c = 0; c < 3; c++) photo.light.intensity[c] = 9;
+    for (int y = 0; y < SIZE; y++)
+        for (int x = 0; x < SIZE; x++)
+            for (int c = 0; c < 4; c++)
                 pixels[(y * SIZE + x) * 4 + c] =
                     (2 * x - 15) * (2 * x - 15) + (2 * y - 15) * (2 * y - 15) < 100 ? c < 3 ? 128 : 255 : 0;
     photo.pixels = pixels;
+    char *arguments[3];
     arguments[0] = name;
     arguments[1] = path;
     arguments[2] = NULL;

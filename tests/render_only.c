@@ -13,25 +13,23 @@ int main(void) {
     ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL};
     ssdgs_settings settings[2];
     uint64_t hash = 1;
-    int kind, i, c;
     settings[0] = ssdgs_settings_default();
     settings[1] = ssdgs_settings_published();
-    for (kind = 0; kind < 2; kind++) {
+    for (int kind = 0; kind < 2; kind++) {
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
-        ssdgs_model_view view;
         if (ssdgs_context_create(NULL, &context) ||
             ssdgs_model_create(context, &settings[kind], COUNT, &model))
             return 1;
-        view = ssdgs_model_arrays(model);
-        for (i = 0; i < COUNT; i++)
-            for (c = 0; c < SSDGS_CHANNELS; c++)
+        ssdgs_model_view view = ssdgs_model_arrays(model);
+        for (int i = 0; i < COUNT; i++)
+            for (int c = 0; c < SSDGS_CHANNELS; c++)
                 view.gaussians[(size_t)c * view.stride + (size_t)i] +=
                     (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(i * SSDGS_CHANNELS + c)) - 0.4);
         if (ssdgs_render(model, &camera, &light, 1, &image)) return 1;
-        for (i = 0; i < (int)sizeof color; i++)
+        for (int i = 0; i < (int)sizeof color; i++)
             hash = (hash ^ ((const unsigned char *)color)[i]) * UINT64_C(0x100000001B3);
-        for (i = 0; i < (int)sizeof depth; i++)
+        for (int i = 0; i < (int)sizeof depth; i++)
             hash = (hash ^ ((const unsigned char *)depth)[i]) * UINT64_C(0x100000001B3);
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);

@@ -29,21 +29,19 @@ static int failed(show *s, const char *message) {
 
 static ssdgs_result show_visibility(void *user, ssdgs_frame *frame) {
     ssdgs_result result = ssdgs_stage_cpu(frame, SSDGS_STAGE_SHADE);
-    int i, c;
     (void)user;
-    for (i = 0; !result && i < frame->gaussians.count; i++)
-        for (c = 0; c < 3; c++) frame->color[4 * i + c] = frame->visibility[i];
+    for (int i = 0; !result && i < frame->gaussians.count; i++)
+        for (int c = 0; c < 3; c++) frame->color[4 * i + c] = frame->visibility[i];
     frame->layer_count = 0; /* no highlights on it */
     return result;
 }
 
 static int open_dataset(show *s, const char *folder, const char *background) {
-    int i;
-    for (i = 0; i < 3; i++) s->background[i] = (ssdgs_real)!strcmp(background, "white");
+    for (int i = 0; i < 3; i++) s->background[i] = (ssdgs_real)!strcmp(background, "white");
     if (olat_load(folder, "transforms_test.json", 0, &s->set, s->error)) return 1;
     s->width = s->set.frames[0].camera.width;
     s->height = s->set.frames[0].camera.height;
-    for (i = 1; i < s->set.count; i++)
+    for (int i = 1; i < s->set.count; i++)
         if (s->set.frames[i].camera.width != s->width || s->set.frames[i].camera.height != s->height)
             return failed(s, "the views differ in size");
     s->image = (ssdgs_real *)malloc(sizeof *s->image * 4 * (size_t)s->width * (size_t)s->height);
@@ -54,11 +52,11 @@ static int open_dataset(show *s, const char *folder, const char *background) {
 }
 
 static int open_model(show *s, const char *path) {
-    ssdgs_context_desc desc;
-    ssdgs_gpu_hook gpu;
     ssdgs_model_destroy(s->model);
     s->model = NULL;
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
+    ssdgs_gpu_hook gpu;
     memset(&gpu, 0, sizeof gpu);
     gpu.stage[SSDGS_STAGE_SHADE] = show_visibility;
     desc.gpu = &gpu;
@@ -79,8 +77,7 @@ static int make_sheet(show *s, int columns, int rows) {
 
 /* Copies a cell's size of (.., stride) pixels of RGB from x, y on. */
 static void paste(show *s, int row, int column, const unsigned char *from, int stride, int x, int y) {
-    int line;
-    for (line = 0; line < s->height; line++)
+    for (int line = 0; line < s->height; line++)
         memcpy(
             s->sheet +
                 3 * (((size_t)row * (size_t)s->height + (size_t)line) * (size_t)s->columns + (size_t)column) *
@@ -107,19 +104,17 @@ static int render(show *s, const ssdgs_camera *camera, const ssdgs_light *light)
 static int pipeline(show *s, const char *model) {
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     const int rows = s->set.count < ROWS ? s->set.count : ROWS;
-    int row, column, c;
-    size_t i;
     if (ssdgs_model_load(s->coarse, model, &s->coarse_model, NULL))
         return failed(s, ssdgs_error_message(s->coarse));
     if (make_sheet(s, 4, rows)) return 1;
-    for (row = 0; row < rows; row++) {
+    for (int row = 0; row < rows; row++) {
         const olat_frame *frame = &s->set.frames[(2 * row + 1) * s->set.count / (2 * rows)];
         const ssdgs_settings *settings = ssdgs_model_settings(s->model);
         const ssdgs_real up[3] = {0, 0, 1},
                          field = (ssdgs_real)(2 * atan(0.5 * s->width / (double)frame->camera.fx));
         const ssdgs_camera from_light =
             ssdgs_camera_look_at(frame->light.position, settings->centre, up, field, s->width, s->height);
-        for (column = 0; column < 4; column++) {
+        for (int column = 0; column < 4; column++) {
             ssdgs_image planes;
             ssdgs_result result = SSDGS_OK;
             memset(&planes, 0, sizeof planes);
@@ -133,8 +128,8 @@ static int pipeline(show *s, const char *model) {
                     ssdgs_render(s->model, column ? &frame->camera : &from_light, &frame->light, 1, &planes);
             if (result) return failed(s, ssdgs_error_message(column == 1 ? s->coarse : s->context));
             if (column < 3) {
-                for (i = 0; i < pixels && column != 1; i++)
-                    for (c = 0; c < 3; c++)
+                for (size_t i = 0; i < pixels && column != 1; i++)
+                    for (int c = 0; c < 3; c++)
                         s->image[3 * i + (size_t)c] = column ? s->alpha[i] : 1 - s->alpha[i];
                 ssdgs_to_bytes(s->image, 3 * pixels, SSDGS_TRANSFER_NONE, s->bytes);
             } else if (render(s, &frame->camera, &frame->light)) {
@@ -147,10 +142,9 @@ static int pipeline(show *s, const char *model) {
 }
 
 static int sweeps(show *s) {
-    int row, column;
     if (make_sheet(s, COLUMNS, 2)) return 1;
-    for (row = 0; row < 2; row++)
-        for (column = 0; column < COLUMNS; column++) {
+    for (int row = 0; row < 2; row++)
+        for (int column = 0; column < COLUMNS; column++) {
             const olat_frame *other = &s->set.frames[column * s->set.count / COLUMNS];
             if (render(s, &s->set.frames[row ? column * s->set.count / COLUMNS : 0].camera,
                        row ? &s->set.frames[0].light : &other->light))
@@ -162,11 +156,10 @@ static int sweeps(show *s) {
 
 /* The cosine of the angle at the centre between the eye and the light. */
 static double facing(const olat_frame *frame, const ssdgs_real centre[3]) {
-    double to_eye[3], to_light[3];
     ssdgs_real eye[3];
-    int i;
     olat_eye(&frame->camera, eye);
-    for (i = 0; i < 3; i++) {
+    double to_eye[3], to_light[3];
+    for (int i = 0; i < 3; i++) {
         to_eye[i] = (double)(eye[i] - centre[i]);
         to_light[i] = (double)(frame->light.position[i] - centre[i]);
     }
@@ -177,9 +170,8 @@ static double facing(const olat_frame *frame, const ssdgs_real centre[3]) {
 static double brightness(show *s, const olat_frame *frame) {
     const ssdgs_real black[3] = {0, 0, 0};
     double sum = 0;
-    size_t i;
     olat_compose(frame, black, s->image);
-    for (i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++)
+    for (size_t i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++)
         sum += (double)s->image[i];
     return sum;
 }
@@ -188,8 +180,7 @@ static int backlit(show *s, const char *const *models, int count) {
     const int width = s->width, height = s->height;
     const olat_frame *chosen = s->set.frames;
     double most = 0;
-    int i;
-    for (i = 0; i < s->set.count; i++) {
+    for (int i = 0; i < s->set.count; i++) {
         const double light = brightness(s, s->set.frames + i);
         if (facing(s->set.frames + i, ssdgs_model_settings(s->model)->centre) > -0.25 || light <= most)
             continue;
@@ -202,7 +193,7 @@ static int backlit(show *s, const char *const *models, int count) {
     olat_compose(chosen, s->background, s->image);
     ssdgs_to_bytes(s->image, 3 * (size_t)width * (size_t)height, SSDGS_TRANSFER_NONE, s->bytes);
     paste(s, 0, 0, s->bytes, width, width / 4, height / 4);
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         if (open_model(s, models[i]) || render(s, &chosen->camera, &chosen->light)) return 1;
         paste(s, 0, 1 + i, s->bytes, width, width / 4, height / 4);
     }
@@ -210,12 +201,10 @@ static int backlit(show *s, const char *const *models, int count) {
 }
 
 static int strip(show *s, int columns, const char *const *files, int count) {
-    int i;
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         void *pixels = NULL;
         ssdgs_pixels format;
-        int width, height, bad;
-        size_t p, c;
+        int width, height;
         if (olat_read_png(files[i], &width, &height, &format, &pixels, s->error)) return 1;
         if (i == 0) {
             s->width = width;
@@ -223,10 +212,10 @@ static int strip(show *s, int columns, const char *const *files, int count) {
             s->bytes = (unsigned char *)malloc(3 * (size_t)width * (size_t)height);
             if (make_sheet(s, columns, (count + columns - 1) / columns)) s->columns = 0;
         }
-        bad = !s->bytes || !s->sheet || width != s->width || height != s->height ||
-              format != SSDGS_PIXELS_RGBA8;
-        for (p = 0; !bad && p < (size_t)width * (size_t)height; p++)
-            for (c = 0; c < 3; c++) s->bytes[3 * p + c] = ((const uint8_t *)pixels)[4 * p + c];
+        const int bad = !s->bytes || !s->sheet || width != s->width || height != s->height ||
+                        format != SSDGS_PIXELS_RGBA8;
+        for (size_t p = 0; !bad && p < (size_t)width * (size_t)height; p++)
+            for (size_t c = 0; c < 3; c++) s->bytes[3 * p + c] = ((const uint8_t *)pixels)[4 * p + c];
         free(pixels);
         if (bad) return failed(s, "the images differ, or are too large");
         paste(s, i / columns, i % columns, s->bytes, width, 0, 0);
@@ -241,12 +230,11 @@ static int strip(show *s, int columns, const char *const *files, int count) {
 static double shift(const ssdgs_camera *a, const ssdgs_camera *b) {
     const ssdgs_camera *const cameras[2] = {a, b};
     double sum = 0;
-    int corner, c, k;
-    for (corner = 0; corner < 8; corner++) {
+    for (int corner = 0; corner < 8; corner++) {
         double at[2][2];
-        for (c = 0; c < 2; c++) {
+        for (int c = 0; c < 2; c++) {
             double x[3];
-            for (k = 0; k < 3; k++) {
+            for (int k = 0; k < 3; k++) {
                 const ssdgs_real *row = cameras[c]->view + 4 * k;
                 x[k] = (double)row[3] + 0.25 * ((corner & 1 ? 1 : -1) * (double)row[0] +
                                                 (corner & 2 ? 1 : -1) * (double)row[1] +
@@ -263,16 +251,15 @@ static double shift(const ssdgs_camera *a, const ssdgs_camera *b) {
 
 static int poses(show *s, const char *truth, const char *fitted) {
     double distance = 0, turn = 0, apart_px = 0, light = 0;
-    int i, k, m;
     if (olat_load("", truth, OLAT_NO_IMAGES, &s->set, s->error) ||
         olat_load("", fitted, OLAT_NO_IMAGES, &s->other, s->error))
         return 1;
     if (s->set.count != s->other.count) return failed(s, "the files differ in frames");
-    for (i = 0; i < s->set.count; i++) {
+    for (int i = 0; i < s->set.count; i++) {
         const ssdgs_real *a = s->set.frames[i].camera.view, *b = s->other.frames[i].camera.view;
         double apart[3] = {0, 0, 0}, trace = 0, lights[3];
-        for (k = 0; k < 3; k++) {
-            for (m = 0; m < 3; m++) {
+        for (int k = 0; k < 3; k++) {
+            for (int m = 0; m < 3; m++) {
                 apart[k] +=
                     (double)a[4 * m + k] * (double)a[4 * m + 3] - (double)b[4 * m + k] * (double)b[4 * m + 3];
                 trace += (double)a[4 * k + m] * (double)b[4 * k + m];
@@ -291,9 +278,10 @@ static int poses(show *s, const char *truth, const char *fitted) {
 
 int main(int argc, char **argv) {
     const char *what = argc > 1 ? argv[1] : "", *const *files = (const char *const *)argv + 5;
-    int status, columns = argc > 3 ? atoi(argv[3]) : 0;
+    int columns = argc > 3 ? atoi(argv[3]) : 0;
     show s;
     memset(&s, 0, sizeof s);
+    int status;
     if (!strcmp(what, "poses") && argc == 4) status = poses(&s, argv[2], argv[3]);
     else if (!strcmp(what, "strip") && argc > 4 && columns > 0)
         status = strip(&s, columns, files - 1, argc - 4);

@@ -151,10 +151,10 @@ enum { LAWS = sizeof laws / sizeof *laws };
 /* 1 / the unit in the last place of a float of this size. */
 static double per_ulp(double size) {
     uint64_t bits, least = (uint64_t)(1023 - 126) << 52;
-    double inverse;
     memcpy(&bits, &size, 8);
     bits &= (uint64_t)0x7FF << 52;
     bits = ((uint64_t)(2 * 1023 + 23) << 52) - (bits > least ? bits : least);
+    double inverse;
     memcpy(&inverse, &bits, 8);
     return inverse;
 }
@@ -179,15 +179,15 @@ static void test_law(const struct law *law, uint64_t step) {
                              0.0031308f, 0.04045f,  0.5f,        86.5f,       1e-30f};
     static double want[CHUNK], scale[CHUNK];
     double worst[SSDGS_ISA_COUNT], value = 0, inverse = 0;
-    float at[SSDGS_ISA_COUNT], last = -1;
+    float last = -1;
     uint64_t next = 0;
-    char key[64];
-    int more = 1, i;
+    int more = 1;
     memset(worst, 0, sizeof worst);
+    float at[SSDGS_ISA_COUNT];
     memset(at, 0, sizeof at);
     while (more) {
         more = next >> 32 == 0;
-        for (i = 0; i < CHUNK; i++) {
+        for (int i = 0; i < CHUNK; i++) {
             float x = from_bits(next), c = law_input(law, x);
             if (more) {
                 next += c == x ? step : 4001;
@@ -207,18 +207,19 @@ static void test_law(const struct law *law, uint64_t step) {
         EVERY_ISA {
             double most = worst[isa];
             apply(law->map);
-            for (i = 0; i < CHUNK; i++) {
+            for (int i = 0; i < CHUNK; i++) {
                 const double error = fabs((double)out[i] - want[i]) * scale[i];
                 most = error > most ? error : most;
             }
             if (!k->finite(out, CHUNK)) most = 1e300;
-            for (i = 0; most > worst[isa] && i < CHUNK; i++)
+            for (int i = 0; most > worst[isa] && i < CHUNK; i++)
                 if (!test_finite((double)out[i]) || fabs((double)out[i] - want[i]) * scale[i] >= most)
                     at[isa] = in[0][i];
             worst[isa] = most;
         }
     }
     EVERY_ISA {
+        char key[64];
         sprintf(key, "ulp_%s_%s", law->name, isa_name());
         figure(key, worst[isa]);
         if (!CHECK(worst[isa] <= law->bound) || step == 1)
@@ -233,22 +234,21 @@ static void test_not_numbers(void) {
         float below, above;
     } ends[] = {{EXP, -87, 87}, {SIGMOID, -87, 87}, {SOFTPLUS, -87, 0}, {EXP2, -126, 0}};
     const float infinite = from_bits(0x7F800000u);
-    float limit[2];
-    size_t e;
-    int i, map;
     EVERY_ISA {
-        for (map = EXP2; map <= SOFTPLUS; map++) {
+        for (int map = EXP2; map <= SOFTPLUS; map++) {
             if (map == LOG) continue; /* its callers have bounds of their own */
-            for (i = 0; i < CHUNK; i++) in[0][i] = from_bits(i & 1 ? 0x7FC00000u : 0xFFC00001u);
+            for (int i = 0; i < CHUNK; i++) in[0][i] = from_bits(i & 1 ? 0x7FC00000u : 0xFFC00001u);
             apply(map);
+            int i;
             for (i = 0; i < CHUNK && !test_finite((double)out[i]);) i++;
             CHECK(i == CHUNK);
         }
-        for (e = 0; e < sizeof ends / sizeof *ends; e++) {
-            for (i = 0; i < CHUNK; i++) in[0][i] = i & 1 ? ends[e].above : ends[e].below;
+        for (size_t e = 0; e < sizeof ends / sizeof *ends; e++) {
+            for (int i = 0; i < CHUNK; i++) in[0][i] = i & 1 ? ends[e].above : ends[e].below;
             apply(ends[e].map);
+            float limit[2];
             memcpy(limit, out, sizeof limit);
-            for (i = 0; i < CHUNK; i++)
+            for (int i = 0; i < CHUNK; i++)
                 in[0][i] = i & 1 && ends[e].above > 0 ? infinite : i & 1 ? ends[e].above : -infinite;
             apply(ends[e].map);
             CHECK(limit[0] > 0 && !memcmp(out, limit, sizeof limit));
@@ -262,22 +262,22 @@ static void test_encode(void) {
     enum { LEVELS = 4 };
     static float x[BLOCK], code[(1 + 2 * LEVELS) * BLOCK];
     double worst = 0;
-    int i, l, round;
     EVERY_ISA {
-        for (round = 0; round < 200; round++) {
-            for (i = 0; i < BLOCK; i++) x[i] = (float)(20 * draw((uint64_t)(round * BLOCK + i)) - 10);
+        for (int round = 0; round < 200; round++) {
+            for (int i = 0; i < BLOCK; i++) x[i] = (float)(20 * draw((uint64_t)(round * BLOCK + i)) - 10);
             k->encode(code, x, NULL, 1, 1, LEVELS);
-            for (l = 0; l < LEVELS; l++)
-                for (i = 0; i < BLOCK; i++) {
+            for (int l = 0; l < LEVELS; l++)
+                for (int i = 0; i < BLOCK; i++) {
                     const double angle = (1 << l) * (double)x[i];
                     worst = max(worst, gap((double)code[(1 + l) * BLOCK + i], sin(angle)));
                     worst = max(worst, gap((double)code[(1 + LEVELS + l) * BLOCK + i], cos(angle)));
                 }
         }
-        for (i = 0; i < BLOCK; i++) x[i] = (float)((i & 1 ? -1 : 1) * pow(10, 0.6 * i));
+        for (int i = 0; i < BLOCK; i++) x[i] = (float)((i & 1 ? -1 : 1) * pow(10, 0.6 * i));
         x[BLOCK - 1] = from_bits(0x7F800000u);
         k->encode(code, x, NULL, 1, 1, LEVELS);
         CHECK(k->finite(code + BLOCK, 2 * LEVELS * BLOCK));
+        int i;
         for (i = BLOCK; i < (1 + 2 * LEVELS) * BLOCK && fabs((double)code[i]) <= 1.00001;) i++;
         CHECK(i == (1 + 2 * LEVELS) * BLOCK);
     }
@@ -292,8 +292,7 @@ typedef double function(const double *p, const void *with);
 static double slope(function *f, double *p, int i, const void *with, double h) {
     const double p0 = p[i];
     double side[4];
-    int s;
-    for (s = 0; s < 4; s++) p[i] = p0 + h * (s < 2 ? s - 2 : s - 1), side[s] = f(p, with);
+    for (int s = 0; s < 4; s++) p[i] = p0 + h * (s < 2 ? s - 2 : s - 1), side[s] = f(p, with);
     p[i] = p0;
     return (8 * (side[2] - side[1]) - (side[3] - side[0])) / (12 * h);
 }
@@ -331,20 +330,19 @@ static double profile(const double *p, const void *with) {
 static void kernel_profile(const medium *m, const ssdgs_real *r, int n, ssdgs_real *f,
                            ssdgs_real *derivatives) {
     ssdgs_real ss[NODES], sa[NODES];
-    int i;
-    for (i = 0; i < n; i++) ss[i] = (ssdgs_real)m->ss, sa[i] = (ssdgs_real)m->sa;
+    for (int i = 0; i < n; i++) ss[i] = (ssdgs_real)m->ss, sa[i] = (ssdgs_real)m->sa;
     OF_ISA(ssdgs__profile, (m->form, ss, sa, r, (ssdgs_real)boundary(m->eta), f, derivatives, (size_t)n));
 }
 
 /* The integral of R over the plane: the trapezoid rule in ln r, whose error falls as e^(-pi^2 / step):
    1e-17. */
 static double total(const medium *m, int by_kernel) {
-    ssdgs_real r[NODES], f[NODES], derivatives[3 * NODES];
+    ssdgs_real r[NODES];
     double sum = 0;
-    int i;
-    for (i = 0; i < NODES; i++) r[i] = (ssdgs_real)exp(0.25 * i - 40);
+    for (int i = 0; i < NODES; i++) r[i] = (ssdgs_real)exp(0.25 * i - 40);
+    ssdgs_real f[NODES], derivatives[3 * NODES];
     if (by_kernel) kernel_profile(m, r, NODES, f, derivatives);
-    for (i = 0; i < NODES; i++) {
+    for (int i = 0; i < NODES; i++) {
         double p[3];
         p[0] = m->ss, p[1] = m->sa, p[2] = (double)r[i];
         sum += 0.25 * 2 * PI * p[2] * p[2] * (by_kernel ? (double)f[i] : profile(p, m));
@@ -369,12 +367,9 @@ static void test_dipole_total(void) {
         {0.05, 2.05, 1.3, 0.002156, 2.049, 1e-3}, {10, 0.01, 1.5, 0.82709, 0.18380 / 0.82709, 2e-5}};
     static const double etas[3] = {1, 1.3, 2.5};
     double worst[FORMS] = {0, 0}, least[FORMS] = {9, 9}, most[FORMS] = {0, 0};
-    char key[64];
     medium m;
-    size_t i;
-    int e, grid;
     EVERY_ISA {
-        for (i = 0; i < sizeof published / sizeof *published; i++) {
+        for (size_t i = 0; i < sizeof published / sizeof *published; i++) {
             m.ss = published[i].ss, m.sa = published[i].sa, m.eta = published[i].eta;
             m.form = SSDGS_DIPOLE_JENSEN;
             CHECK(fabs(total(&m, 1) - published[i].closed) < 1e-5);
@@ -382,14 +377,13 @@ static void test_dipole_total(void) {
             CHECK(fabs(total(&m, 1) / published[i].closed - published[i].printed) < published[i].digits);
         }
         for (m.form = 0; m.form < FORMS; m.form++)
-            for (e = 0; e < 3; e++)
-                for (grid = 0; grid < 81; grid++) {
-                    medium right;
-                    double all, factor;
+            for (int e = 0; e < 3; e++)
+                for (int grid = 0; grid < 81; grid++) {
                     m.ss = 0.05 + 2 * pow(grid % 9 / 8.0, 2), m.sa = 0.05 + 2 * pow(grid / 9 / 8.0, 2),
                     m.eta = etas[e];
-                    right = m, right.form = SSDGS_DIPOLE_JENSEN;
-                    all = total(&m, 1), factor = all / closed(&right);
+                    medium right = m;
+                    right.form = SSDGS_DIPOLE_JENSEN;
+                    const double all = total(&m, 1), factor = all / closed(&right);
                     worst[m.form] = max(worst[m.form], gap(all / closed(&m), 1));
                     if (e == 1)
                         most[m.form] = max(most[m.form], factor),
@@ -398,6 +392,7 @@ static void test_dipole_total(void) {
     }
     for (m.form = 0; m.form < FORMS; m.form++) {
         CHECK(worst[m.form] < 80 * eps);
+        char key[64];
         sprintf(key, "dipole_total_error_%s", form_name[m.form]);
         figure(key, worst[m.form]);
         if (m.form != SSDGS_DIPOLE_PRINTED) continue;
@@ -413,16 +408,15 @@ static void test_dipole_total(void) {
 static void test_dipole_units(void) {
     ssdgs_real r[2][16], f[2][16], derivatives[48];
     medium m[2];
-    int i;
     EVERY_ISA {
         for (m[0].form = 0; m[0].form < FORMS; m[0].form++) {
             double apart = 0;
             m[0].ss = 0.7, m[0].sa = 0.2, m[0].eta = 1.3;
             m[1] = m[0];
             m[1].ss = 2 * (double)(ssdgs_real)m[0].ss, m[1].sa = 2 * (double)(ssdgs_real)m[0].sa;
-            for (i = 0; i < 16; i++) r[0][i] = (ssdgs_real)(0.1 + 0.2 * i), r[1][i] = r[0][i] / 2;
-            for (i = 0; i < 2; i++) kernel_profile(m + i, r[i], 16, f[i], derivatives);
-            for (i = 0; i < 16; i++) apart = max(apart, gap((double)f[1][i] / (4 * (double)f[0][i]), 1));
+            for (int i = 0; i < 16; i++) r[0][i] = (ssdgs_real)(0.1 + 0.2 * i), r[1][i] = r[0][i] / 2;
+            for (int i = 0; i < 2; i++) kernel_profile(m + i, r[i], 16, f[i], derivatives);
+            for (int i = 0; i < 16; i++) apart = max(apart, gap((double)f[1][i] / (4 * (double)f[0][i]), 1));
             CHECK(m[0].form == SSDGS_DIPOLE_JENSEN ? apart == 0 : apart > 1e-3);
         }
     }
@@ -432,35 +426,34 @@ static void test_dipole_units(void) {
 static void test_dipole_points(void) {
     static const double extremes[][3] = {{1, 1e-12, 1}, {1e-12, 1, 1}, {1e6, 1e3, 1e-5},   {1e6, 1, 1e-8},
                                          {1, 1, 1e-8},  {1, 1, 1e8},   {0.05, 1e-12, 1e3}, {1e-3, 1e-3, 1e4}};
-    double worst[2] = {0, 0}, far;
-    ssdgs_real r[16], f[16], derivatives[48];
+    double worst[2] = {0, 0};
     medium m;
-    int i, j, grid;
     m.eta = 1.3;
+    ssdgs_real r[16], f[16], derivatives[48];
     EVERY_ISA {
         for (m.form = 0; m.form < FORMS; m.form++) {
-            for (grid = 0; grid < 64; grid++) {
+            for (int grid = 0; grid < 64; grid++) {
                 m.ss = (double)(ssdgs_real)(0.05 + 2.0 / 7 * (grid % 8));
                 m.sa = (double)(ssdgs_real)(0.05 + 2.0 / 7 * (grid / 8));
-                for (i = 0; i < 16; i++) r[i] = (ssdgs_real)(0.1 + 0.2 * i);
+                for (int i = 0; i < 16; i++) r[i] = (ssdgs_real)(0.1 + 0.2 * i);
                 kernel_profile(&m, r, 16, f, derivatives);
-                for (i = 0; i < 16; i++) {
-                    double p[3], want;
+                for (int i = 0; i < 16; i++) {
+                    double p[3];
                     p[0] = m.ss, p[1] = m.sa, p[2] = (double)r[i];
-                    want = profile(p, &m);
+                    const double want = profile(p, &m);
                     worst[0] = max(worst[0], gap((double)f[i] / want, 1));
-                    for (j = 0; j < 3; j++) { /* as a share of R / p, which is the derivative's size where it
-                                                 does not pass 0 */
+                    for (int j = 0; j < 3; j++) { /* as a share of R / p, which is the derivative's size where
+                                                 it does not pass 0 */
                         const double d = slope(profile, p, j, &m, j < 2 ? 5e-5 : 1e-4);
                         worst[1] = max(worst[1], gap((double)derivatives[16 * j + i], d) * p[j] / want);
                     }
                 }
             }
-            for (grid = 0; grid < (int)(sizeof extremes / sizeof *extremes); grid++) {
+            for (int grid = 0; grid < (int)(sizeof extremes / sizeof *extremes); grid++) {
                 m.ss = extremes[grid][0], m.sa = extremes[grid][1];
-                for (i = 0; i < 16; i++) r[i] = (ssdgs_real)extremes[grid][2];
+                for (int i = 0; i < 16; i++) r[i] = (ssdgs_real)extremes[grid][2];
                 kernel_profile(&m, r, 16, f, derivatives);
-                far = profile(extremes[grid], &m); /* exponents beyond 87 saturate */
+                const double far = profile(extremes[grid], &m); /* exponents beyond 87 saturate */
                 if (!CHECK(gap((double)f[0], far) <= 1e-36 + 100 * eps * far) ||
                     !CHECK(k->finite(derivatives, 48)))
                     printf("    %s, %s, extreme %d: got %g, want %g\n", isa_name(), form_name[m.form], grid,
@@ -479,11 +472,11 @@ static void test_dipole_points(void) {
 static double half_space(double alpha) {
     enum { STEPS = 400 };
     double h[STEPS + 1], sum = 0;
-    int i, j, round;
-    for (i = 0; i <= STEPS; i++) h[i] = 1;
-    for (round = 0; round < 200; round++)
-        for (i = 0; i <= STEPS; i++) { /* Simpson in w, v = w^2, for H's logarithm at 0 */
+    for (int i = 0; i <= STEPS; i++) h[i] = 1;
+    for (int round = 0; round < 200; round++)
+        for (int i = 0; i <= STEPS; i++) { /* Simpson in w, v = w^2, for H's logarithm at 0 */
             const double u = pow(i / (double)STEPS, 2);
+            int j;
             for (j = 1, sum = 0; j <= STEPS; j++) {
                 const double w = j / (double)STEPS;
                 sum += (j == STEPS ? 1 : j % 2 ? 4 : 2) * 2 * w * w * w * h[j] / (u + w * w) / (3 * STEPS);
@@ -502,16 +495,15 @@ static void test_half_space(void) {
                      {0.5, 0.05, 0.432242, -0.065},
                      {1.05, 0.05, 0.551029, -9},
                      {2.05, 0.05, 0.647681, -0.019}};
-    size_t i;
     k = ssdgs__table(isa = SSDGS_ISA_SCALAR);
-    for (i = 0; i < sizeof published / sizeof *published; i++) {
+    for (size_t i = 0; i < sizeof published / sizeof *published; i++) {
         const double ss = published[i].ss, sa = published[i].sa, exact = half_space(ss / (ss + sa));
-        char key[64];
         medium m;
         m.ss = ss, m.sa = sa, m.eta = 1;
         m.form = SSDGS_DIPOLE_JENSEN;
         CHECK(fabs(exact - published[i].exact) < 2e-6);
         if (published[i].dipole > -1) CHECK(fabs(total(&m, 1) / exact - 1 - published[i].dipole) < 0.002);
+        char key[64];
         sprintf(key, "dipole_to_exact_albedo_%03.0f", 1000 * ss / (ss + sa));
         figure(key, total(&m, 1) / exact);
     }
@@ -522,29 +514,28 @@ static void test_dipole_golden(void) {
     static const char *const by[3] = {"sigma_s", "sigma_a", "r"};
     const int real64 = sizeof(ssdgs_real) == 8;
     gold_file file;
-    const double *places[3], *eta;
-    double *f, *d;
-    size_t n, i;
-    int j;
-    medium m;
     if (!gold_open(&file, "dipole")) return;
-    for (j = 0; j < 3; j++) places[j] = gold(&file, by[j], &n);
-    eta = gold(&file, "eta", &n);
-    f = (double *)malloc(4 * n * sizeof *f), d = f + n;
+    const double *places[3];
+    size_t n;
+    for (int j = 0; j < 3; j++) places[j] = gold(&file, by[j], &n);
+    const double *eta = gold(&file, "eta", &n);
+    double *f = (double *)malloc(4 * n * sizeof *f), *d = f + n;
+    medium m;
     EVERY_ISA
     for (m.form = 0; m.form < FORMS; m.form++) {
-        char name[64];
-        for (i = 0; i < n; i++) {
-            ssdgs_real r[16], value[16], slopes[48];
+        for (size_t i = 0; i < n; i++) {
             m.ss = places[0][i], m.sa = places[1][i], m.eta = eta[i];
-            for (j = 0; j < 16; j++) r[j] = (ssdgs_real)places[2][i];
+            ssdgs_real r[16];
+            for (int j = 0; j < 16; j++) r[j] = (ssdgs_real)places[2][i];
+            ssdgs_real value[16], slopes[48];
             kernel_profile(&m, r, 16, value, slopes);
             f[i] = (double)value[0];
-            for (j = 0; j < 3; j++) d[(size_t)j * n + i] = (double)slopes[16 * j];
+            for (int j = 0; j < 3; j++) d[(size_t)j * n + i] = (double)slopes[16 * j];
         }
         CHECK_NEAR(f, gold(&file, form_name[m.form], NULL), n, real64 ? 1e-12 : 1e-9, real64 ? 1e-9 : 3e-5,
                    form_name[m.form]);
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
+            char name[64];
             snprintf(name, sizeof name, "%s_d_%s", form_name[m.form], by[j]);
             CHECK_NEAR(d + (size_t)j * n, gold(&file, name, NULL), n, real64 ? 1e-11 : 1e-8,
                        real64 ? 1e-8 : 3e-4, name);
@@ -583,24 +574,25 @@ static void into_frame(const double q[4], const double v[3], double to[3]) {
 
 static double unit(double v[3]) {
     const double n = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    int i;
-    for (i = 0; i < 3; i++) v[i] /= n;
+    for (int i = 0; i < 3; i++) v[i] /= n;
     return n;
 }
 
 /* f_s of p (PARAMETERS): eqs. 10 to 12. */
 static double highlight(const double *p, const void *with) {
     const lobes *l = (const lobes *)with;
-    double wi[3], wo[3], h[3], local[3], b[3], d = 0, cosine;
-    int i, j;
-    for (i = 0; i < 3; i++) wi[i] = p[LIGHT + i] - p[i], wo[i] = p[EYE + i] - p[i];
+    double wi[3], wo[3], d = 0;
+    for (int i = 0; i < 3; i++) wi[i] = p[LIGHT + i] - p[i], wo[i] = p[EYE + i] - p[i];
     unit(wi), unit(wo);
-    for (i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
+    double h[3];
+    for (int i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
     unit(h);
-    cosine = wo[0] * h[0] + wo[1] * h[1] + wo[2] * h[2];
+    const double cosine = wo[0] * h[0] + wo[1] * h[1] + wo[2] * h[2];
+    double local[3];
     into_frame(p + TURN, h, local);
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         const double weight = log1p(exp(p[WEIGHTS + j])), *s = l->sharpness[j];
+        double b[3];
         into_frame(l->q[j], local, b);
         d += weight * exp(-exp(s[0]) * b[0] * b[0] - exp(s[1]) * b[1] * b[1]);
     }
@@ -609,22 +601,21 @@ static double highlight(const double *p, const void *with) {
 
 /* The kernels' lighting, made as for a frame. */
 static ssdgs__lighting lighting(const lobes *l, const double *p) {
-    ssdgs_real basis[4 * SSDGS_ASG_COUNT], sharpness[2 * SSDGS_ASG_COUNT];
-    ssdgs_light light;
     ssdgs_frame frame;
-    int i, j;
     memset(&frame, 0, sizeof frame);
+    ssdgs_light light;
     memset(&light, 0, sizeof light);
     frame.settings = ssdgs_settings_default();
     frame.settings.eta = (ssdgs_real)l->eta;
     frame.settings.asg = SSDGS_ASG_GEOMETRIC;
     frame.terms = SSDGS_SPECULAR_TERM;
     frame.lights = &light;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         light.position[i] = (ssdgs_real)p[LIGHT + i], frame.eye[i] = (ssdgs_real)p[EYE + i];
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-        for (i = 0; i < 4; i++) basis[4 * j + i] = (ssdgs_real)l->q[j][i];
-        for (i = 0; i < 2; i++) sharpness[2 * j + i] = (ssdgs_real)l->sharpness[j][i];
+    ssdgs_real basis[4 * SSDGS_ASG_COUNT], sharpness[2 * SSDGS_ASG_COUNT];
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+        for (int i = 0; i < 4; i++) basis[4 * j + i] = (ssdgs_real)l->q[j][i];
+        for (int i = 0; i < 2; i++) sharpness[2 * j + i] = (ssdgs_real)l->sharpness[j][i];
     }
     frame.gaussians.asg_basis = basis, frame.gaussians.asg_sharpness = sharpness;
     return ssdgs__lighting_of(&frame, 0);
@@ -639,18 +630,16 @@ static int channel_of(int parameter) {
 
 /* Puts p into lane i of the block, and rounds it to what the kernel sees. */
 static void put(double *p, int i) {
-    int c;
-    for (c = 0; c < LIGHT; c++) gauss[channel_of(c) * BLOCK + i] = (ssdgs_real)p[c];
-    for (c = 0; c < PARAMETERS; c++) p[c] = (double)(ssdgs_real)p[c];
+    for (int c = 0; c < LIGHT; c++) gauss[channel_of(c) * BLOCK + i] = (ssdgs_real)p[c];
+    for (int c = 0; c < PARAMETERS; c++) p[c] = (double)(ssdgs_real)p[c];
 }
 
 /* f_s of the block, and its gradients; returns whether all are finite. */
 static int reflect(const ssdgs__lighting *light) {
-    int i;
     memset(drows, 0, sizeof drows);
     memset(dgauss, 0, sizeof dgauss);
     memset(lane_sums, 0, sizeof lane_sums);
-    for (i = 0; i < BLOCK; i++) drows[SSDGS__GLOSS * BLOCK + i] = 1;
+    for (int i = 0; i < BLOCK; i++) drows[SSDGS__GLOSS * BLOCK + i] = 1;
     k->reflect(light, gauss, rows);
     k->reflect_backward(light, gauss, drows, dgauss, lane_sums);
     return k->finite(rows, SSDGS__ROWS * BLOCK) && k->finite(dgauss, SSDGS_CHANNELS * BLOCK) &&
@@ -659,48 +648,47 @@ static int reflect(const ssdgs__lighting *light) {
 
 /* Lobes turned at random, each moderate; p: frame and weights at random, light and eye apart. */
 static void random_lobes(lobes *l, double *p, uint64_t seed) {
-    int i, j;
     l->eta = 1.3;
-    for (j = 0; j < SSDGS_ASG_COUNT; j++) {
-        for (i = 0; i < 4; i++) l->q[j][i] = (double)(ssdgs_real)(2 * draw(seed++) - 1);
-        for (i = 0; i < 2; i++) l->sharpness[j][i] = (double)(ssdgs_real)(3 * draw(seed++) - 1);
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+        for (int i = 0; i < 4; i++) l->q[j][i] = (double)(ssdgs_real)(2 * draw(seed++) - 1);
+        for (int i = 0; i < 2; i++) l->sharpness[j][i] = (double)(ssdgs_real)(3 * draw(seed++) - 1);
         seed++;
     }
-    for (i = TURN; i < LIGHT; i++) p[i] = 2 * draw(seed++) - 1;
-    for (i = 0; i < 3; i++) p[LIGHT + i] = i == 2 ? 3 : 1, p[EYE + i] = i == 1 ? 3 : -1;
+    for (int i = TURN; i < LIGHT; i++) p[i] = 2 * draw(seed++) - 1;
+    for (int i = 0; i < 3; i++) p[LIGHT + i] = i == 2 ? 3 : 1, p[EYE + i] = i == 1 ? 3 : -1;
 }
 
 /* Value and gradients at 64 random places against the formula, for 8 draws of everything. */
 static void test_asg_points(void) {
     static double want[BLOCK], got[15 * BLOCK], slopes[15 * BLOCK];
     double worst = 0;
-    double sums[2][6];
-    int round, i, c, lane;
     EVERY_ISA {
-        for (round = 0; round < 8; round++) {
+        for (int round = 0; round < 8; round++) {
+            double sums[2][6];
+            memset(sums, 0, sizeof sums);
             double p[PARAMETERS];
             lobes l;
-            ssdgs__lighting light;
-            memset(sums, 0, sizeof sums);
-            for (i = 0; i < BLOCK; i++) {
+            for (int i = 0; i < BLOCK; i++) {
                 random_lobes(&l, p, 5000 * (uint64_t)round);
-                for (c = 0; c < LIGHT; c++) p[c] = 2 * draw((uint64_t)(100000 * round + LIGHT * i + c)) - 1;
+                for (int c = 0; c < LIGHT; c++)
+                    p[c] = 2 * draw((uint64_t)(100000 * round + LIGHT * i + c)) - 1;
                 put(p, i);
                 want[i] = highlight(p, &l);
-                for (c = 0; c < PARAMETERS; c++) {
+                for (int c = 0; c < PARAMETERS; c++) {
                     const double d = slope(highlight, p, c, &l, 1e-4);
                     if (c < LIGHT) slopes[LIGHT * i + c] = d;
                     else sums[0][c - LIGHT] += d;
                 }
             }
-            light = lighting(&l, p);
+            ssdgs__lighting light = lighting(&l, p);
             CHECK(reflect(&light));
-            for (i = 0; i < BLOCK; i++) {
+            for (int i = 0; i < BLOCK; i++) {
                 worst = max(worst, gap((double)rows[SSDGS__GLOSS * BLOCK + i] / want[i], 1));
-                for (c = 0; c < LIGHT; c++) got[LIGHT * i + c] = (double)dgauss[channel_of(c) * BLOCK + i];
+                for (int c = 0; c < LIGHT; c++)
+                    got[LIGHT * i + c] = (double)dgauss[channel_of(c) * BLOCK + i];
             }
-            for (c = 0; c < 6; c++)
-                for (lane = 0; lane < 16; lane++) sums[1][c] += (double)lane_sums[16 * c + lane];
+            for (int c = 0; c < 6; c++)
+                for (int lane = 0; lane < 16; lane++) sums[1][c] += (double)lane_sums[16 * c + lane];
             CHECK_L2(got, slopes, LIGHT * BLOCK, 30 * eps + 1e-7, "gradients of the highlight");
             CHECK_L2(sums[1], sums[0], 6, 30 * eps + 1e-7, "gradients of light and eye");
         }
@@ -716,42 +704,41 @@ static void test_asg_integral(void) {
     static const struct { double a, b; } cases[] = {{1, 1}, {2, 2}, {10, 10}, {1, 20}, {30, 3}};
     enum { AROUND = 64, DOWN = 200 };
     double worst = 0;
-    size_t c;
-    int i, j, n;
     EVERY_ISA
-    for (c = 0; c < sizeof cases / sizeof *cases; c++) {
-        double p[PARAMETERS], back[4], sum = 0, want = 0;
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double p[PARAMETERS], sum = 0, want = 0;
         const int lobe = 3;
         lobes l;
-        ssdgs__lighting light;
         random_lobes(&l, p, 700 + c);
-        for (j = 0; j < SSDGS_ASG_COUNT; j++) p[WEIGHTS + j] = -100;
+        for (int j = 0; j < SSDGS_ASG_COUNT; j++) p[WEIGHTS + j] = -100;
         p[WEIGHTS + lobe] = log(exp(1.0) - 1); /* softplus makes it 1 */
-        for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+        for (int i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
         l.sharpness[lobe][0] = log(cases[c].a);
         l.sharpness[lobe][1] = log(cases[c].b);
-        light = lighting(&l, p);
-        for (n = 0; n <= DOWN; n++) {
+        ssdgs__lighting light = lighting(&l, p);
+        double back[4];
+        for (int n = 0; n <= DOWN; n++) {
             const double theta = PI / 2 * n / DOWN, simpson = (n == 0 || n == DOWN ? 1
                                                                : n % 2             ? 4
                                                                                    : 2) *
                                                               PI / 2 / DOWN / 3;
             const double ring = 2 * PI * simpson * cos(theta) * sin(theta);
-            for (i = 0; i < AROUND; i++) {
+            for (int i = 0; i < AROUND; i++) {
                 const double phi = 2 * PI * (i + 0.5) / AROUND;
                 double h[3];
                 h[0] = sin(theta) * cos(phi), h[1] = sin(theta) * sin(phi), h[2] = cos(theta);
-                for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * l.q[lobe][j];
+                for (int j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * l.q[lobe][j];
                 into_frame(back, h, h);
-                for (j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * p[TURN + j];
+                for (int j = 0; j < 4; j++) back[j] = (j ? -1 : 1) * p[TURN + j];
                 into_frame(back, h, h);
-                for (j = 0; j < 3; j++) p[j] = -h[j]; /* the light stands at the origin */
+                for (int j = 0; j < 3; j++) p[j] = -h[j]; /* the light stands at the origin */
                 put(p, i);
             }
             k->reflect(&light, gauss, rows);
-            for (i = 0; i < AROUND; i++) sum += ring / AROUND * (double)rows[SSDGS__GLOSS * BLOCK + i] / 0.04;
+            for (int i = 0; i < AROUND; i++)
+                sum += ring / AROUND * (double)rows[SSDGS__GLOSS * BLOCK + i] / 0.04;
         }
-        for (i = 0; i < 4096; i++) {
+        for (int i = 0; i < 4096; i++) {
             const double phi = 2 * PI * i / 4096,
                          g = cases[c].a * pow(cos(phi), 2) + cases[c].b * pow(sin(phi), 2);
             want -= 2 * PI / 4096 * expm1(-g) / (2 * g);
@@ -768,29 +755,27 @@ static void test_asg_poles(void) {
                                    0.1, 0.41,  0.42, 1.5,  1.5707963, 1.6,  3,      3.14, PI};
     enum { CASES = sizeof theta / sizeof *theta };
     double worst[2] = {0, 0};
-    int i, j, c;
     EVERY_ISA {
         double p[PARAMETERS];
         lobes l;
-        ssdgs__lighting light;
         random_lobes(&l, p, 900);
-        for (j = 0; j < SSDGS_ASG_COUNT; j++)
-            for (i = 0; i < 4; i++) l.q[j][i] = i == 0;
-        for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
-        for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
-        light = lighting(&l, p);
-        for (i = 0; i < BLOCK; i++) {
+        for (int j = 0; j < SSDGS_ASG_COUNT; j++)
+            for (int i = 0; i < 4; i++) l.q[j][i] = i == 0;
+        for (int i = 0; i < 4; i++) p[TURN + i] = i == 0;
+        for (int i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+        ssdgs__lighting light = lighting(&l, p);
+        for (int i = 0; i < BLOCK; i++) {
             p[0] = -sin(theta[i % CASES]) * 0.6, p[1] = -sin(theta[i % CASES]) * 0.8,
             p[2] = -cos(theta[i % CASES]);
             put(p, i);
         }
         CHECK(reflect(&light));
-        for (i = 0; i < CASES - 1; i++) {
-            double want, size = 0, off = 0;
-            for (c = 0; c < 3; c++) p[c] = (double)gauss[(SSDGS_POSITION + c) * BLOCK + i];
-            want = highlight(p, &l);
+        for (int i = 0; i < CASES - 1; i++) {
+            double size = 0, off = 0;
+            for (int c = 0; c < 3; c++) p[c] = (double)gauss[(SSDGS_POSITION + c) * BLOCK + i];
+            const double want = highlight(p, &l);
             worst[0] = max(worst[0], gap((double)rows[SSDGS__GLOSS * BLOCK + i] / want, 1));
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 const double d = slope(highlight, p, c, &l, 1e-5);
                 size += fabs(d), off += gap((double)dgauss[(SSDGS_POSITION + c) * BLOCK + i], d);
             }
@@ -808,42 +793,41 @@ static void test_asg_poles(void) {
    wi + wo keeps what its size leaves of eps. */
 static void test_fresnel(void) {
     double worst = 0, lowest = 1, highest = 0;
-    int i, j, round;
     EVERY_ISA
-    for (round = 0; round < 40; round++) {
+    for (int round = 0; round < 40; round++) {
         double p[PARAMETERS];
         lobes l;
-        ssdgs__lighting light;
         random_lobes(&l, p, 1000 + 100 * (uint64_t)round);
-        for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
             l.sharpness[j][0] = l.sharpness[j][1] = -100;
             p[WEIGHTS + j] = j ? -100 : log(exp(1.0) - 1);
         }
-        for (j = 0; j < 3; j++) { /* every other round in one place: wo.h = 1, or an ulp more or less */
+        for (int j = 0; j < 3; j++) { /* every other round in one place: wo.h = 1, or an ulp more or less */
             p[LIGHT + j] = 2 * draw((uint64_t)(7 * round + j)) - 1;
             p[EYE + j] = (round % 2 ? 1 : -1) * p[LIGHT + j];
         }
-        light = lighting(&l, p);
-        for (i = 0; i < BLOCK; i++) {
+        ssdgs__lighting light = lighting(&l, p);
+        for (int i = 0; i < BLOCK; i++) {
             const double off = i == 0 ? 0 : pow(10, -9.0 * i / (BLOCK - 1) + 1);
-            for (j = 0; j < 3; j++) p[j] = off * (2 * draw((uint64_t)(BLOCK * 3 * round + 3 * i + j)) - 1);
+            for (int j = 0; j < 3; j++)
+                p[j] = off * (2 * draw((uint64_t)(BLOCK * 3 * round + 3 * i + j)) - 1);
             put(p, i);
         }
         CHECK(reflect(&light));
-        for (i = 0; i < BLOCK; i++) {
+        for (int i = 0; i < BLOCK; i++) {
             const double got = (double)rows[SSDGS__GLOSS * BLOCK + i];
-            double sum[3], apart, want;
-            for (j = 0; j < 3; j++) {
+            double sum[3];
+            for (int j = 0; j < 3; j++) {
                 p[j] = (double)gauss[(SSDGS_POSITION + j) * BLOCK + i];
                 sum[j] = (double)(rows[(SSDGS__WI + j) * BLOCK + i] + rows[(SSDGS__WO + j) * BLOCK + i]);
             }
-            apart = unit(sum);
+            const double apart = unit(sum);
             if (apart < 1.1e-6) {
                 if (apart < 0.9e-6)
                     CHECK(got == 0 && dgauss[SSDGS_POSITION * BLOCK + i] == 0); /* no half vector */
                 continue;
             }
-            want = highlight(p, &l);
+            const double want = highlight(p, &l);
             lowest = -max(-lowest, -got), highest = max(highest, got);
             worst = max(worst, gap(got, want) * apart / eps);
         }
@@ -858,23 +842,21 @@ static void test_fresnel(void) {
 /* Raw sharpness of any size gives a finite highlight. */
 static void test_asg_extremes(void) {
     static const double raw[3] = {-100, 0, 100};
-    int grid, i, j;
     EVERY_ISA
-    for (grid = 0; grid < 9; grid++) {
+    for (int grid = 0; grid < 9; grid++) {
         double p[PARAMETERS];
         lobes l;
-        ssdgs__lighting light;
         random_lobes(&l, p, 900);
-        for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
             l.sharpness[j][0] = raw[grid % 3], l.sharpness[j][1] = raw[grid / 3];
-            for (i = 0; i < 4; i++)
+            for (int i = 0; i < 4; i++)
                 l.q[j][i] = j % 2 ? l.q[j][i] : i == 0; /* half of them: poles that h may meet */
         }
-        for (i = 0; i < 4; i++) p[TURN + i] = i == 0;
-        for (i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
-        light = lighting(&l, p);
-        for (i = 0; i < BLOCK; i++) {
-            for (j = 0; j < 3; j++) p[j] = i ? 2 * draw((uint64_t)(3 * i + j)) - 1 : j == 2 ? -1 : 0;
+        for (int i = 0; i < 4; i++) p[TURN + i] = i == 0;
+        for (int i = 0; i < 3; i++) p[LIGHT + i] = p[EYE + i] = 0;
+        ssdgs__lighting light = lighting(&l, p);
+        for (int i = 0; i < BLOCK; i++) {
+            for (int j = 0; j < 3; j++) p[j] = i ? 2 * draw((uint64_t)(3 * i + j)) - 1 : j == 2 ? -1 : 0;
             put(p, i);
         }
         if (!CHECK(reflect(&light))) printf("    %s, case %d\n", isa_name(), grid);
@@ -889,16 +871,15 @@ static void test_eta(void) {
         int good;
     } etas[] = {{1, 1}, {1.3, 1}, {2.5, 1}, {0.8, 0}, {2.6, 0}, {3.84, 0}, {3.85, 0}, {-1.3, 0}};
     ssdgs_context *context = NULL;
-    double p[PARAMETERS];
-    lobes l;
-    size_t i;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    for (i = 0; i < sizeof etas / sizeof *etas; i++) {
+    for (size_t i = 0; i < sizeof etas / sizeof *etas; i++) {
         ssdgs_settings settings = ssdgs_settings_default();
         ssdgs_model *model = NULL;
         settings.eta = (ssdgs_real)etas[i].eta;
         CHECK((ssdgs_model_create(context, &settings, 1, &model) == SSDGS_OK) == etas[i].good);
         ssdgs_model_destroy(model);
+        double p[PARAMETERS];
+        lobes l;
         random_lobes(&l, p, 1);
         l.eta = etas[i].eta;
         if (etas[i].good)
@@ -911,8 +892,7 @@ static void test_eta(void) {
 int main(int argc, char **argv) {
     const int full = argc > 1 && !strcmp(argv[1], "full");
 #ifndef SSDGS_REAL64
-    size_t l;
-    for (l = 0; l < LAWS && (full || argc < 2); l++)
+    for (size_t l = 0; l < LAWS && (full || argc < 2); l++)
         if (argc < 3 || !strcmp(argv[2], laws[l].name)) test_law(laws + l, full ? 1 : 4001);
     if (full) TEST_END();
     test_not_numbers();

@@ -39,12 +39,12 @@ static void unit_vector(double v[3]) {
 }
 
 static void random_camera(double distance, int width, int height) {
-    double from[3], to[3];
-    ssdgs_real eye[3], target[3], up[3];
-    int c;
+    double from[3];
     unit_vector(from);
-    for (c = 0; c < 3; c++) to[c] = uniform(-1, 1);
-    for (c = 0; c < 3; c++) {
+    double to[3];
+    for (int c = 0; c < 3; c++) to[c] = uniform(-1, 1);
+    ssdgs_real eye[3], target[3], up[3];
+    for (int c = 0; c < 3; c++) {
         eye[c] = (ssdgs_real)(distance * from[c]);
         target[c] = (ssdgs_real)(0.2 * to[c]);
         up[c] = (ssdgs_real)uniform(-1, 1);
@@ -54,10 +54,9 @@ static void random_camera(double distance, int width, int height) {
 
 static void random_light(ssdgs_light *light, double distance) {
     double from[3];
-    int c;
     unit_vector(from);
     memset(light, 0, sizeof *light);
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         light->position[c] = (ssdgs_real)(distance * from[c]);
         light->intensity[c] = (ssdgs_real)(uniform(0.5, 1.5) * distance * distance);
     }
@@ -65,7 +64,6 @@ static void random_light(ssdgs_light *light, double distance) {
 
 /* count Gaussians in [-0.5, 0.5]^3, scales from .. to; networks off. */
 static void random_scene(uint64_t seed, int count, double from, double to) {
-    size_t i, c;
     key = seed, drawn = 0;
     memset(&s, 0, sizeof s);
     s.count = count;
@@ -73,17 +71,18 @@ static void random_scene(uint64_t seed, int count, double from, double to) {
     s.settings.scattering_layers = 2, s.settings.scattering_width = 1, s.settings.shadow_layers = 0;
     s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
     s.options = ssdgs_render_options_exact();
-    for (i = 0; i < (size_t)count; i++) {
-        for (c = 0; c < SSDGS_CHANNELS; c++) s.raw[c][i] = (ssdgs_real)uniform(-2, 1);
-        for (c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = (ssdgs_real)uniform(-1, 1);
-        for (c = 0; c < 4; c++) s.raw[SSDGS_FRAME + c][i] = (ssdgs_real)uniform(-1, 1);
-        for (c = 0; c < 3; c++) s.raw[SSDGS_POSITION + c][i] = (ssdgs_real)uniform(-0.5, 0.5);
-        for (c = 0; c < 3; c++) s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)uniform(log(from), log(to));
+    for (size_t i = 0; i < (size_t)count; i++) {
+        for (size_t c = 0; c < SSDGS_CHANNELS; c++) s.raw[c][i] = (ssdgs_real)uniform(-2, 1);
+        for (size_t c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = (ssdgs_real)uniform(-1, 1);
+        for (size_t c = 0; c < 4; c++) s.raw[SSDGS_FRAME + c][i] = (ssdgs_real)uniform(-1, 1);
+        for (size_t c = 0; c < 3; c++) s.raw[SSDGS_POSITION + c][i] = (ssdgs_real)uniform(-0.5, 0.5);
+        for (size_t c = 0; c < 3; c++)
+            s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)uniform(log(from), log(to));
         s.raw[SSDGS_OPACITY][i] = (ssdgs_real)uniform(-4, 7);
     }
-    for (i = 0; i < SSDGS_ASG_COUNT * 4; i++) s.basis[i] = (ssdgs_real)uniform(-1, 1);
-    for (i = 0; i < SSDGS_ASG_COUNT * 2; i++) s.sharpness[i] = (ssdgs_real)uniform(-1, 3);
-    for (i = 0; i < SSDGS_ASG_COUNT; i++) s.sigma[i] = (ssdgs_real)uniform(-1, 2);
+    for (size_t i = 0; i < SSDGS_ASG_COUNT * 4; i++) s.basis[i] = (ssdgs_real)uniform(-1, 1);
+    for (size_t i = 0; i < SSDGS_ASG_COUNT * 2; i++) s.sharpness[i] = (ssdgs_real)uniform(-1, 3);
+    for (size_t i = 0; i < SSDGS_ASG_COUNT; i++) s.sigma[i] = (ssdgs_real)uniform(-1, 2);
     s.light_count = 1;
     random_light(s.lights, 2);
     random_camera(2, SIDE, SIDE);
@@ -91,16 +90,14 @@ static void random_scene(uint64_t seed, int count, double from, double to) {
 
 static ssdgs_model *make_model(ssdgs_context *context) {
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    size_t c, i;
     if (!CHECK(!ssdgs_model_create(context, &s.settings, s.count, &model))) exit(1);
-    v = ssdgs_model_arrays(model);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
         memcpy(v.gaussians + c * v.stride, s.raw[c], (size_t)s.count * sizeof(ssdgs_real));
     memcpy(v.asg_basis, s.basis, sizeof s.basis);
     memcpy(v.asg_sharpness, s.sharpness, sizeof s.sharpness);
     memcpy(v.asg_sigma, s.sigma, sizeof s.sigma);
-    for (i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(5, i) - 0.1);
+    for (size_t i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(5, i) - 0.1);
     return model;
 }
 
@@ -148,8 +145,7 @@ static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a
 
 static void normalise(double v[3]) {
     const double length = sqrt(dot(v, v));
-    int i;
-    for (i = 0; i < 3; i++) v[i] /= length;
+    for (int i = 0; i < 3; i++) v[i] /= length;
 }
 
 /* Rows of r: the images of the axes are its columns. */
@@ -161,18 +157,17 @@ static void rotation(double w, double x, double y, double z, double r[9]) {
 }
 
 static void read_gaussians(void) {
-    int i, c;
-    for (i = 0; i < s.count; i++) {
+    for (int i = 0; i < s.count; i++) {
         gaussian *g = all + i;
 #define RAW(channel) ((double)s.raw[channel][i])
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             g->x[c] = RAW(SSDGS_POSITION + c);
             g->scale[c] = exp(RAW(SSDGS_LOG_SCALE + c));
             g->diffuse[c] = softplus(RAW(SSDGS_DIFFUSE + c));
             g->specular[c] = softplus(RAW(SSDGS_SPECULAR + c));
         }
-        for (c = 0; c < SSDGS_ASG_COUNT; c++) g->weight[c] = softplus(RAW(SSDGS_ASG_WEIGHT + c));
-        for (c = 0; c < 2; c++) g->sharp[c] = exp(RAW(SSDGS_ASG_WEIGHT + c));
+        for (int c = 0; c < SSDGS_ASG_COUNT; c++) g->weight[c] = softplus(RAW(SSDGS_ASG_WEIGHT + c));
+        for (int c = 0; c < 2; c++) g->sharp[c] = exp(RAW(SSDGS_ASG_WEIGHT + c));
         g->f0 = sigmoid(RAW(SSDGS_ASG_WEIGHT + 2) + log(0.04 / 0.96));
         g->soft = sigmoid(RAW(SSDGS_ASG_WEIGHT + 3));
         g->opacity = sigmoid(RAW(SSDGS_OPACITY));
@@ -186,11 +181,10 @@ static void read_gaussians(void) {
 
 static lens camera_lens(void) {
     lens l;
-    int i;
     memset(&l, 0, sizeof l);
     l.fx = (double)s.camera.fx, l.fy = (double)s.camera.fy, l.cx = (double)s.camera.cx,
     l.cy = (double)s.camera.cy;
-    for (i = 0; i < 12; i++) l.view[i] = (double)s.camera.view[i];
+    for (int i = 0; i < 12; i++) l.view[i] = (double)s.camera.view[i];
     l.near_plane = s.camera.near_plane > 0 ? (double)s.camera.near_plane : 0.01;
     l.variance = (double)s.settings.pixel_variance;
     l.width = s.camera.width, l.height = s.camera.height;
@@ -201,10 +195,9 @@ static lens camera_lens(void) {
 /* The library's choice of a light's camera; check_light_camera() judges it. */
 static lens light_lens(const ssdgs_splat_view *v) {
     lens l;
-    int i;
     memset(&l, 0, sizeof l);
     l.fx = (double)v->fx, l.fy = (double)v->fy, l.cx = (double)v->cx, l.cy = (double)v->cy;
-    for (i = 0; i < 12; i++) l.view[i] = (double)v->view[i];
+    for (int i = 0; i < 12; i++) l.view[i] = (double)v->view[i];
     l.near_plane = (double)v->near_plane;
     l.distance = (double)v->distance;
     l.width = v->width, l.height = v->height;
@@ -216,36 +209,38 @@ static lens light_lens(const ssdgs_splat_view *v) {
 }
 
 static void to_view(const lens *l, const double x[3], double t[3]) {
-    int i;
-    for (i = 0; i < 3; i++) t[i] = dot(l->view + 4 * i, x) + l->view[4 * i + 3];
+    for (int i = 0; i < 3; i++) t[i] = dot(l->view + 4 * i, x) + l->view[4 * i + 3];
 }
 
 /* Eq. 1's projection by full matrices: J W Sigma W^T J^T. 0: not drawn. */
 static int project(const lens *l, const gaussian *g, splat *out) {
-    double t[3], sigma[9], w[6], cov[3], det0, det, h;
-    int i, j, k, m;
+    double t[3];
     to_view(l, g->x, t);
     if (!(t[2] > l->near_plane)) return 0;
+    double sigma[9];
+    int i, k;
     for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++)
+        for (int j = 0; j < 3; j++)
             for (k = 0, sigma[3 * i + j] = 0; k < 3; k++)
                 sigma[3 * i + j] += g->axes[3 * i + k] * g->scale[k] * g->scale[k] * g->axes[3 * j + k];
-    for (j = 0; j < 3; j++) {
+    double w[6];
+    for (int j = 0; j < 3; j++) {
         w[j] = l->orthographic ? l->fx * l->view[j]
                                : l->fx / t[2] * l->view[j] - l->fx * t[0] / (t[2] * t[2]) * l->view[8 + j];
         w[3 + j] = l->orthographic
                        ? l->fy * l->view[4 + j]
                        : l->fy / t[2] * l->view[4 + j] - l->fy * t[1] / (t[2] * t[2]) * l->view[8 + j];
     }
-    for (m = 0; m < 3; m++) /* xx, xy, yy */
+    double cov[3];
+    for (int m = 0; m < 3; m++) /* xx, xy, yy */
         for (i = 0, cov[m] = 0; i < 3; i++)
-            for (j = 0; j < 3; j++) cov[m] += w[(m > 1) * 3 + i] * sigma[3 * i + j] * w[(m > 0) * 3 + j];
-    det0 = cov[0] * cov[2] - cov[1] * cov[1];
-    h = l->variance;
+            for (int j = 0; j < 3; j++) cov[m] += w[(m > 1) * 3 + i] * sigma[3 * i + j] * w[(m > 0) * 3 + j];
+    const double det0 = cov[0] * cov[2] - cov[1] * cov[1];
+    double h = l->variance;
     if (l->floor)
         h -= 0.5 * (cov[0] + cov[2]) - sqrt(0.25 * (cov[0] - cov[2]) * (cov[0] - cov[2]) + cov[1] * cov[1]);
     h = h > 0 ? h : 0;
-    det = (cov[0] + h) * (cov[2] + h) - cov[1] * cov[1];
+    const double det = (cov[0] + h) * (cov[2] + h) - cov[1] * cov[1];
     out->a = (cov[2] + h) / det, out->b = -cov[1] / det, out->c = (cov[0] + h) / det;
     out->opacity = g->opacity * (l->compensate ? sqrt(det0 / det) : 1);
     out->x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx;
@@ -263,9 +258,8 @@ static int nearer(const void *a, const void *b) {
    nearly half there (the table of projection_error()). */
 static int beside(const lens *l, const gaussian *g) {
     double t[3], variance = 0;
-    int k;
     to_view(l, g->x, t);
-    for (k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++) {
         const double axis[3] = {g->axes[k], g->axes[3 + k], g->axes[6 + k]};
         variance += pow(g->scale[k] * dot(axis, l->view + 8), 2);
     }
@@ -274,8 +268,8 @@ static int beside(const lens *l, const gaussian *g) {
 }
 
 static int project_all(const lens *l, splat *out) {
-    int i, n = 0;
-    for (i = 0; i < s.count; i++)
+    int n = 0;
+    for (int i = 0; i < s.count; i++)
         if (project(l, all + i, out + n) && !beside(l, all + i)) out[n++].index = i;
     qsort(out, (size_t)n, sizeof *out, nearer);
     return n;
@@ -287,8 +281,7 @@ static double response(const splat *p, double x, double y) {
 }
 
 static void camera_centre(double eye[3]) {
-    int i;
-    for (i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++)
         eye[i] = -((double)s.camera.view[i] * (double)s.camera.view[3] +
                    (double)s.camera.view[4 + i] * (double)s.camera.view[7] +
                    (double)s.camera.view[8 + i] * (double)s.camera.view[11]);
@@ -297,44 +290,48 @@ static void camera_centre(double eye[3]) {
 /* Eqs. 3, 9 to 12 without scattering; visibility: S per light and Gaussian, NULL = 1. Not sure where wi + wo
    nearly cancels, so float knows no half vector. */
 static void shade(const gaussian *g, int index, const double *visibility, shaded *out) {
-    double wo[3], eye[3], *color = out->value + COLOR;
-    int i, j, light;
+    double eye[3], *color = out->value + COLOR;
     camera_centre(eye);
-    for (i = 0; i < 3; i++) wo[i] = eye[i] - g->x[i], color[i] = 0;
+    double wo[3];
+    for (int i = 0; i < 3; i++) wo[i] = eye[i] - g->x[i], color[i] = 0;
     normalise(wo);
     out->sure = 1;
     out->value[F0] = g->f0;
     out->value[SOFT] = g->soft;
-    for (i = 0; i < 3; i++) out->value[N + i] = g->frame[3 * i + 2];
-    for (i = 0; i < 9; i++)
+    for (int i = 0; i < 3; i++) out->value[N + i] = g->frame[3 * i + 2];
+    int j;
+    for (int i = 0; i < 9; i++)
         for (j = 0, out->value[Q + i] = 0; j < 2; j++)
             out->value[Q + i] += g->sharp[j] * g->frame[i / 3 * 3 + j] * g->frame[i % 3 * 3 + j];
-    for (light = 0; light < s.light_count; light++) {
+    for (int light = 0; light < s.light_count; light++) {
         const ssdgs_light *lamp = s.lights + light;
         const int directional = lamp->kind == SSDGS_LIGHT_DIRECTIONAL;
         const double n[3] = {g->frame[2], g->frame[5], g->frame[8]};
-        double wi[3], h[3], local[3], d = 0, falloff, fresnel, diffuse;
-        for (i = 0; i < 3; i++) wi[i] = (double)lamp->position[i] - (directional ? 0 : g->x[i]);
-        falloff = directional ? 1 : 1 / dot(wi, wi);
+        double wi[3], d = 0;
+        for (int i = 0; i < 3; i++) wi[i] = (double)lamp->position[i] - (directional ? 0 : g->x[i]);
+        double falloff = directional ? 1 : 1 / dot(wi, wi);
         normalise(wi);
-        for (i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
+        double h[3];
+        for (int i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
         if (dot(h, h) < 0.01) out->sure = 0;
         normalise(h);
-        for (i = 0; i < 3; i++)
+        double local[3];
+        for (int i = 0; i < 3; i++)
             local[i] = g->frame[i] * h[0] + g->frame[3 + i] * h[1] + g->frame[6 + i] * h[2];
         for (j = 0; j < SSDGS_ASG_COUNT; j++) {
             const ssdgs_real *q = s.basis + 4 * j, *sharp = s.sharpness + 2 * j;
-            double r[9], p[3];
+            double r[9];
             rotation((double)q[0], (double)q[1], (double)q[2], (double)q[3], r);
-            for (i = 0; i < 3; i++) p[i] = r[i] * local[0] + r[3 + i] * local[1] + r[6 + i] * local[2];
+            double p[3];
+            for (int i = 0; i < 3; i++) p[i] = r[i] * local[0] + r[3 + i] * local[1] + r[6 + i] * local[2];
             d += g->weight[j] *
                  exp(-exp((double)sharp[0]) * p[0] * p[0] - exp((double)sharp[1]) * p[1] * p[1]);
         }
-        fresnel = 0.04 + 0.96 * pow(1 - dot(wo, h), 5);
-        diffuse = dot(n, wi) > 0 ? dot(n, wi) / PI : 0;
+        const double fresnel = 0.04 + 0.96 * pow(1 - dot(wo, h), 5);
+        const double diffuse = dot(n, wi) > 0 ? dot(n, wi) / PI : 0;
         falloff *= (double)s.settings.light_scale;
         out->value[V + light] = visibility ? visibility[light * s.count + index] : 1;
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             const double arrives = falloff * (double)lamp->intensity[i];
             color[i] +=
                 (g->diffuse[i] * diffuse + g->specular[i] * fresnel * d) * arrives * out->value[V + light];
@@ -351,20 +348,21 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
 static double passed(const splat *p, int n, int x, int y, double distance, double higher) {
     static const double level[3] = {0.9, 0.5, 0.1};
     const double thick = ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
-    double t = 1, fall[3], before[3], left[3], since;
-    int k, falls = 0;
-    for (k = 0; k < n; k++) {
+    double t = 1, fall[3], before[3], left[3];
+    int falls = 0;
+    for (int k = 0; k < n; k++) {
         const double raw = response(p + k, x + 0.5, y + 0.5), above = t;
         if (raw < (double)s.options.alpha_threshold) continue;
         t *= 1 - (raw < 0.999 ? raw : 0.999);
         for (; falls < 3 && t < level[falls] * higher; falls++)
             fall[falls] = p[k].depth, before[falls] = above, left[falls] = t;
     }
+    int k;
     for (k = 0; k < falls && distance > fall[k]; k++) {}
     if (!k) return 1;
     if (k == 3) return t;
     if (k == falls) return left[k - 1];
-    since = distance - fmax(fall[k] - thick, fall[k - 1]);
+    const double since = distance - fmax(fall[k] - thick, fall[k - 1]);
     return since <= 0 ? left[k - 1]
                       : left[k - 1] + (before[k] - left[k - 1]) * since / (since + fall[k] - distance);
 }
@@ -372,22 +370,21 @@ static double passed(const splat *p, int n, int x, int y, double distance, doubl
 /* Visibility of a place from the first light. 0 where the last bits of float decide what is in the way. */
 static int look(const double at[3], double *visibility) {
     static splat p[MOST];
-    int f;
-    for (f = 0; f < face_count; f++) {
+    for (int f = 0; f < face_count; f++) {
         const lens *l = faces + f;
-        double t[3], x, y, distance, sum[4] = {0, 0, 0, 0};
-        int i, n, column, row;
+        double t[3], sum[4] = {0, 0, 0, 0};
         to_view(l, at, t);
-        x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx,
-        y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
+        double x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx,
+               y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
         if (!(t[2] > l->near_plane) || x < 0 || y < 0 || x > l->width || y > l->height) continue;
-        n = project_all(l, p);
-        distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-6) -
-                   ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
+        const int n = project_all(l, p);
+        const double distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-6) -
+                                ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
         x = fmin(fmax(x - 0.5, 0), l->width - 1), y = fmin(fmax(y - 0.5, 0), l->height - 1);
-        column = x < l->width - 1 ? (int)x : l->width - 2, row = y < l->height - 1 ? (int)y : l->height - 2;
+        const int column = x < l->width - 1 ? (int)x : l->width - 2,
+                  row = y < l->height - 1 ? (int)y : l->height - 2;
         x -= column, y -= row;
-        for (i = 0; i < 4; i++) {
+        for (int i = 0; i < 4; i++) {
             const double weight = (i % 2 ? x : 1 - x) * (i / 2 ? y : 1 - y);
             const int u = column + i % 2, w = row + i / 2;
             *visibility = sum[0] += weight * passed(p, n, u, w, distance, 1);
@@ -405,51 +402,55 @@ static int look(const double at[3], double *visibility) {
 static int highlight(const double b[VALUES], double depth, double x, double y, double out[6]) {
     const double at[3] = {(x - (double)s.camera.cx) / (double)s.camera.fx,
                           (y - (double)s.camera.cy) / (double)s.camera.fy, 1};
-    double eye[3], ray[3], place[3], wo[3];
-    int light, i, j, sure = 1;
+    double eye[3];
+    int sure = 1;
     camera_centre(eye);
-    for (i = 0; i < 3; i++) {
+    double ray[3], place[3], wo[3];
+    for (int i = 0; i < 3; i++) {
         ray[i] = (double)s.camera.view[i] * at[0] + (double)s.camera.view[4 + i] * at[1] +
                  (double)s.camera.view[8 + i];
         place[i] = eye[i] + depth * ray[i];
         wo[i] = -ray[i];
     }
     normalise(wo);
-    for (light = 0; light < s.light_count; light++) {
+    for (int light = 0; light < s.light_count; light++) {
         const ssdgs_light *lamp = s.lights + light;
-        double wi[3], h[3], n[3], p[3], q[2] = {0, 0}, sum = 0, fresnel, microfacet, woh, visible = 1,
-                                        arrives = 1;
+        double q[2] = {0, 0}, sum = 0, visible = 1, arrives = 1;
         if (s.settings.terms & SSDGS_SHADOW_TERM) {
             const int known = look(place, &visible);
             sure &= known;
             arrives = known < 0 ? b[V + light] : visible + b[SOFT] * (b[V + light] - visible);
         }
-        for (i = 0; i < 3; i++)
+        double wi[3];
+        for (int i = 0; i < 3; i++)
             wi[i] = (double)lamp->position[i] - (lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? 0 : place[i]);
         normalise(wi);
-        for (i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
+        double h[3];
+        for (int i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
         if (dot(h, h) < 0.01) sure = 0;
         normalise(h);
-        for (i = 0; i < 3; i++) n[i] = b[N + i];
+        double n[3];
+        for (int i = 0; i < 3; i++) n[i] = b[N + i];
         normalise(n);
-        for (i = 0; i < 3; i++) p[i] = h[i] - n[i] * dot(n, h);
-        for (i = 0; i < 9; i++)
+        double p[3];
+        for (int i = 0; i < 3; i++) p[i] = h[i] - n[i] * dot(n, h);
+        for (int i = 0; i < 9; i++)
             q[0] += p[i / 3] * b[Q + i] * p[i % 3], q[1] += h[i / 3] * b[Q + i] * h[i % 3];
-        for (j = 0; j < SSDGS_ASG_COUNT; j++) {
+        for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
             const double part = sigmoid((double)s.sharpness[2 * j + 1]);
             sum += softplus((double)s.sigma[j]) *
                    exp(-exp((double)s.sharpness[2 * j]) * ((1 - part) * q[0] + part * q[1]));
         }
-        woh = dot(wo, h);
-        fresnel = b[F0] + (1 - b[F0]) * pow(1 - woh, 5);
-        microfacet =
+        const double woh = dot(wo, h);
+        const double fresnel = b[F0] + (1 - b[F0]) * pow(1 - woh, 5);
+        const double microfacet =
             dot(n, wi) > 0 && dot(b + N, b + N) >= 1e-12 ? dot(n, wi) / (woh > 0.25 ? woh * woh : 0.0625) : 0;
-        for (i = 0; i < 3 && microfacet > 0; i++) {
+        for (int i = 0; i < 3 && microfacet > 0; i++) {
             const double steep = b[M + 3 * light + i] * fresnel * sum / (woh > 0.25 ? woh * woh : 0.0625) /
                                  sqrt(dot(b + N, b + N));
             out[5] = fmax(out[5], steep);
         }
-        for (i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++)
             out[i] += ((microfacet > 0 ? b[M + 3 * light + i] * microfacet * fresnel * sum : 0) +
                        b[D + 3 * light + i]) *
                       arrives;
@@ -463,10 +464,10 @@ static int blend(const splat *p, int n, double x, double y, const shaded *of, do
         (double)s.options.alpha_threshold > 1e-9 ? (double)s.options.alpha_threshold : 1e-9;
     const double stop = (double)s.options.stop;
     double t = 1, last = -1, sum[VALUES];
-    int k, c, sure = 1;
+    int sure = 1;
     memset(sum, 0, sizeof sum);
-    for (c = 0; c < 6; c++) out[c] = 0;
-    for (k = 0; k < n; k++) {
+    for (int c = 0; c < 6; c++) out[c] = 0;
+    for (int k = 0; k < n; k++) {
         const double raw = response(p + k, x, y), alpha = raw < 0.999 ? raw : 0.999;
         if (threshold > 1e-4 && fabs(raw - threshold) < 1e-5) sure = 0;
         if (raw < threshold) continue;
@@ -475,14 +476,14 @@ static int blend(const splat *p, int n, double x, double y, const shaded *of, do
         if (p[k].depth - last < 1e-6 * p[k].depth) sure = 0; /* in one order or the other */
         sure = sure && of[p[k].index].sure;
         last = p[k].depth;
-        for (c = 0; c < VALUES; c++) sum[c] += t * alpha * of[p[k].index].value[c];
+        for (int c = 0; c < VALUES; c++) sum[c] += t * alpha * of[p[k].index].value[c];
         out[4] += t * alpha * p[k].depth;
         t *= 1 - alpha;
     }
-    for (c = 0; c < 3; c++) out[c] = sum[COLOR + c] + t * (double)s.options.background[c];
+    for (int c = 0; c < 3; c++) out[c] = sum[COLOR + c] + t * (double)s.options.background[c];
     out[3] = 1 - t;
     if (s.settings.asg == SSDGS_ASG_DEFERRED && t < 1) {
-        for (c = Q; c < N; c++) sum[c] /= 1 - t;
+        for (int c = Q; c < N; c++) sum[c] /= 1 - t;
         sure &= highlight(sum, out[4] / (1 - t), x, y, out);
     }
     return sure;
@@ -507,9 +508,8 @@ static double scale_of(double color, double steep) {
 }
 
 static void compare(const planes *got, double (*want)[6], const unsigned char *sure, int pixels, errors *e) {
-    int i, c;
-    for (i = 0; i < pixels; i++)
-        for (c = 0; sure[i] && c < 5; c++) {
+    for (int i = 0; i < pixels; i++)
+        for (int c = 0; sure[i] && c < 5; c++) {
             const double value = (double)(c < 3   ? got->color[3 * i + c]
                                           : c < 4 ? got->alpha[i]
                                                   : got->depth[i]);
@@ -522,18 +522,16 @@ static void oracle_image(const double *visibility, double (*want)[6], unsigned c
     static shaded of[MOST];
     const lens l = camera_lens();
     const int n = project_all(&l, p);
-    int i;
-    for (i = 0; i < n; i++) shade(all + p[i].index, p[i].index, visibility, of + p[i].index);
-    for (i = 0; i < l.width * l.height; i++)
+    for (int i = 0; i < n; i++) shade(all + p[i].index, p[i].index, visibility, of + p[i].index);
+    for (int i = 0; i < l.width * l.height; i++)
         sure[i] = (unsigned char)blend(p, n, i % l.width + 0.5, i / l.width + 0.5, of, want[i]);
 }
 
 static void camera_scene(int index) {
-    int width, height, c;
     random_scene((uint64_t)index, 200, 0.01, 0.2);
     s.count = index % 10 == 5 ? integer(100, 200) : integer(1, 60); /* tiles are walked 64 at a time */
-    width = integer(16, 40),
-    height = integer(16, 40); /* one after the other: compilers differ in the order of arguments */
+    const int width = integer(16, 40),
+              height = integer(16, 40); /* one after the other: compilers differ in the order of arguments */
     random_camera(uniform(0.9, 3), width, height);
     s.camera.fy = (ssdgs_real)((double)s.camera.fx * (index % 4 == 1 ? uniform(0.25, 4) : 1));
     if (index % 4 == 2) {
@@ -547,7 +545,7 @@ static void camera_scene(int index) {
     if (index % 11 == 1) s.options.stop = 0;
     if (index % 13 == 1) s.settings.pixel_variance = (ssdgs_real)0.3;
     s.settings.light_scale = (ssdgs_real)uniform(0.5, 2);
-    for (c = 0; c < 3; c++) s.options.background[c] = (ssdgs_real)uniform(0, 1);
+    for (int c = 0; c < 3; c++) s.options.background[c] = (ssdgs_real)uniform(0, 1);
     s.light_count = integer(0, 2);
     random_light(s.lights, 1);
     random_light(s.lights + 1, uniform(0.8, 3));
@@ -559,18 +557,18 @@ static void test_camera(int scenes) {
     static unsigned char sure[PIXELS];
     errors e[SSDGS_ISA_COUNT][2]; /* of specular terms per Gaussian, deferred */
     double most[2] = {0, 0}, sum = 0, count = 0;
-    int index, isa, i, unsure = 0, pixels = 0;
+    int unsure = 0, pixels = 0;
     memset(e, 0, sizeof e);
     s.options = ssdgs_render_options_exact(); /* the oracle takes these from them */
     CHECK(fabs((double)s.options.alpha_threshold * 255 - 1) < 1e-6 &&
           fabs((double)s.options.stop * 1e4 - 1) < 1e-6);
-    for (index = 0; index < scenes; index++) {
+    for (int index = 0; index < scenes; index++) {
         camera_scene(index);
         read_gaussians();
         oracle_image(NULL, want, sure);
         pixels += s.camera.width * s.camera.height;
-        for (i = 0; i < s.camera.width * s.camera.height; i++) unsure += !sure[i];
-        for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        for (int i = 0; i < s.camera.width * s.camera.height; i++) unsure += !sure[i];
+        for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
             if (!contexts[isa][0]) continue;
             render(contexts[isa][0], image);
             compare(image, want, sure, s.camera.width * s.camera.height,
@@ -584,8 +582,8 @@ static void test_camera(int scenes) {
             }
         }
     }
-    for (isa = 0; isa < SSDGS_ISA_COUNT; isa++)
-        for (i = 0; i < 2 && contexts[isa][0]; i++) {
+    for (int isa = 0; isa < SSDGS_ISA_COUNT; isa++)
+        for (int i = 0; i < 2 && contexts[isa][0]; i++) {
             printf("%s%s: at most %.3g, on average %.3g\n", ssdgs_isa_string((ssdgs_isa)isa),
                    i ? ", deferred" : "", e[isa][i].most, e[isa][i].sum / e[isa][i].count);
             most[i] = e[isa][i].most > most[i] ? e[isa][i].most : most[i];
@@ -620,19 +618,20 @@ static ssdgs_frame light_frame(ssdgs_model *model) {
 
 /* Every centre lies on a face, a perspective face looks from the light, and its rows are orthonormal. */
 static void check_light_camera(void) {
-    int i, f, g, on = 0;
-    for (f = 0; f < face_count; f++) {
-        double position[3], t[3];
-        for (i = 0; i < 3; i++) position[i] = (double)s.lights[0].position[i];
+    int on = 0;
+    for (int f = 0; f < face_count; f++) {
+        double position[3];
+        for (int i = 0; i < 3; i++) position[i] = (double)s.lights[0].position[i];
+        double t[3];
         to_view(faces + f, position, t);
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             CHECK(faces[f].orthographic || fabs(t[i]) < 2e-6 * (1 + sqrt(dot(position, position))));
             CHECK(fabs(dot(faces[f].view + 4 * i, faces[f].view + 4 * (i > 0 ? i - 1 : 2))) < 1e-6);
             CHECK(fabs(dot(faces[f].view + 4 * i, faces[f].view + 4 * i) - 1) < 1e-6);
         }
     }
-    for (g = 0; g < s.count; g++)
-        for (f = 0; f < face_count; f++) {
+    for (int g = 0; g < s.count; g++)
+        for (int f = 0; f < face_count; f++) {
             splat p;
             if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 &&
                 p.x <= faces[f].width && p.y <= faces[f].height) {
@@ -655,31 +654,30 @@ static void oracle_light(light_truth *out) {
     static double raw[MOST], rho[MOST], v[MOST], cue[MOST];
     const double threshold = (double)s.options.alpha_threshold;
     const double bias = (double)s.settings.light_bias * (double)s.settings.length_unit;
-    int f, n, i, g, k;
     memset(out, 0, sizeof *out);
-    for (g = 0; g < s.count; g++) rho[g] = v[g] = cue[g] = 0;
-    for (f = 0; f < face_count; f++) {
+    for (int g = 0; g < s.count; g++) rho[g] = v[g] = cue[g] = 0;
+    for (int f = 0; f < face_count; f++) {
         const lens *l = faces + f;
-        n = project_all(l, p);
-        for (i = 0; i < l->width * l->height; i++) {
+        const int n = project_all(l, p);
+        for (int i = 0; i < l->width * l->height; i++) {
             const double x = i % l->width + 0.5, y = i / l->width + 0.5, u = (x - l->cx) / l->fx,
                          w = (y - l->cy) / l->fy;
             const double solid = l->orthographic ? pow(l->fx * l->distance, -2)
                                                  : pow(1 + u * u + w * w, -1.5) / (l->fx * l->fy);
             double beam = 1;
-            for (k = 0; k < n; k++) {
+            for (int k = 0; k < n; k++) {
                 raw[k] = response(p + k, x, y);
                 if (fabs(raw[k] - threshold) < 1e-4 * threshold)
-                    for (g = 0; g < n; g++)
+                    for (int g = 0; g < n; g++)
                         if (response(p + g, x, y) > 0.9 * threshold) out->doubt[p[g].index] = 1;
                 raw[k] = raw[k] < threshold ? 0 : raw[k];
                 out->flux[p[k].index] += solid * beam * (raw[k] < 0.999 ? raw[k] : 0.999);
                 beam *= 1 - (raw[k] < 0.999 ? raw[k] : 0.999);
             }
-            for (g = 0; g < n; g++) {
+            for (int g = 0; g < n; g++) {
                 double t = 1, depth = 0;
                 if (raw[g] <= 0) continue;
-                for (k = 0; k < n; k++) {
+                for (int k = 0; k < n; k++) {
                     const double ahead = p[g].depth - bias - p[k].depth,
                                  alpha = raw[k] < 0.999 ? raw[k] : 0.999;
                     if (k != g && raw[k] > 0 && fabs(ahead) < 3e-6 * p[g].depth) out->doubt[p[g].index] = 1;
@@ -693,7 +691,7 @@ static void oracle_light(light_truth *out) {
             }
         }
     }
-    for (g = 0; g < s.count; g++) {
+    for (int g = 0; g < s.count; g++) {
         out->v[g] = rho[g] > 0 ? v[g] / rho[g] : 1;
         out->cue[g] = rho[g] > 0 ? cue[g] / rho[g] : 0;
     }
@@ -714,51 +712,51 @@ static void test_light(int rounds) {
     static double want[PIXELS][6];
     static unsigned char sure[PIXELS];
     static light_truth truth;
-    errors v, cue, flux, colors;
+    errors v;
     const int cases = (int)(sizeof light_cases / sizeof *light_cases);
-    int index, isa, i, doubtful = 0, total = 0;
+    int doubtful = 0, total = 0;
     memset(&v, 0, sizeof v);
+    errors cue, flux, colors;
     cue = flux = colors = v;
-    for (index = 0; index < rounds * 2 * cases; index++) {
+    for (int index = 0; index < rounds * 2 * cases; index++) {
         const light_case *c = light_cases + index / 2 % cases;
         int known = 0;
         random_scene(1000000 + (uint64_t)index, 200, 0.01, 0.1);
         s.count = index % 8 == 5 ? 200 : integer(2, 40); /* tiles are walked 64 at a time */
-        for (i = 0; i < 6; i++)
+        for (int i = 0; i < 6; i++)
             s.raw[SSDGS_POSITION + i / 2][i % 2] = (ssdgs_real)(i % 2 - 0.5); /* always as large a scene */
-        for (i = 0; i < s.count; i++) s.raw[SSDGS_OPACITY][i] += 2;
+        for (int i = 0; i < s.count; i++) s.raw[SSDGS_OPACITY][i] += 2;
         read_gaussians();
         random_light(s.lights, c->distance);
         s.lights[0].kind = (ssdgs_light_kind)c->kind;
         s.settings.light_blur = index % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         s.settings.light_bias = (ssdgs_real)c->bias;
         s.settings.light_map_size = c->map;
-        for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
-            ssdgs_model *model;
-            ssdgs_frame frame;
+        for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
             if (!contexts[isa][0]) continue;
             s.settings.terms = SSDGS_ALL_TERMS;
             s.settings.transport = 1; /* for the flux */
-            model = make_model(contexts[isa][index % 3 == 0]);
-            frame = light_frame(model);
+            ssdgs_model *model = make_model(contexts[isa][index % 3 == 0]);
+            ssdgs_frame frame = light_frame(model);
             if (!CHECK(frame.view_count == 1 + c->faces)) exit(1);
             if (!known) {
                 face_count = c->faces;
-                for (i = 0; i < c->faces; i++) faces[i] = light_lens(frame.views + 1 + i);
+                for (int i = 0; i < c->faces; i++) faces[i] = light_lens(frame.views + 1 + i);
                 check_light_camera();
                 oracle_light(&truth);
                 oracle_image(truth.v, want, sure);
                 known = 1;
                 total += s.count;
-                for (i = 0; i < s.count; i++) doubtful += truth.doubt[i];
+                for (int i = 0; i < s.count; i++) doubtful += truth.doubt[i];
             }
-            for (i = 0; i < s.count; i++) {
+            for (int i = 0; i < s.count; i++) {
                 if (truth.doubt[i]) continue;
                 count_error(&v, fabs((double)frame.visibility[i] - truth.v[i]));
                 count_error(&cue, fabs((double)frame.depth_cue[i] - truth.cue[i]));
                 if (truth.flux[i] > 1e-9) count_error(&flux, fabs((double)frame.flux[i] / truth.flux[i] - 1));
             }
             ssdgs_model_destroy(model);
+            int i;
             for (i = 0; i < s.count && !truth.doubt[i]; i++) {}
             if (i < s.count || index % 2) continue;
             s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
@@ -782,16 +780,17 @@ static void test_light(int rounds) {
 /* Largest response of g along the ray from `eye`. */
 static double ray_response(const gaussian *g, const double eye[3], const double direction[3],
                            double farthest) {
-    double o[3], d[3], cross[3], d2;
-    int i, j;
-    for (i = 0; i < 3; i++)
+    double o[3], d[3];
+    int j;
+    for (int i = 0; i < 3; i++)
         for (j = 0, o[i] = d[i] = 0; j < 3; j++) {
             o[i] += g->axes[3 * j + i] * (eye[j] - g->x[j]) / g->scale[i];
             d[i] += g->axes[3 * j + i] * direction[j] / g->scale[i];
         }
     if (dot(o, d) >= 0) return 0; /* behind */
-    for (i = 0; i < 3; i++) cross[i] = o[(i + 1) % 3] * d[(i + 2) % 3] - o[(i + 2) % 3] * d[(i + 1) % 3];
-    d2 = dot(cross, cross) / dot(d, d);
+    double cross[3];
+    for (int i = 0; i < 3; i++) cross[i] = o[(i + 1) % 3] * d[(i + 2) % 3] - o[(i + 2) % 3] * d[(i + 1) % 3];
+    const double d2 = dot(cross, cross) / dot(d, d);
     return d2 < farthest ? g->opacity * exp(-0.5 * d2) : 0;
 }
 
@@ -800,29 +799,28 @@ static void trace_visibility(const lens *light, double *v) {
     enum { GRID = 15 }; /* the least alpha, 1/255, is at 11.1 at most */
     static splat p[MOST];
     lens sharp = *light;
-    double eye[3];
-    int n, g, k, i, j;
     sharp.variance = 0;
-    n = project_all(&sharp, p);
-    for (i = 0; i < 3; i++) eye[i] = (double)s.lights[0].position[i];
-    for (g = 0; g < n; g++) {
+    const int n = project_all(&sharp, p);
+    double eye[3];
+    for (int i = 0; i < 3; i++) eye[i] = (double)s.lights[0].position[i];
+    for (int g = 0; g < n; g++) {
         const double bias = (double)s.settings.light_bias * (double)s.settings.length_unit;
         const double det = p[g].a * p[g].c - p[g].b * p[g].b, xx = p[g].c / det, xy = -p[g].b / det,
                      yy = p[g].a / det;
         const double lx = sqrt(xx), ly = xy / lx, lyy = sqrt(yy - ly * ly),
                      reach = sqrt(2 * log(255 * p[g].opacity) + 1e-9);
         double sum = 0, rho = 0;
-        for (i = 0; p[g].opacity > 1.0 / 255 && i < GRID * GRID; i++) {
+        for (int i = 0; p[g].opacity > 1.0 / 255 && i < GRID * GRID; i++) {
             const double a = reach * ((2 * (i % GRID) + 1.0) / GRID - 1),
                          b = reach * ((2 * (i / GRID) + 1.0) / GRID - 1);
             const double u = (p[g].x + lx * a - light->cx) / light->fx,
                          w = (p[g].y + ly * a + lyy * b - light->cy) / light->fy;
-            double direction[3], weight, t = 1;
-            for (j = 0; j < 3; j++)
+            double direction[3], t = 1;
+            for (int j = 0; j < 3; j++)
                 direction[j] = u * light->view[j] + w * light->view[4 + j] + light->view[8 + j];
-            weight = ray_response(all + p[g].index, eye, direction, 12);
+            const double weight = ray_response(all + p[g].index, eye, direction, 12);
             if (weight < 1.0 / 255) continue;
-            for (k = 0; k < n && p[k].depth < p[g].depth - bias; k++) {
+            for (int k = 0; k < n && p[k].depth < p[g].depth - bias; k++) {
                 const double alpha = ray_response(all + p[k].index, eye, direction, 12);
                 if (alpha >= 1.0 / 255) t *= 1 - (alpha < 0.999 ? alpha : 0.999);
             }
@@ -838,11 +836,7 @@ static double shadow_error(int range, int count, int blur, int map, double bias)
     static double truth[MOST];
     static int traced = -1;
     const int wanted = 3 * (bias > 0) + range;
-    ssdgs_model *model;
-    ssdgs_frame frame;
-    lens light;
     double sum = 0;
-    int i;
     random_scene(2000000 + (uint64_t)range, count, from[range], to[range]);
     read_gaussians();
     random_light(s.lights, 2.5);
@@ -850,11 +844,11 @@ static double shadow_error(int range, int count, int blur, int map, double bias)
     s.settings.light_bias = (ssdgs_real)bias;
     s.settings.light_map_size = map;
     s.settings.light_blur = blur;
-    model = make_model(best());
-    frame = light_frame(model);
-    light = light_lens(frame.views + 1);
+    ssdgs_model *model = make_model(best());
+    ssdgs_frame frame = light_frame(model);
+    lens light = light_lens(frame.views + 1);
     if (traced != wanted) trace_visibility(&light, truth), traced = wanted;
-    for (i = 0; i < s.count; i++) sum += fabs((double)frame.visibility[i] - truth[i]) / s.count;
+    for (int i = 0; i < s.count; i++) sum += fabs((double)frame.visibility[i] - truth[i]) / s.count;
     ssdgs_model_destroy(model);
     return sum;
 }
@@ -863,14 +857,13 @@ static void test_shadow_error(int count) {
     static const char *const names[3] = {"_large", "", "_small"};
     static const double default_most[3] = {
         0.012, 0.005, 0.0005}; /* what the affine projection leaves of the large ones stays */
-    int range, m;
-    for (range = 0; range < 3; range++) {
+    for (int range = 0; range < 3; range++) {
         const ssdgs_settings d = ssdgs_settings_default();
         const double error = shadow_error(range, count, d.light_blur, d.light_map_size, (double)d.light_bias);
-        double add[4], floored[4];
         CHECK(error < default_most[range]);
         if (!DOUBLE) printf("figure shadow_mean_abs_default%s %.5f\n", names[range], error);
-        for (m = 0; m < 4; m++) {
+        double add[4], floored[4];
+        for (int m = 0; m < 4; m++) {
             add[m] = shadow_error(range, count, SSDGS_BLUR_ADD, 64 << m, 0);
             floored[m] = shadow_error(range, count, SSDGS_BLUR_FLOOR, 64 << m, 0);
             if (!DOUBLE) printf("figure shadow_mean_abs_add_%d%s %.5f\n", 64 << m, names[range], add[m]);
@@ -879,7 +872,7 @@ static void test_shadow_error(int count) {
         }
         CHECK(4 * floored[0] < add[0] && 3 * floored[1] < add[1] && floored[1] < add[2] &&
               floored[2] < add[3]);
-        for (m = 1; m < 4; m++) CHECK(add[m] < 0.8 * add[m - 1] && floored[m] < 1.1 * floored[m - 1]);
+        for (int m = 1; m < 4; m++) CHECK(add[m] < 0.8 * add[m - 1] && floored[m] < 1.1 * floored[m - 1]);
     }
 }
 
@@ -900,20 +893,20 @@ static void full_scene(uint64_t seed, int width, int height) {
 /* Blend weights and the last transmittance make 1. */
 static void test_unity(void) {
     double most = 0;
-    int isa, i, c, dense = 0;
+    int dense = 0;
     full_scene(3000000, 93, 61);
     s.settings.baked = 1;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         s.options.background[c] = 1;
-        for (i = 0; i < s.count; i++)
+        for (int i = 0; i < s.count; i++)
             s.raw[SSDGS_DIFFUSE + c][i] = (ssdgs_real)0.54132485461291806; /* softplus: 1 */
     }
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         if (!contexts[isa][0]) continue;
         render(contexts[isa][0], image);
-        for (i = 0; i < 93 * 61; i++) {
+        for (int i = 0; i < 93 * 61; i++) {
             dense += image->alpha[i] > (ssdgs_real)0.5;
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 const double error = fabs((double)image->color[3 * i + c] - 1);
                 most = error <= most ? most : error;
             }
@@ -924,15 +917,14 @@ static void test_unity(void) {
 }
 
 static void test_permutation(void) {
-    int isa, i, c;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         if (!contexts[isa][0]) continue;
         full_scene(3000001, 93, 61);
         s.settings.transport = 0; /* which gathers from nodes of neighbours in this order */
         render(contexts[isa][0], image);
-        for (i = s.count - 1; i > 0; i--) {
+        for (int i = s.count - 1; i > 0; i--) {
             const int j = integer(0, i);
-            for (c = 0; c < SSDGS_CHANNELS; c++) {
+            for (int c = 0; c < SSDGS_CHANNELS; c++) {
                 const ssdgs_real swap = s.raw[c][i];
                 s.raw[c][i] = s.raw[c][j], s.raw[c][j] = swap;
             }
@@ -944,10 +936,9 @@ static void test_permutation(void) {
 
 /* In front of the camera, round, on the axis, which meets the centre of pixel (8, 8). */
 static void axis_scene(int count, double logit) {
-    int i, c;
     random_scene(3000002, count, 0.1, 0.1);
-    for (i = 0; i < count; i++) {
-        for (c = 0; c < 3; c++) s.raw[c][i] = 0;
+    for (int i = 0; i < count; i++) {
+        for (int c = 0; c < 3; c++) s.raw[c][i] = 0;
         s.raw[SSDGS_OPACITY][i] = (ssdgs_real)logit;
     }
     memset(s.camera.view, 0, sizeof s.camera.view);
@@ -957,8 +948,7 @@ static void axis_scene(int count, double logit) {
 
 /* One Gaussian is its opacity at its centre; two a hair apart are one of 1 - (1 - o)^2. */
 static void test_coincident(void) {
-    double logit;
-    for (logit = -4; logit <= 6; logit++) {
+    for (double logit = -4; logit <= 6; logit++) {
         const double o = sigmoid(logit), both = 1 - (1 - o) * (1 - o), tolerance = DOUBLE ? 1e-14 : 4e-7;
         axis_scene(1, logit);
         render(best(), image);
@@ -977,19 +967,17 @@ static void test_coincident(void) {
 static void visibility(double *v) {
     ssdgs_model *model = make_model(best());
     const ssdgs_frame frame = light_frame(model);
-    int i;
-    for (i = 0; i < s.count; i++) v[i] = (double)frame.visibility[i];
+    for (int i = 0; i < s.count; i++) v[i] = (double)frame.visibility[i];
     ssdgs_model_destroy(model);
 }
 
 /* Beer and Lambert: k wide layers leave (1 - a)^k, those within the bias do not count. */
 static void test_layers(void) {
     const double a = 0.3;
-    double v[MOST], most = 0;
-    int layers, blur, bias, i, c;
-    for (blur = 0; blur < 2; blur++)
-        for (bias = 0; bias < 2; bias++)
-            for (layers = 0; layers < 9; layers++) {
+    double most = 0;
+    for (int blur = 0; blur < 2; blur++)
+        for (int bias = 0; bias < 2; bias++)
+            for (int layers = 0; layers < 9; layers++) {
                 const int met = layers - (bias ? layers < 2 ? layers : 2 : 0);
                 axis_scene(1 + layers, log(a / (1 - a)));
                 s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
@@ -998,14 +986,15 @@ static void test_layers(void) {
                 s.settings.light_map_size = 512;
                 s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
                 s.lights[0].position[0] = s.lights[0].position[1] = 0, s.lights[0].position[2] = 1;
-                for (i = 0; i <= layers; i++) {
-                    for (c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = c == 0;
-                    for (c = 0; c < 3; c++)
+                for (int i = 0; i <= layers; i++) {
+                    for (int c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = c == 0;
+                    for (int c = 0; c < 3; c++)
                         s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)(i == 0  ? log(0.15)
                                                                      : c < 2 ? log(8.0)
                                                                              : -7);
                     s.raw[SSDGS_POSITION + 2][i] = (ssdgs_real)(0.1 * i); /* the bias is 0.25 */
                 }
+                double v[MOST];
                 visibility(v);
                 most = fabs(v[0] - pow(1 - a, met)) <= most ? most : fabs(v[0] - pow(1 - a, met));
             }
@@ -1014,23 +1003,25 @@ static void test_layers(void) {
 
 /* Alone, or too faint to be drawn: fully lit. One more in the way never lights any. */
 static void test_occluder(void) {
-    double without[MOST], with[MOST], most = -1;
-    int trial, i, darker = 0;
-    for (trial = 0; trial < 40; trial++) {
+    double most = -1;
+    int darker = 0;
+    for (int trial = 0; trial < 40; trial++) {
         random_scene(3100000 + (uint64_t)trial, 60, 0.01, 0.1);
         s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
         s.settings.light_blur = trial % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         s.settings.light_bias = 0;
         s.settings.light_map_size = 64;
         random_light(s.lights, trial % 4 < 2 ? 3 : 0.3);
-        for (i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++)
             s.raw[SSDGS_POSITION + i][0] *= (ssdgs_real)0.5; /* does not stretch what the map must cover */
         s.raw[SSDGS_OPACITY][0] = -20;
+        double without[MOST];
         visibility(without);
         CHECK(without[0] >= 1 && without[0] <= 1);
         s.raw[SSDGS_OPACITY][0] = 3;
+        double with[MOST];
         visibility(with);
-        for (i = 1; i < s.count; i++) {
+        for (int i = 1; i < s.count; i++) {
             most = with[i] - without[i] <= most ? most : with[i] - without[i];
             darker += with[i] < without[i] - 0.01;
         }
@@ -1044,15 +1035,14 @@ static void test_occluder(void) {
 /* Light passes freely where its map has no Gaussian, whatever a frame before left there: the place that two
    blend to lies between them. A third one is the nearest to the light. */
 static void test_gap(void) {
-    int dense, i, c;
-    for (dense = 1; dense >= 0; dense--) {
+    for (int dense = 1; dense >= 0; dense--) {
         axis_scene(3, dense ? 8 : 0);
         s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
         s.settings.light_bias = 0, s.settings.light_map_size = 64;
         s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
-        for (c = 0; c < 3; c++) s.lights[0].position[c] = c == 0;
-        for (i = 0; i < 3; i++) {
-            for (c = 0; c < 3; c++) s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)log(dense ? 0.3 : 0.03);
+        for (int c = 0; c < 3; c++) s.lights[0].position[c] = c == 0;
+        for (int i = 0; i < 3; i++) {
+            for (int c = 0; c < 3; c++) s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)log(dense ? 0.3 : 0.03);
             s.raw[SSDGS_POSITION][i] = (ssdgs_real)(i == 2 ? 0.3 : 0.1 * dense);
             s.raw[SSDGS_POSITION + 2][i] = (ssdgs_real)(i ? 0.4 : -0.4);
             s.raw[SSDGS_FRAME][i] = s.raw[SSDGS_FRAME + 2][i] = 1; /* faces the light */
@@ -1079,23 +1069,21 @@ static void test_veil(void) {
     ssdgs_light light = {SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}};
     ssdgs_image out = {0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_model *model = NULL;
-    int tenth, i, c;
     out.color = values;
     out.alpha = values + 3 * PX * PX;
     out.shadow = values + 4 * PX * PX;
     settings.shadow_layers = 0;
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     if (!CHECK(!ssdgs_model_create(best(), &settings, FLOOR + 1, &model))) exit(1);
-    for (tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
+    for (int tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
         const ssdgs_model_view v = ssdgs_model_arrays(model);
-        double shadow;
-        for (i = 0; i <= FLOOR; i++) {
+        for (int i = 0; i <= FLOOR; i++) {
             ssdgs_real *p = v.gaussians + i;
-            for (c = 0; c < 2; c++)
+            for (int c = 0; c < 2; c++)
                 p[(size_t)c * v.stride] =
                     (ssdgs_real)(i == FLOOR ? 0 : ((c ? i / ROW : i % ROW) + 0.5) / ROW - 0.5);
             p[2 * v.stride] = (ssdgs_real)(i == FLOOR ? 0.4 : 0);
-            for (c = 0; c < 3; c++)
+            for (int c = 0; c < 3; c++)
                 p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = (ssdgs_real)log(c == 2       ? 0.002
                                                                               : i == FLOOR ? 1
                                                                                            : 0.016);
@@ -1105,8 +1093,8 @@ static void test_veil(void) {
             p[(SSDGS_ASG_WEIGHT + 3) * v.stride] = -20; /* hard */
         }
         if (!CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &out, NULL))) exit(1);
-        i = PX / 2 * PX + PX / 2;
-        shadow = (double)(out.shadow[i] / out.alpha[i]);
+        const int i = PX / 2 * PX + PX / 2;
+        const double shadow = (double)(out.shadow[i] / out.alpha[i]);
         if (!CHECK(fabs(shadow - (tenth < 2 ? 1 : 1 - 0.1 * tenth)) < 0.01))
             printf("    a veil of %d tenths leaves %g\n", tenth, shadow);
     }
@@ -1116,16 +1104,15 @@ static void test_veil(void) {
 /* Without a map, as where a hook walks the lights and makes none, pixels take the visibility of their
    Gaussians. */
 static void test_no_map(void) {
-    ssdgs_model *model;
-    ssdgs_frame frame;
-    int i, checked = 0;
+    int checked = 0;
     full_scene(3000005, 60, 40);
-    model = make_model(best());
+    ssdgs_model *model = make_model(best());
+    ssdgs_frame frame;
     CHECK(!ssdgs__frame_begin(&frame, model, &s.camera, s.lights, 1, &s.options, 1, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
-    for (i = 1; i < frame.view_count; i++) frame.views[i].light_map = NULL;
+    for (int i = 1; i < frame.view_count; i++) frame.views[i].light_map = NULL;
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
-    for (i = 0; i < 60 * 40; i++) {
+    for (int i = 0; i < 60 * 40; i++) {
         const ssdgs_real *of_gaussians = ssdgs__layer_plane(&frame, SSDGS__LIGHT_LAYER + 2, 1) + i;
         const double cover = (double)ssdgs__layer_plane(&frame, SSDGS__DEPTH_LAYER, 2)[i],
                      want = (double)*of_gaussians / cover;
@@ -1140,11 +1127,10 @@ static void test_no_map(void) {
 static double largest_difference(int x0, int y0, int width, int height, int whole, double depth_scale,
                                  int spared) {
     double most[3] = {0, 0, 0}; /* of pixels, the largest first */
-    int x, y, c, i;
-    for (y = 0; y < height; y++)
-        for (x = 0; x < width; x++) {
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
             double worst = 0;
-            for (c = 0; c < 5; c++) {
+            for (int c = 0; c < 5; c++) {
                 const int a = y * width + x, b = (y + y0) * whole + x + x0;
                 const double difference =
                     c < 3   ? (double)(image[1].color[3 * a + c] - image->color[3 * b + c])
@@ -1153,7 +1139,7 @@ static double largest_difference(int x0, int y0, int width, int height, int whol
                 const double size = c < 3 ? scale_of((double)image->color[3 * b + c], 0) : 1;
                 worst = fabs(difference) <= worst * size ? worst : fabs(difference) / size;
             }
-            for (i = 0; i < 3; i++)
+            for (int i = 0; i < 3; i++)
                 if (!(worst <= most[i])) {
                     const double next = most[i];
                     most[i] = worst, worst = next;
@@ -1168,17 +1154,15 @@ static void test_crop(void) {
                                    {0, 0, 90, 1},    {0, 0, 1, 70},   {0, 0, 37, 41}, {0, 0, 1, 1},
                                    {16, 16, 48, 32}, {32, 0, 17, 13}, {5, 3, 40, 50}, {77, 69, 1, 1}};
     double most = 0;
-    size_t i;
-    for (i = 0; i < sizeof crops / sizeof *crops; i++) {
+    for (size_t i = 0; i < sizeof crops / sizeof *crops; i++) {
         const int *c = crops[i];
-        double e;
         full_scene(3000003, 90, 70);
         s.options.alpha_threshold = 0;
         render(best(), image);
         s.camera.width = c[2], s.camera.height = c[3];
         s.camera.cx -= (ssdgs_real)c[0], s.camera.cy -= (ssdgs_real)c[1];
         render(best(), image + 1);
-        e = largest_difference(c[0], c[1], c[2], c[3], 90, 1, 0);
+        const double e = largest_difference(c[0], c[1], c[2], c[3], 90, 1, 0);
         if (c[0] + c[1] == 0) CHECK(e <= 0);
         most = e <= most ? most : e;
     }
@@ -1194,13 +1178,10 @@ static void test_similarity(void) {
     } cases[] = {{1, 0, 0.7}, {1e-6, 0, 0}, {1e-3, 0, 2e-4}, {31, 0, 5},
                  {1e6, 0, 0}, {1, 1, 0},    {1, 2.5, 0.3},   {0.01, 4, 0}};
     double most = 0;
-    size_t n;
-    for (n = 0; n < sizeof cases / sizeof *cases; n++) {
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         const double k = cases[n].scale, half = 0.5 * cases[n].turn;
         const double w = cos(half), x = 0.6 * sin(half), y = -0.48 * sin(half), z = 0.64 * sin(half);
         const double move[3] = {cases[n].move, -0.5 * cases[n].move, 0.25 * cases[n].move};
-        double r[9], e;
-        int i, j, c;
         full_scene(3000004 + n, 70, 50);
         s.options.alpha_threshold = s.options.stop = 0;
         s.settings.light_map_size = 0;
@@ -1209,18 +1190,20 @@ static void test_similarity(void) {
         s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
         s.options.terms = cases[n].turn > 0 ? SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM : SSDGS_ALL_TERMS;
         render(best(), image);
+        double r[9];
         rotation(w, x, y, z, r);
+        int c;
 #define MOVED(out, in, by, how) \
     do { \
         double from_[3]; \
         for (c = 0; c < 3; c++) from_[c] = (double)(in); \
         for (c = 0; c < 3; c++) (out) = (ssdgs_real)((by)*dot(r + 3 * c, from_) + (how)*move[c]); \
     } while (0)
-        for (i = 0; i < s.count; i++) {
+        for (int i = 0; i < s.count; i++) {
             MOVED(s.raw[SSDGS_POSITION + c][i], s.raw[SSDGS_POSITION + c][i], k, 1);
             for (c = 0; c < 3; c++)
                 s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)((double)s.raw[SSDGS_LOG_SCALE + c][i] + log(k));
-            for (j = SSDGS_ROTATION; j <= SSDGS_FRAME; j += SSDGS_FRAME - SSDGS_ROTATION) {
+            for (int j = SSDGS_ROTATION; j <= SSDGS_FRAME; j += SSDGS_FRAME - SSDGS_ROTATION) {
                 const double a = (double)s.raw[j][i], b = (double)s.raw[j + 1][i];
                 const double d = (double)s.raw[j + 2][i], f = (double)s.raw[j + 3][i];
                 s.raw[j][i] = (ssdgs_real)(w * a - x * b - y * d - z * f);
@@ -1235,16 +1218,16 @@ static void test_similarity(void) {
         for (c = 0; c < 3; c++) s.lights[0].intensity[c] *= (ssdgs_real)(k * k);
         s.settings.length_unit = (ssdgs_real)((double)s.settings.length_unit * k);
         s.camera.near_plane = (ssdgs_real)(0.01 * k);
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             ssdgs_real *row = s.camera.view + 4 * i;
-            double axis[3];
             MOVED(row[c], row[c], 1, 0);
+            double axis[3];
             for (c = 0; c < 3; c++) axis[c] = (double)row[c];
             row[3] = (ssdgs_real)(k * (double)row[3] - dot(axis, move));
         }
         render(best(), image + 1);
-        e = largest_difference(0, 0, 70, 50, 70, k,
-                               DOUBLE ? 0 : 2); /* places near a map's jumps may change sides */
+        const double e = largest_difference(0, 0, 70, 50, 70, k,
+                                            DOUBLE ? 0 : 2); /* places near a map's jumps may change sides */
         if (!CHECK(e < (DOUBLE ? 3e-13 : 5e-5)))
             printf("    scale %g, turn %g, move %g: %.3g\n", k, cases[n].turn, cases[n].move, e);
         most = e <= most ? most : e;
@@ -1261,17 +1244,16 @@ static double projection_error(double sigma, double degrees) {
     const double angle = degrees * PI / 180, eye[3] = {0, 0, 0};
     double sum = 0, whole = 0;
     gaussian g;
-    splat p;
-    lens l;
-    int i, c;
     memset(&g, 0, sizeof g);
+    lens l;
     memset(&l, 0, sizeof l);
-    for (c = 0; c < 3; c++) g.axes[4 * c] = 1, g.scale[c] = sigma, l.view[5 * c] = 1;
+    for (int c = 0; c < 3; c++) g.axes[4 * c] = 1, g.scale[c] = sigma, l.view[5 * c] = 1;
     g.opacity = 1;
     g.x[0] = sin(angle), g.x[2] = cos(angle);
     l.fx = l.fy = 1;
+    splat p;
     CHECK(project(&l, &g, &p));
-    for (i = 0; i < GRID * GRID; i++) {
+    for (int i = 0; i < GRID * GRID; i++) {
         const double x = p.x + 8 / sqrt(p.a) * ((2 * (i % GRID) + 1.0) / GRID - 1);
         const double y = p.y + 8 / sqrt(p.c) * ((2 * (i / GRID) + 1.0) / GRID - 1);
         const double direction[3] = {x, y, 1}, exact = ray_response(&g, eye, direction, 50);
@@ -1288,9 +1270,8 @@ static void test_projection(void) {
         {0.0001, 0.0032, 0.0069, 0.012, 0.021}, {0.0016, 0.013, 0.028, 0.048, 0.083},
         {0.010, 0.033, 0.070, 0.12, 0.21},      {0.041, 0.073, 0.15, 0.25, 0.43},
         {0.18, 0.21, 0.35, 0.54, 0.76},         {0.44, 0.47, 0.59, 0.74, 0.88}};
-    int i, j;
-    for (i = 0; i < 6; i++)
-        for (j = 0; j < 5; j++) {
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 5; j++) {
             const double error = projection_error(sigmas[i], 15 * j);
             CHECK(fabs(error - published[i][j]) < 0.15 * published[i][j]);
             if (!DOUBLE) printf("figure ewa_l1_sigma%03.0f_at%02d %.4g\n", 1000 * sigmas[i], 15 * j, error);
@@ -1302,13 +1283,13 @@ enum { TURNS = 96, FOCAL = 1000, SCREEN = 1024 };
 static ssdgs_real turned[SSDGS_CHANNELS][TURNS];
 
 static int fill_turned(double sigma, double aspect, int step) {
-    int n, c;
     memset(turned, 0, sizeof turned);
+    int n;
     for (n = 0; n * step <= 90; n++) {
         turned[SSDGS_POSITION + 2][n] = 1;
         turned[SSDGS_ROTATION][n] = (ssdgs_real)cos(n * step * PI / 360);
         turned[SSDGS_ROTATION + 3][n] = (ssdgs_real)sin(n * step * PI / 360);
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             turned[SSDGS_LOG_SCALE + c][n] = (ssdgs_real)log(sigma / FOCAL / (c ? aspect : 1));
         turned[SSDGS_OPACITY][n] = 2;
     }
@@ -1336,30 +1317,29 @@ static void true_conic(int n, double variance, double conic[3]) {
 static void test_conic(int step) {
     static ssdgs_real record[TURNS][8], depth[TURNS];
     double worst = 0, excess = -1, needle_excess = 0;
-    int isa, size, aspect, n, c, x, y;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (size = 1; size <= 6 && ssdgs__table(isa); size++)
-            for (aspect = 0; aspect <= 6; aspect++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
+        for (int size = 1; size <= 6 && ssdgs__table(isa); size++)
+            for (int aspect = 0; aspect <= 6; aspect++) {
                 ssdgs__projection p;
                 memset(&p, 0, sizeof p);
                 p.view[0] = p.view[5] = p.view[10] = 1;
                 p.fx = p.fy = FOCAL, p.cx = p.cy = SCREEN / 2, p.near_plane = (ssdgs_real)0.01;
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
-                n = fill_turned(pow(10, size), pow(10, aspect), step);
+                int n = fill_turned(pow(10, size), pow(10, aspect), step);
                 ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record[0],
                                            depth);
                 while (n--) {
                     const ssdgs_real *r = record[n];
-                    double want[3], norm;
                     CHECK(depth[n] > 0);
+                    double want[3];
                     true_conic(n, (double)p.variance, want);
-                    norm = fabs(want[0]) > fabs(want[2]) ? fabs(want[0]) : fabs(want[2]);
-                    for (c = 0; c < 3; c++) {
+                    const double norm = fabs(want[0]) > fabs(want[2]) ? fabs(want[0]) : fabs(want[2]);
+                    for (int c = 0; c < 3; c++) {
                         const double error = fabs((double)r[2 + c] - want[c]) / norm;
                         worst = error <= worst ? worst : error;
                     }
-                    for (y = 0; y < SCREEN; y += 37)
-                        for (x = 0; x < SCREEN; x++) {
+                    for (int y = 0; y < SCREEN; y += 37)
+                        for (int x = 0; x < SCREEN; x++) {
                             const ssdgs_real dx = (ssdgs_real)(x + 0.5) - r[0],
                                              dy = (ssdgs_real)(y + 0.5) - r[1];
                             const double power = (double)((r[4] * dy + r[3] * dx) * dy + r[2] * dx * dx);
@@ -1376,15 +1356,13 @@ static void test_conic(int step) {
 }
 
 static void make_contexts(void) {
-    int isa, t;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (t = 0; t < 2; t++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
+        for (int t = 0; t < 2; t++) {
             ssdgs_context_desc desc;
-            ssdgs_result result;
             memset(&desc, 0, sizeof desc);
             desc.isa = (ssdgs_isa)isa;
             desc.threads = t ? 3 : 1;
-            result = ssdgs_context_create(&desc, &contexts[isa][t]);
+            const ssdgs_result result = ssdgs_context_create(&desc, &contexts[isa][t]);
             CHECK(result == SSDGS_OK || result == SSDGS_ERR_ISA);
             if (result) contexts[isa][t] = NULL;
         }
@@ -1396,10 +1374,9 @@ static void make_contexts(void) {
    column. 0: none, or the last bit decides which neighbour. */
 static int depth_normal(const double *depth, int width, int x, int y, double n[3]) {
     double way[2][3];
-    int i, c;
-    for (i = 0; i < 2; i++) {
-        double p[3][3], distance[2]; /* before, here, after */
-        for (c = -1; c <= 1; c++) {
+    for (int i = 0; i < 2; i++) {
+        double p[3][3]; /* before, here, after */
+        for (int c = -1; c <= 1; c++) {
             const int px = i ? x : x + c, py = i ? y + c : y;
             const double d = depth[py * width + px];
             p[c + 1][0] = (px + 0.5 - (double)s.camera.cx) / (double)s.camera.fx * d;
@@ -1407,11 +1384,13 @@ static int depth_normal(const double *depth, int width, int x, int y, double n[3
             p[c + 1][2] = d;
             if (d <= 0) return 0;
         }
+        double distance[2];
         distance[0] = fabs(p[1][2] - p[0][2]), distance[1] = fabs(p[2][2] - p[1][2]);
         if (fabs(distance[0] - distance[1]) < 1e-6) return 0;
-        for (c = 0; c < 3; c++) way[i][c] = distance[0] < distance[1] ? p[1][c] - p[0][c] : p[2][c] - p[1][c];
+        for (int c = 0; c < 3; c++)
+            way[i][c] = distance[0] < distance[1] ? p[1][c] - p[0][c] : p[2][c] - p[1][c];
     }
-    for (c = 0; c < 3; c++)
+    for (int c = 0; c < 3; c++)
         n[c] = way[1][(c + 1) % 3] * way[0][(c + 2) % 3] - way[1][(c + 2) % 3] * way[0][(c + 1) % 3];
     normalise(n);
     return 1;
@@ -1422,13 +1401,13 @@ static void test_normals(void) {
     static ssdgs_real layers[7 * 3 * SIZE];
     static double depth[SIZE];
     double most = 0, weight = 0.7 / SIZE;
-    int index, isa, threads, x, y, c, i, told = 0, flat = 0;
-    for (index = 0; index < 20; index++) {
+    int told = 0, flat = 0;
+    for (int index = 0; index < 20; index++) {
         double plane[3] = {0, 0, 1};
         key = (uint64_t)(9000 + index), drawn = 0;
         random_camera(uniform(0.9, 3), WIDTH, HEIGHT);
-        for (c = 0; c < 2; c++) plane[c] = uniform(-0.7, 0.7);
-        for (i = 0; i < SIZE; i++) { /* a plane, or anything */
+        for (int c = 0; c < 2; c++) plane[c] = uniform(-0.7, 0.7);
+        for (int i = 0; i < SIZE; i++) { /* a plane, or anything */
             const double u = (i % WIDTH + 0.5 - (double)s.camera.cx) / (double)s.camera.fx;
             const double v = (i / WIDTH + 0.5 - (double)s.camera.cy) / (double)s.camera.fy;
             const double alpha = uniform(0, 1) < 0.05 ? uniform(0, 0.49) : uniform(0.51, 1);
@@ -1440,8 +1419,8 @@ static void test_normals(void) {
                            : (double)layers[3 * 3 * SIZE + i] / (double)layers[3 * 3 * SIZE + 2 * SIZE + i];
         }
         normalise(plane);
-        for (isa = 0; isa < SSDGS_ISA_COUNT; isa++)
-            for (threads = 0; threads < 2 && contexts[isa][0]; threads++) {
+        for (int isa = 0; isa < SSDGS_ISA_COUNT; isa++)
+            for (int threads = 0; threads < 2 && contexts[isa][0]; threads++) {
                 ssdgs_frame frame;
                 memset(&frame, 0, sizeof frame);
                 frame.context = contexts[isa][threads];
@@ -1451,23 +1430,23 @@ static void test_normals(void) {
                 frame.layer_pixels = layers;
                 CHECK(!ssdgs__normals_loss(&frame, 0) && !frame.normal_gradient);
                 if (!CHECK(!ssdgs__normals_loss(&frame, (ssdgs_real)0.7) && frame.normal_gradient)) return;
-                for (y = 0; y < HEIGHT; y++)
-                    for (x = 0; x < WIDTH; x++) {
+                for (int y = 0; y < HEIGHT; y++)
+                    for (int x = 0; x < WIDTH; x++) {
                         const ssdgs_real *got = frame.normal_gradient + y * WIDTH + x;
-                        double n[3];
                         const int inside = x > 0 && y > 0 && x < WIDTH - 1 && y < HEIGHT - 1;
                         const int known = inside && depth[y * WIDTH + x] > 0 &&
                                           depth[y * WIDTH + x - 1] > 0 && depth[y * WIDTH + x + 1] > 0 &&
                                           depth[(y - 1) * WIDTH + x] > 0 && depth[(y + 1) * WIDTH + x] > 0;
                         most = fmax(most, fabs((double)got[3 * SIZE] / weight - known));
-                        for (c = 0; c < 3 && !known; c++)
+                        for (int c = 0; c < 3 && !known; c++)
                             most = fmax(most, fabs((double)got[c * SIZE]) / weight);
                         if (!known) continue;
+                        double n[3];
                         if (index < 10)
-                            for (c = 0; c < 3; c++) n[c] = -plane[c]; /* plane . p = constant */
+                            for (int c = 0; c < 3; c++) n[c] = -plane[c]; /* plane . p = constant */
                         else if (!depth_normal(depth, WIDTH, x, y, n)) continue;
                         told++, flat += index < 10;
-                        for (c = 0; c < 3; c++) {
+                        for (int c = 0; c < 3; c++) {
                             const double world = (double)s.camera.view[c] * n[0] +
                                                  (double)s.camera.view[4 + c] * n[1] +
                                                  (double)s.camera.view[8 + c] * n[2];

@@ -33,12 +33,12 @@ static struct {
 static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
     const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_train_options options = ssdgs_train_options_default();
-    int i, c;
     memset(&all, 0, sizeof all);
     memset(pixels, 100, sizeof pixels);
     photo.camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
     photo.light.kind = SSDGS_LIGHT_POINT;
-    for (c = 0; c < 3; c++) photo.light.position[c] = -1 - (ssdgs_real)c / 2, photo.light.intensity[c] = 4;
+    for (int c = 0; c < 3; c++)
+        photo.light.position[c] = -1 - (ssdgs_real)c / 2, photo.light.intensity[c] = 4;
     photo.pixels = pixels;
     photo.format = SSDGS_PIXELS_RGBA8;
     image.color = color;
@@ -46,8 +46,8 @@ static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
     if (!CHECK(!ssdgs_context_create(desc, &all.context) &&
                !ssdgs_model_create(all.context, NULL, MANY, &all.model)))
         exit(1);
-    for (i = 0; i < MANY; i++)
-        for (c = 0; c < 3; c++) {
+    for (int i = 0; i < MANY; i++)
+        for (int c = 0; c < 3; c++) {
             all.model->gaussians[(size_t)c * all.model->capacity + (size_t)i] =
                 (ssdgs_real)(ssdgs__uniform(1, (uint64_t)(3 * i + c)) - 0.5);
             all.model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * all.model->capacity + (size_t)i] = -2;
@@ -67,9 +67,8 @@ static int call_everything(void) {
     ssdgs_model *model = all.model, *other = NULL;
     ssdgs_trainer *trainer = all.trainer, *next = NULL;
     ssdgs_context *context = all.context;
-    ssdgs_metrics metrics;
     ssdgs_photo copy = photo;
-    int iteration, refused = 0;
+    int refused = 0;
     if (all.depth || !context || !model) return 0; /* the log hears none of what follows */
     all.depth = 1;
     refused += ssdgs_render(model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT;
@@ -79,10 +78,12 @@ static int call_everything(void) {
     refused += ssdgs_model_save(model, FILE_NAME) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_load(context, FILE_NAME, &other, NULL) == SSDGS_ERR_ARGUMENT && !other;
     refused += ssdgs_model_load_memory(context, "ply", 3, &other, NULL) == SSDGS_ERR_ARGUMENT && !other;
+    ssdgs_metrics metrics;
     refused += ssdgs_compare(context, color, color, 4, 4, &metrics) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_evaluate(model, &photo, photo.light.intensity, NULL, &metrics) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_refine_photo(model, &copy, photo.light.intensity, 1) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_trainer_create(model, &photo, 1, NULL, &next) == SSDGS_ERR_ARGUMENT && !next;
+    int iteration;
     refused += ssdgs_checkpoint_iteration(context, FILE_NAME, &iteration) == SSDGS_ERR_ARGUMENT;
     all.tries += 12;
     if (trainer) {
@@ -109,9 +110,8 @@ static ssdgs_result hook(void *user, ssdgs_frame *frame) {
 }
 
 static void run(void *user, int count, void (*task)(void *data, int index), void *data) {
-    int i;
     (void)user;
-    for (i = 0; i < count; i++) task(data, i);
+    for (int i = 0; i < count; i++) task(data, i);
     call_everything();
 }
 
@@ -128,22 +128,21 @@ static void release(void *user, void *memory) {
 }
 
 static void hear(void *user, ssdgs_result code, const char *message) {
-    char before[512];
     (void)user, (void)code;
+    char before[512];
     snprintf(before, sizeof before, "%s", message);
     call_everything();
     CHECK(!strcmp(before, message)); /* what is being told stays */
 }
 
 static void test_from_within(void) {
-    int from, with_trainer;
-    for (from = 0; from < 4; from++)
-        for (with_trainer = 0; with_trainer < 2; with_trainer++) {
+    for (int from = 0; from < 4; from++)
+        for (int with_trainer = 0; with_trainer < 2; with_trainer++) {
             ssdgs_context_desc desc;
-            ssdgs_gpu_hook gpu;
             ssdgs_real bad = photo.camera.near_plane;
             memset(&desc, 0, sizeof desc);
             desc.threads = 2;
+            ssdgs_gpu_hook gpu;
             memset(&gpu, 0, sizeof gpu);
             gpu.stage[SSDGS_STAGE_SHADE] = hook;
             if (from == 0) desc.gpu = &gpu;
@@ -173,9 +172,9 @@ static void test_from_within(void) {
 /* ---- the progress callback ---- */
 
 static int progress(void *user, const ssdgs_train_stats *stats) {
-    ssdgs_metrics metrics;
     (void)user, (void)stats;
     CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+    ssdgs_metrics metrics;
     CHECK(!ssdgs_evaluate(all.model, &photo, photo.light.intensity, NULL, &metrics));
     CHECK(!ssdgs_model_save(all.model, FILE_NAME));
     ssdgs_trainer_destroy(all.trainer); /* refused */
@@ -223,8 +222,7 @@ static void count_notes(void *user, ssdgs_result code, const char *message) {
 static void test_order(void) {
     static const char *const orders[6] = {"tmc", "tcm", "mtc", "mct", "ctm", "cmt"};
     static const int told[6] = {0, 1, 1, 2, 1, 2};
-    int i, k;
-    for (i = 0; i < 6; i++) {
+    for (int i = 0; i < 6; i++) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 3;
@@ -234,7 +232,7 @@ static void test_order(void) {
         blocks = notes = 0;
         set_up(&desc, 1);
         notes = 0;
-        for (k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++) {
             const char gone = orders[i][k];
             if (gone == 't') ssdgs_trainer_destroy(all.trainer);
             if (gone == 'm') ssdgs_model_destroy(all.model);
@@ -253,23 +251,20 @@ static void test_order(void) {
 static void test_fork(void) {
 #if !defined(_WIN32) && !defined(SSDGS_NO_THREADS)
     static ssdgs_real first[SIDE * SIDE * 3];
-    ssdgs_context_desc desc;
-    int round;
-    for (round = 0; round < 20; round++) { /* workers are at different points */
-        pid_t child;
+    for (int round = 0; round < 20; round++) { /* workers are at different points */
         int status = 0;
+        ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 4;
         set_up(&desc, 1);
         CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
         memcpy(first, color, sizeof first);
         fflush(stdout);
-        child = fork();
+        const pid_t child = fork();
         if (child == 0) {
-            int good;
             alarm(20); /* hangs */
             memset(color, 0, sizeof color);
-            good = round % 2 || !ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image);
+            int good = round % 2 || !ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image);
             good = good && (round % 2 || !memcmp(first, color, sizeof first));
             tear_down();
             _exit(good ? 0 : 1);
@@ -297,12 +292,8 @@ static void test_null(void) {
     const ssdgs_real three[3] = {0, 0, 0};
     ssdgs_model *other = NULL;
     ssdgs_trainer *none = NULL;
-    ssdgs_camera camera;
-    ssdgs_light light;
-    ssdgs_metrics metrics;
     unsigned char byte = 7;
     ssdgs_real value = 7;
-    int iteration;
     set_up(NULL, 1);
     NAMES(ssdgs_render(all.model, NULL, &photo.light, 1, &image), "ssdgs_render: camera is NULL");
     NAMES(ssdgs_render(all.model, &photo.camera, &photo.light, 1, NULL), "ssdgs_render: image is NULL");
@@ -314,6 +305,7 @@ static void test_null(void) {
     NAMES(ssdgs_model_load_memory(all.context, NULL, 3, &other, NULL),
           "ssdgs_model_load_memory: bytes is NULL");
     NAMES(ssdgs_model_load_memory(all.context, "ply", 3, NULL, NULL), "ssdgs_model_load_memory: out is NULL");
+    ssdgs_metrics metrics;
     NAMES(ssdgs_compare(all.context, NULL, color, 4, 4, &metrics), "ssdgs_compare: image is NULL");
     NAMES(ssdgs_compare(all.context, color, color, 4, 4, NULL), "ssdgs_compare: metrics is NULL");
     NAMES(ssdgs_evaluate(all.model, NULL, three, NULL, &metrics), "ssdgs_evaluate: photo is NULL");
@@ -323,11 +315,14 @@ static void test_null(void) {
     NAMES(ssdgs_refine_photo(all.model, &photo, NULL, 1), "ssdgs_refine_photo: background is NULL");
     NAMES(ssdgs_refine_photo(all.model, &photo, three, -1), "ssdgs_refine_photo: -1 iterations");
     NAMES(ssdgs_trainer_create(all.model, &photo, 1, NULL, NULL), "ssdgs_trainer_create: out is NULL");
+    ssdgs_light light;
     NAMES(ssdgs_trainer_refined(all.trainer, 0, NULL, &light), "ssdgs_trainer_refined: camera is NULL");
+    ssdgs_camera camera;
     NAMES(ssdgs_trainer_refined(all.trainer, 0, &camera, NULL), "ssdgs_trainer_refined: light is NULL");
     NAMES(ssdgs_trainer_refined(all.trainer, 1, &camera, &light), "ssdgs_trainer_refined: photograph 1 of 1");
     NAMES(ssdgs_trainer_save(all.trainer, NULL), "ssdgs_trainer_save: path is NULL");
     NAMES(ssdgs_trainer_load(all.trainer, NULL), "ssdgs_trainer_load: path is NULL");
+    int iteration;
     NAMES(ssdgs_checkpoint_iteration(all.context, NULL, &iteration),
           "ssdgs_checkpoint_iteration: path is NULL");
     NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
@@ -364,18 +359,16 @@ static void test_null(void) {
 static void test_shared(void) {
     static const char *const names[5] = {"asg_basis", "asg_sharpness", "asg_sigma", "the scattering network",
                                          "the shadow network"};
-    int group, kind;
-    for (group = 0; group < 5; group++)
-        for (kind = 0; kind < 2; kind++) {
-            ssdgs_model_view view;
-            ssdgs_real *at[5];
-            char text[100];
+    for (int group = 0; group < 5; group++)
+        for (int kind = 0; kind < 2; kind++) {
             set_up(NULL, 1);
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
-            view = ssdgs_model_arrays(all.model);
+            ssdgs_model_view view = ssdgs_model_arrays(all.model);
+            ssdgs_real *at[5];
             at[0] = view.asg_basis, at[1] = view.asg_sharpness, at[2] = view.asg_sigma,
             at[3] = view.scattering, at[4] = view.shadow;
             at[group][5] = kind ? (ssdgs_real)NAN : (ssdgs_real)INFINITY;
+            char text[100];
             snprintf(text, sizeof text, "model: value 5 of %s is not finite", names[group]);
             CHECK(ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_NONFINITE);
             if (!CHECK(!strcmp(ssdgs_error_message(all.context), text)))
@@ -401,23 +394,22 @@ static void test_bytes(void) {
     const ssdgs_real odd[8] = {-1, (ssdgs_real)-1e30,    (ssdgs_real)NAN,      0, 1,
                                2,  (ssdgs_real)INFINITY, (ssdgs_real)-INFINITY};
     const unsigned char want[8] = {0, 0, 0, 0, 255, 255, 255, 0};
-    unsigned char got[8];
-    int transfer, i;
-    for (transfer = 0; transfer < 2; transfer++) {
-        ssdgs_real values[256], *many = (ssdgs_real *)malloc(4096 * sizeof *many);
-        unsigned char bytes[256], *out = (unsigned char *)malloc(4096);
+    for (int transfer = 0; transfer < 2; transfer++) {
+        ssdgs_real *many = (ssdgs_real *)malloc(4096 * sizeof *many);
+        unsigned char *out = (unsigned char *)malloc(4096);
         uint32_t bits = 0x33000000u;
         int off = 0, before = 0, falls = 0;
+        unsigned char got[8];
         ssdgs_to_bytes(odd, 8, transfer, got);
         CHECK(!memcmp(got, want, 8));
         while (bits < 0x3F900000u) {
-            for (i = 0; i < 4096; i++, bits += 97) {
+            for (int i = 0; i < 4096; i++, bits += 97) {
                 float x;
                 memcpy(&x, &bits, sizeof x);
                 many[i] = (ssdgs_real)x;
             }
             ssdgs_to_bytes(many, 4096, transfer, out);
-            for (i = 0; i < 4096; i++) {
+            for (int i = 0; i < 4096; i++) {
                 const double x = many[i] < 1 ? (double)many[i] : 1,
                              level = 255 * (transfer == SSDGS_TRANSFER_SRGB ? curve(x) : x);
                 off += fabs(out[i] - level) > 1;
@@ -426,10 +418,13 @@ static void test_bytes(void) {
             }
         }
         CHECK(off == 0 && falls == 0);
-        for (i = 0; i < 256; i++)
+        ssdgs_real values[256];
+        for (int i = 0; i < 256; i++)
             values[i] = transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode((ssdgs_real)(i / 255.0))
                                                         : (ssdgs_real)(i / 255.0);
+        unsigned char bytes[256];
         ssdgs_to_bytes(values, 256, transfer, bytes);
+        int i;
         for (i = 0; i < 256 && bytes[i] == i; i++) {}
         CHECK(i == 256);
         free(many);
@@ -441,28 +436,29 @@ static void test_bytes(void) {
    formula, beyond 1 too. */
 static void test_pixels(void) {
     enum { W = 5, H = 4, STRIDE = 7, PITCH = 32 };
-    ssdgs_real colors[H * STRIDE * 3], alphas[H * STRIDE], background[3] = {(ssdgs_real)0.2, 0, 1}, stored[3];
-    unsigned char out[H * PITCH];
+    ssdgs_real background[3] = {(ssdgs_real)0.2, 0, 1};
     ssdgs_image from;
-    int x, y, c, bgra, up, opaque;
     memset(&from, 0, sizeof from);
     from.stride = STRIDE;
+    ssdgs_real colors[H * STRIDE * 3];
     from.color = colors;
-    for (y = 0; y < H * STRIDE; y++) {
+    ssdgs_real alphas[H * STRIDE];
+    for (int y = 0; y < H * STRIDE; y++) {
         alphas[y] = (ssdgs_real)(y % 5) / 4;
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             colors[3 * y + c] = alphas[y] * (ssdgs_real)ssdgs__uniform(2, (uint64_t)(3 * y + c));
     }
-    for (opaque = 0; opaque < 2; opaque++)
-        for (bgra = 0; bgra < 2; bgra++)
-            for (up = 0; up < 2; up++) {
+    unsigned char out[H * PITCH];
+    for (int opaque = 0; opaque < 2; opaque++)
+        for (int bgra = 0; bgra < 2; bgra++)
+            for (int up = 0; up < 2; up++) {
                 int wrong = 0;
                 from.alpha = opaque ? NULL : alphas;
                 memset(out, 77, sizeof out);
                 ssdgs_to_pixels(&from, W, H, SSDGS_TRANSFER_SRGB, bgra ? SSDGS_BGRA8 : SSDGS_RGBA8,
                                 up ? out + (H - 1) * PITCH : out, up ? -PITCH : PITCH);
-                for (y = 0; y < H; y++)
-                    for (x = 0; x < PITCH; x++) {
+                for (int y = 0; y < H; y++)
+                    for (int x = 0; x < PITCH; x++) {
                         const unsigned char *p = out + (up ? H - 1 - y : y) * PITCH + x;
                         const int at = y * STRIDE + x / 4, channel = x % 4 == 3 ? 3
                                                                      : bgra     ? 2 - x % 4
@@ -477,10 +473,11 @@ static void test_pixels(void) {
                     }
                 CHECK(wrong == 0);
             }
-    for (x = 0; x < 3000; x++) {
+    for (int x = 0; x < 3000; x++) {
         const double a = (x % 7 + 1) / 7.0, v = pow(10, -6 + 8.0 * x / 3000);
         const ssdgs_real color3[3] = {(ssdgs_real)(a * v), (ssdgs_real)(-a * v), 0}, one = (ssdgs_real)a;
         const double want[3] = {a * curve(v) + (1 - a) * 0.2, -a * 12.92 * v, 1 - a};
+        ssdgs_real stored[3];
         ssdgs_compose(color3, &one, 1, SSDGS_TRANSFER_SRGB, background, stored);
         CHECK_NEAR(stored, want, 3, 3e-7, 2e-5, "composed");
     }

@@ -15,28 +15,26 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 static ssdgs_model *make_model(ssdgs_context *context) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    size_t i, c;
     settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
-    v = ssdgs_model_arrays(model);
-    for (i = 0; i < COUNT; i++) {
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t i = 0; i < COUNT; i++) {
         const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
         const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z,
                                -r * sin(turn),      r * cos(turn),       0};
-        for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
-        for (c = 0; c < 4; c++)
+        for (size_t c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
+        for (size_t c = 0; c < 4; c++)
             v.gaussians[(SSDGS_ROTATION + c) * v.stride + i] = v.gaussians[(SSDGS_FRAME + c) * v.stride + i] =
                 (ssdgs_real)raw[3 + c];
-        for (c = 0; c < 3; c++)
+        for (size_t c = 0; c < 3; c++)
             v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + i] = (ssdgs_real)(c < 2 ? -3.6 : -6);
         v.gaussians[SSDGS_OPACITY * v.stride + i] = (ssdgs_real)(3 * draw(50 * i) - 1);
-        for (c = SSDGS_DIFFUSE; c < SSDGS_FRAME; c++)
+        for (size_t c = SSDGS_DIFFUSE; c < SSDGS_FRAME; c++)
             v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
-        for (c = SSDGS_ASG_WEIGHT; c < SSDGS_CHANNELS; c++)
+        for (size_t c = SSDGS_ASG_WEIGHT; c < SSDGS_CHANNELS; c++)
             v.gaussians[c * v.stride + i] = (ssdgs_real)(2 * draw(50 * i + c) - 1);
     }
-    for (i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * draw(1000000 + i) - 0.1);
+    for (size_t i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * draw(1000000 + i) - 0.1);
     return model;
 }
 
@@ -47,12 +45,11 @@ static ssdgs_camera camera_at(double angle) {
 
 static ssdgs_light light_at(double angle) {
     ssdgs_light light;
-    int c;
     memset(&light, 0, sizeof light);
     light.position[0] = (ssdgs_real)(2 * cos(angle));
     light.position[1] = (ssdgs_real)(2 * sin(angle));
     light.position[2] = 1;
-    for (c = 0; c < 3; c++) light.intensity[c] = (ssdgs_real)(3 + c);
+    for (int c = 0; c < 3; c++) light.intensity[c] = (ssdgs_real)(3 + c);
     return light;
 }
 
@@ -81,15 +78,13 @@ static void check_same(ssdgs_model *model, const ssdgs_camera *camera, const ssd
 
 static void test_kept(void) {
     ssdgs_context *context = NULL;
-    ssdgs_model *model, *other;
     ssdgs_render_options options = ssdgs_render_options_default();
     ssdgs_camera a = camera_at(0), b = camera_at(1);
-    ssdgs_light lights[2], moved = light_at(2);
-    ssdgs_render_stats stats;
-    ssdgs_model_view view;
+    ssdgs_light moved = light_at(2);
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
-    other = make_model(context);
+    ssdgs_model *model = make_model(context);
+    ssdgs_model *other = make_model(context);
+    ssdgs_light lights[2];
     lights[0] = light_at(1);
     lights[1] = light_at(4);
 #define FIRST() render(model, &a, lights, 2, &options, image[0], NULL)
@@ -112,6 +107,7 @@ static void test_kept(void) {
     FIRST();
     FIRST(); /* the shadow network's outputs are kept from here on */
     render(model, &b, lights, 2, &options, image[0], NULL);
+    ssdgs_render_stats stats;
     render(model, &b, lights, 2, &options, image[0], &stats);
     CHECK(stats.shadows_cached >= 2 * stats.shaded); /* whole blocks */
     check_same(model, &a, lights, 2, &options, 0, 1, "kept shadows, back again");
@@ -136,7 +132,7 @@ static void test_kept(void) {
     render(other, &a, lights, 2, &options, image[1], NULL);
     check_same(model, &a, lights, 2, &options, 0, 0, "another model between");
     FIRST();
-    view = ssdgs_model_arrays(model);
+    ssdgs_model_view view = ssdgs_model_arrays(model);
     view.gaussians[SSDGS_POSITION * view.stride] += (ssdgs_real)0.2;
     check_same(model, &a, lights, 2, &options, 0, 0, "the model changed");
     ssdgs_model_destroy(other);
@@ -179,8 +175,7 @@ static void pool_release(void *user, void *memory) {
 }
 
 static void pool_empty(void) {
-    int k;
-    for (k = 0; k < 64; k++)
+    for (int k = 0; k < 64; k++)
         while (pool[k]) {
             block *next = pool[k]->next;
             free(pool[k]);
@@ -196,32 +191,30 @@ static void test_walk(void) {
     static ssdgs_real planes[2][PIXELS * VALUES];
     static unsigned char photograph[PIXELS * 4];
     ssdgs_context *context[2] = {NULL, NULL};
-    ssdgs_context_desc desc;
-    ssdgs_model *models[2][MODELS];
-    ssdgs_camera cameras[VIEWS];
-    ssdgs_light lights[LIGHTS];
     ssdgs_render_options options = ssdgs_render_options_default();
-    int frame, i, k, change, which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0,
-                             lights_cached = 0, failures = 0;
+    int which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_cached = 0, failures = 0;
     uint64_t at = 7000000;
 #define PICK(n) ((int)(draw(at++) * (n)))
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.allocator.allocate = pool_allocate;
     desc.allocator.release = pool_release;
-    for (k = 0; k < 2; k++) {
+    ssdgs_model *models[2][MODELS];
+    for (int k = 0; k < 2; k++) {
         if (!CHECK(!ssdgs_context_create(k ? NULL : &desc, &context[k]))) exit(1);
-        for (i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
+        for (int i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
         models[k][1]->settings.asg = SSDGS_ASG_GEOMETRIC;
     }
-    for (i = 0; i < VIEWS; i++) cameras[i] = camera_at(2 * i);
-    for (i = 0; i < LIGHTS; i++) lights[i] = light_at(1 + i);
-    for (frame = 0; frame < FRAMES; frame++) {
+    ssdgs_camera cameras[VIEWS];
+    for (int i = 0; i < VIEWS; i++) cameras[i] = camera_at(2 * i);
+    ssdgs_light lights[LIGHTS];
+    for (int i = 0; i < LIGHTS; i++) lights[i] = light_at(1 + i);
+    for (int frame = 0; frame < FRAMES; frame++) {
         const int changes = 1 + PICK(2);
-        ssdgs_render_stats stats[2];
         ssdgs_photo photo;
         ssdgs_metrics metrics;
         ssdgs_light other;
-        for (change = 0; change < changes; change++) {
+        for (int change = 0; change < changes; change++) {
             const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
                       gaussian = PICK(COUNT), light = PICK(LIGHTS);
             const ssdgs_real value = (ssdgs_real)draw(at++);
@@ -242,13 +235,13 @@ static void test_walk(void) {
             case 13: options.background[PICK(3)] = value; break;
             case 14: options.terms = SSDGS_ALL_TERMS; break;
             case 15:
-                for (i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light);
+                for (int i = 0; i < VIEWS; i++) cameras[i].width = SIDE / (2 + light);
                 break;
             case 16:
-                for (k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
+                for (int k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
                 break;
             case 17: /* the model's own, in both contexts */
-                for (k = 0; k < 2; k++) {
+                for (int k = 0; k < 2; k++) {
                     const ssdgs_model_view v = ssdgs_model_arrays(models[k][which]);
                     v.gaussians[(size_t)channel * v.stride + (size_t)gaussian] += 2 * value - 1;
                     v.scattering[channel] += value - (ssdgs_real)0.5;
@@ -266,14 +259,15 @@ static void test_walk(void) {
             }
         }
         memset(planes, 0, sizeof planes);
-        for (k = 0; k < 2; k++) {
+        ssdgs_render_stats stats[2];
+        for (int k = 0; k < 2; k++) {
             ssdgs_image out;
             ssdgs_real **const plane[PLANE_COUNT] = {&out.color,      &out.alpha,   &out.depth,
                                                      &out.normal,     &out.diffuse, &out.specular,
                                                      &out.scattering, &out.shadow};
             static const int first[PLANE_COUNT] = {0, 3, 4, 5, 8, 11, 14, 14};
             memset(&out, 0, sizeof out);
-            for (i = 0; i < PLANE_COUNT; i++)
+            for (int i = 0; i < PLANE_COUNT; i++)
                 if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering)))
                     *plane[i] = planes[k] + PIXELS * first[i];
             if (k && context[k]->frame) memset(&context[k]->frame->cache, 0, sizeof context[k]->frame->cache);
@@ -289,8 +283,8 @@ static void test_walk(void) {
     }
 #undef PICK
     CHECK(failures > 5 && cameras_kept > FRAMES / 4 && lights_cached > FRAMES / 16);
-    for (k = 0; k < 2; k++) {
-        for (i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
         ssdgs_context_destroy(context[k]);
     }
     pool_empty();
@@ -301,32 +295,32 @@ static void test_walk(void) {
 static void test_max_error(void) {
     static const double bounds[3] = {1.0 / 64, 1.0 / 16, 1.0 / 4};
     ssdgs_context *context = NULL;
-    ssdgs_context_desc desc;
     ssdgs_light light = light_at(1);
     ssdgs_camera camera = camera_at(0);
-    int isa, b, i, last = COUNT;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
-        ssdgs_model *model;
+    int last = COUNT;
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.isa = (ssdgs_isa)isa;
         if (!ssdgs__table(isa)) continue;
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-        model = make_model(context);
+        ssdgs_model *model = make_model(context);
+        int b;
         for (b = 0, last = COUNT; b < 3; b++) {
             ssdgs_render_options options = ssdgs_render_options_exact();
-            ssdgs_frame frame;
             double most = 0;
             int glimpsed = 0;
             options.max_error = (ssdgs_real)bounds[b];
+            ssdgs_frame frame;
             CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0));
             CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
-            for (i = 0; i < COUNT; i++) {
+            for (int i = 0; i < COUNT; i++) {
                 frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
                 glimpsed += frame.seen[i] == SSDGS_SKIPPED;
             }
             frame.layer_count = 0; /* the weights alone */
             CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
-            for (i = 0; i < PIXELS; i++)
+            for (int i = 0; i < PIXELS; i++)
                 most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
             CHECK(most > 0 && most <= bounds[b] * (1 + 1e-5));
             CHECK(glimpsed > 0 && frame.shaded_count < last);
@@ -344,29 +338,28 @@ static void test_spent_budget(void) {
     ssdgs_model *model = NULL;
     ssdgs_camera camera = camera_at(0);
     ssdgs_render_options options = ssdgs_render_options_exact();
-    ssdgs_frame frame;
-    ssdgs_model_view v;
     double most = 0;
-    int i, c, glimpsed = 0;
+    int glimpsed = 0;
     options.max_error = (ssdgs_real)0.5;
     if (!CHECK(!ssdgs_context_create(NULL, &context)) ||
         !CHECK(!ssdgs_model_create(context, NULL, LAYERS, &model)))
         exit(1);
-    v = ssdgs_model_arrays(model);
-    for (i = 0; i < LAYERS; i++) {
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (int i = 0; i < LAYERS; i++) {
         v.gaussians[SSDGS_POSITION * v.stride + (size_t)i] = (ssdgs_real)(0.001 * i);
         v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.6;
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
     }
+    ssdgs_frame frame;
     CHECK(!ssdgs__frame_begin(&frame, model, &camera, NULL, 0, &options, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
-    for (i = 0; i < LAYERS; i++) {
+    for (int i = 0; i < LAYERS; i++) {
         frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
         glimpsed += frame.seen[i] == SSDGS_SKIPPED;
     }
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
-    for (i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
+    for (int i = 0; i < PIXELS; i++) most = (double)frame.pixels[i] > most ? (double)frame.pixels[i] : most;
     CHECK(most > 0.3 && most <= 0.5 * (1 + 1e-5));
     CHECK(glimpsed > 0 && frame.shaded_count > LAYERS / 4);
     ssdgs_model_destroy(model);
@@ -376,23 +369,21 @@ static void test_spent_budget(void) {
 /* The presets against the exact image, and the numbers that describe a frame. */
 static void test_presets(void) {
     ssdgs_context *context = NULL;
-    ssdgs_model *model;
     ssdgs_light light = light_at(0.5);
     ssdgs_camera camera = camera_at(0);
-    ssdgs_render_options options[3];
-    ssdgs_render_stats stats[3];
     ssdgs_image out;
-    int o, i;
     memset(&out, 0, sizeof out);
+    ssdgs_render_options options[3];
     options[0] = ssdgs_render_options_exact();
     options[1] = ssdgs_render_options_default();
     options[2] = ssdgs_render_options_fast();
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
-    for (o = 0; o < 3; o++) {
+    ssdgs_model *model = make_model(context);
+    ssdgs_render_stats stats[3];
+    for (int o = 0; o < 3; o++) {
         double squares = 0;
         render(model, &camera, &light, 1, options + o, image[o > 0], stats + o);
-        for (i = 0; o && i < PIXELS * 3; i++) squares += pow((double)(image[1][i] - image[0][i]), 2);
+        for (int i = 0; o && i < PIXELS * 3; i++) squares += pow((double)(image[1][i] - image[0][i]), 2);
         if (o)
             printf("%s against exact: %.1f dB\n", o == 1 ? "default" : "fast",
                    ssdgs__psnr(squares / (PIXELS * 3)));
@@ -412,9 +403,8 @@ static void test_presets(void) {
 }
 
 static int all_rows(const ssdgs_real *rows, int count, uint16_t *list) {
-    int i;
     (void)rows;
-    for (i = 0; i < count; i++) list[i] = (uint16_t)i;
+    for (int i = 0; i < count; i++) list[i] = (uint16_t)i;
     return count;
 }
 
@@ -433,25 +423,23 @@ static void test_dead_neurons(void) {
     static ssdgs_real gradient[2][(32 + 16) * WIDE + (48 + 16) * (WIDE + OUTS)], d[2][64 * SSDGS__BLOCK],
         spare[64 * SSDGS__BLOCK], transposed[64 * SSDGS__BLOCK];
     static ssdgs_real sums[WEIGHTS];
-    int isa, i, part;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         const ssdgs__kernels *table = ssdgs__table(isa);
-        ssdgs__row_lists lists;
-        ssdgs__kernels k;
-        ssdgs_real *dinputs[2];
         if (!table) continue;
-        for (i = 0; i < WEIGHTS; i++) weights[i] = (ssdgs_real)(draw((uint64_t)i) - 0.5);
-        for (i = 0; i < INS * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
-        for (i = 0; i < WIDE; i += 2)
+        for (int i = 0; i < WEIGHTS; i++) weights[i] = (ssdgs_real)(draw((uint64_t)i) - 0.5);
+        for (int i = 0; i < INS * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
+        for (int i = 0; i < WIDE; i += 2)
             weights[INS * WIDE + i] = weights[(INS + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
-        for (part = 0; part < 2; part++) {
-            k = *table;
+        ssdgs_real *dinputs[2];
+        for (int part = 0; part < 2; part++) {
+            ssdgs__kernels k = *table;
             if (part) k.live_rows = all_rows;
+            ssdgs__row_lists lists;
             ssdgs__row_lists_fill(&lists);
             memset(gradient[part], 0, sizeof gradient[part]);
             ssdgs__network_forward(&k, sizes, 3, weights, &lists, inputs, outputs[part]);
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
-            for (i = 0; i < OUTS * SSDGS__BLOCK; i++)
+            for (int i = 0; i < OUTS * SSDGS__BLOCK; i++)
                 d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
             dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part],
                                                     spare, transposed, &lists, INS, gradient[part]);
@@ -468,14 +456,13 @@ static void test_dead_neurons(void) {
 /* However far out a coordinate is, its sines and cosines are none of them beyond 1. */
 static void test_far_out(void) {
     static ssdgs_real in[SSDGS__BLOCK], out[9 * SSDGS__BLOCK];
-    int isa, i;
-    for (i = 0; i < SSDGS__BLOCK; i++) in[i] = (ssdgs_real)((i & 1 ? -1 : 1) * pow(10, i / 2));
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int i = 0; i < SSDGS__BLOCK; i++) in[i] = (ssdgs_real)((i & 1 ? -1 : 1) * pow(10, i / 2));
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         const ssdgs__kernels *table = ssdgs__table(isa);
         double most = 0;
         if (!table) continue;
         table->encode(out, in, NULL, 1, 1, 4);
-        for (i = SSDGS__BLOCK; i < 9 * SSDGS__BLOCK; i++)
+        for (int i = SSDGS__BLOCK; i < 9 * SSDGS__BLOCK; i++)
             most = fabs((double)out[i]) <= most ? most : fabs((double)out[i]);
         CHECK(most > 0.9 && most < 1.01);
     }
@@ -484,27 +471,25 @@ static void test_far_out(void) {
 /* Frozen networks get no gradient, and take none from anybody else. */
 static void test_frozen(void) {
     ssdgs_context *context = NULL;
-    ssdgs_model *model;
     ssdgs_light light = light_at(1);
     ssdgs_camera camera = camera_at(0);
     ssdgs_real *planes = NULL;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], n, i;
-    int part, g;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
+    ssdgs_model *model = make_model(context);
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
-    n = model->capacity * SSDGS_CHANNELS;
-    for (part = 0; part < 4; part++) {
+    const size_t n = model->capacity * SSDGS_CHANNELS;
+    for (int part = 0; part < 4; part++) {
         ssdgs_frame frame;
         CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE));
-        for (i = 0; i < PIXELS * 4; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
+        for (size_t i = 0; i < PIXELS * 4; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
         frame.frozen[0] = part & 1;
         frame.frozen[1] = part >> 1;
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
-        for (g = 0; g < 2; g++) {
+        for (int g = 0; g < 2; g++) {
             double sum = 0;
-            for (i = first[g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
+            for (size_t i = first[g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET];
                  i < first[(g ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET) + 1]; i++)
                 sum += fabs((double)frame.global_gradient[i]);
             CHECK(frame.frozen[g] ? sum == 0 : sum > 0);
@@ -527,10 +512,6 @@ static void test_all_glimpsed(void) {
     ssdgs_camera camera = camera_at(0);
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_image out;
-    ssdgs_model_view v;
-    double depth[2];
-    size_t c;
-    int pass, i;
     memset(&out, 0, sizeof out);
     out.color = planes;
     out.alpha = planes + 3 * PIXELS;
@@ -538,19 +519,21 @@ static void test_all_glimpsed(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context)) ||
         !CHECK(!ssdgs_model_create(context, NULL, 3, &model)))
         exit(1);
-    for (pass = 0; pass < 2; pass++) {
+    double depth[2];
+    for (int pass = 0; pass < 2; pass++) {
         options.max_error = (ssdgs_real)(pass ? 0.5 : 0);
-        v = ssdgs_model_arrays(model);
-        for (i = 0; i < 3; i++) {
+        ssdgs_model_view v = ssdgs_model_arrays(model);
+        for (int i = 0; i < 3; i++) {
             v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = (ssdgs_real)-4.5;
-            for (c = 0; c < 3; c++)
+            for (size_t c = 0; c < 3; c++)
                 v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
         }
         v.gaussians[0] = (ssdgs_real)NAN;
-        for (c = 0; c < 3; c++)
+        for (size_t c = 0; c < 3; c++)
             v.gaussians[(SSDGS_POSITION + c) * v.stride + 1] =
                 -3 * camera.view[8 + c]; /* behind the camera */
         CHECK(!ssdgs_render_ex(model, &camera, NULL, 0, &options, &out, NULL));
+        int i;
         for (depth[pass] = 0, i = 0; i < PIXELS; i++)
             if ((double)out.alpha[i] > 0.005) depth[pass] = (double)(out.depth[i] / out.alpha[i]);
     }

@@ -98,7 +98,6 @@ static meter memory;
 
 static void *meter_resize(void *old, size_t size) {
     const size_t had = old ? ((size_t *)old)[-2] : 0;
-    size_t *block;
     memory.calls++;
     if (memory.meanwhile) {
         void (*const now)(void) = memory.meanwhile;
@@ -109,7 +108,7 @@ static void *meter_resize(void *old, size_t size) {
         (memory.calls == memory.fail_at || (memory.for_ever && memory.calls > memory.fail_at)))
         return NULL;
     if (memory.limit && size > memory.limit) return NULL;
-    block = (size_t *)realloc(old ? (size_t *)old - 2 : NULL, size + 2 * sizeof *block);
+    size_t *block = (size_t *)realloc(old ? (size_t *)old - 2 : NULL, size + 2 * sizeof *block);
     if (!block) return NULL;
     block[0] = size;
     memory.live += !old;
@@ -184,8 +183,7 @@ static size_t draw_below(size_t n) { return (size_t)(draw() * (double)n); }
 
 /* A lit ball on a transparent ground, seen from all around. */
 static void make_photos(void) {
-    int i, x, y, c;
-    for (i = 0; i < PHOTOS; i++) {
+    for (int i = 0; i < PHOTOS; i++) {
         const double angle = 6.2831853 * i / PHOTOS;
         ssdgs_real eye[3], target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         eye[0] = (ssdgs_real)(2 * cos(angle));
@@ -196,20 +194,20 @@ static void make_photos(void) {
         photos[i].light.position[0] = (ssdgs_real)(2 * cos(angle + 1));
         photos[i].light.position[1] = (ssdgs_real)(2 * sin(angle + 1));
         photos[i].light.position[2] = 1;
-        for (c = 0; c < 3; c++) photos[i].light.intensity[c] = 7;
-        for (y = 0; y < SIDE; y++)
-            for (x = 0; x < SIDE; x++) {
+        for (int c = 0; c < 3; c++) photos[i].light.intensity[c] = 7;
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) {
                 const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3),
                              dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3);
                 const double r2 = dx * dx + dy * dy;
                 unsigned char *p = pixels[i] + 4 * (y * SIDE + x);
-                for (c = 0; c < 3; c++)
+                for (int c = 0; c < 3; c++)
                     p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c ? 0.7 : 1) + 30 * dx) : 0;
                 p[3] = r2 < 1 ? 255 : 0;
             }
         photos[i].pixels = pixels[i];
     }
-    for (i = 0; i < SIDE * SIDE * 6; i++) pair[i % 2][i / 2] = (ssdgs_real)ssdgs__uniform(1, (uint64_t)i);
+    for (int i = 0; i < SIDE * SIDE * 6; i++) pair[i % 2][i / 2] = (ssdgs_real)ssdgs__uniform(1, (uint64_t)i);
     options = ssdgs_train_options_default();
     options.seed = 2;
     options.iterations = 40;
@@ -233,12 +231,10 @@ static ssdgs_settings small_settings(int width) {
 static ssdgs_model *random_model(int count, int width) {
     const ssdgs_settings settings = small_settings(width);
     ssdgs_model *m = NULL;
-    ssdgs_model_view v;
-    int i, c;
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &m))) exit(1);
-    v = ssdgs_model_arrays(m);
-    for (i = 0; i < count; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) {
+    ssdgs_model_view v = ssdgs_model_arrays(m);
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1;
             v.gaussians[(size_t)c * v.stride + (size_t)i] =
                 (ssdgs_real)(c < SSDGS_ROTATION                          ? 0.5 * u
@@ -268,11 +264,10 @@ static ssdgs_result frame(int large) { /* the large one asks for more of everyth
     ssdgs_render_options o = ssdgs_render_options_default();
     ssdgs_light lights[3];
     ssdgs_camera camera = photos[large].camera;
-    ssdgs_image image;
-    int i;
-    for (i = 0; i < 3; i++) lights[i] = photos[i].light;
+    for (int i = 0; i < 3; i++) lights[i] = photos[i].light;
     if (!large) camera.width = camera.height = SIDE / 2; /* a corner */
     o.antialias = large;
+    ssdgs_image image;
     memset(&image, 0, sizeof image);
     memset(planes, 0, sizeof planes);
     image.color = planes[0];
@@ -339,9 +334,8 @@ static void end_world(void) {
 #define SEED UINT64_C(0xCBF29CE484222325)
 
 static uint64_t hash_model(uint64_t hash, const ssdgs_model *m) {
-    int c;
     hash = ssdgs__fold(ssdgs__fold(hash, &m->settings, sizeof m->settings), &m->count, sizeof m->count);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         hash =
             ssdgs__fold(hash, m->gaussians + (size_t)c * m->capacity, (size_t)m->count * sizeof(ssdgs_real));
     return ssdgs__fold(hash, m->globals, m->global_count * sizeof(ssdgs_real));
@@ -360,17 +354,16 @@ static uint64_t hash_file(uint64_t hash, const char *path) {
 static uint64_t held(void) {
     const ssdgs_trainer *t = trainer;
     uint64_t hash = model ? hash_model(SEED, model) : SEED;
-    int i;
     if (!t) return hash;
     hash = ssdgs__fold(hash, &t->iteration, sizeof t->iteration);
     hash = ssdgs__fold(hash, &t->skipped, sizeof t->skipped);
     hash = ssdgs__fold(hash, t->steps, sizeof t->steps);
-    for (i = 0; i < SSDGS_CHANNELS; i++) {
+    for (int i = 0; i < SSDGS_CHANNELS; i++) {
         hash = ssdgs__fold(hash, t->mean + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
         hash =
             ssdgs__fold(hash, t->square + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
     }
-    for (i = 0; i < SSDGS__STATISTICS; i++)
+    for (int i = 0; i < SSDGS__STATISTICS; i++)
         hash = ssdgs__fold(hash, t->screen_gradient + (size_t)i * t->stride,
                            (size_t)model->count * sizeof(ssdgs_real));
     hash = ssdgs__fold(hash, t->global_mean, model->global_count * sizeof(ssdgs_real));
@@ -481,44 +474,40 @@ static int all_finite(const ssdgs_real *values, size_t n) {
 }
 
 static int finite_model(const ssdgs_model *m) {
-    int c, good = all_finite(m->globals, m->global_count);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    int good = all_finite(m->globals, m->global_count);
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         good &= all_finite(m->gaussians + (size_t)c * m->capacity, (size_t)m->count);
     return good;
 }
 
 static void test_memory(void) {
     const int operation_count = (int)(sizeof operations / sizeof *operations);
-    int i, for_ever, uncontrolled = 0;
-    uint64_t plain_step;
+    int uncontrolled = 0;
     options.densify_every = 1000; /* the step with density control, without */
     before_control();
     CHECK(!step());
-    plain_step = held();
+    const uint64_t plain_step = held();
     end_world();
     options.densify_every = DENSE;
-    for (i = 0; i < operation_count; i++) {
+    for (int i = 0; i < operation_count; i++) {
         const operation *op = operations + i;
-        uint64_t before, want, base = 0;
-        long calls, n;
+        uint64_t base = 0;
         int wrong = 0, shown = 0;
         begin(op);
-        before = held();
+        const uint64_t before = held();
         if (model && model->count) base = frame(0) ? 0 : ssdgs__fold(SEED, planes, sizeof planes);
         end_world();
         begin(op);
         CHECK(!op->run());
-        calls = memory.calls;
-        want = given();
+        const long calls = memory.calls;
+        const uint64_t want = given();
         end_world();
         CHECK(memory.live == 0 && calls > 0);
-        for (n = 0; n < 2 * calls; n++) {
-            long live;
-            int at;
+        for (long n = 0; n < 2 * calls; n++) {
             begin(op);
-            for_ever = n >= calls;
-            live = memory.live;
-            at = trainer ? trainer->iteration : 0;
+            const int for_ever = n >= calls;
+            const long live = memory.live;
+            const int at = trainer ? trainer->iteration : 0;
             memory.fail_at = 1 + n % calls;
             memory.for_ever = for_ever;
             error[0] = 0;
@@ -545,7 +534,7 @@ static void test_memory(void) {
         if (!test_check(!wrong, __FILE__, __LINE__, op->name)) printf("    %d things wrong\n", wrong);
     }
     CHECK(uncontrolled > 4);
-    for (i = 0; i < 8; i++) { /* the context itself, with a thread of its own: three allocations */
+    for (int i = 0; i < 8; i++) { /* the context itself, with a thread of its own: three allocations */
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 2;
@@ -585,11 +574,9 @@ static bytes slurp(const char *path) {
 }
 
 static void spill(const char *path, const void *data, size_t size) {
-    FILE *stream;
-    int good;
     remove(path); /* some file systems flush what is overwritten, which takes long */
-    stream = fopen(path, "wb");
-    good = stream && fwrite(data, 1, size, stream) == size;
+    FILE *stream = fopen(path, "wb");
+    const int good = stream && fwrite(data, 1, size, stream) == size;
     if (!CHECK(stream && !fclose(stream) && good)) exit(1);
 }
 
@@ -603,13 +590,13 @@ static int holds(const char *path, const bytes *want) {
 #ifndef _WIN32
 /* Files of the test's folder whose names contain this; remove: 1 = removes them. */
 static int files_with(const char *part, int unlinked) {
-    char path[512];
     int count = 0;
     DIR *folder = opendir(FOLDER);
     struct dirent *entry;
     while (folder && (entry = readdir(folder)) != NULL) {
         if (!strstr(entry->d_name, part) || entry->d_name[0] == '.') continue;
         count++;
+        char path[512];
         snprintf(path, sizeof path, FOLDER "/%s", entry->d_name);
         if (unlinked) remove(path);
     }
@@ -620,9 +607,8 @@ static int files_with(const char *part, int unlinked) {
 /* Runs a function in a process of its own that has twenty seconds (a reader that hangs fails); its result. */
 static int apart(int (*function)(void)) {
     int status = 0;
-    pid_t child;
     fflush(stdout);
-    child = fork();
+    const pid_t child = fork();
     if (child == 0) {
         alarm(20);
         _exit(function());
@@ -648,14 +634,13 @@ static const writer writers[3] = {{"model", save_model}, {"checkpoint", save_run
 static int fails_cleanly(const writer *w, const char *path, const bytes *old) {
     const long live = memory.live;
     const uint64_t before = held();
-    ssdgs_result result;
-    int good;
     error[0] = 0;
-    result = w->save(path);
+    const ssdgs_result result = w->save(path);
     memset(&disk, 0, sizeof disk);
     io_points++;
-    good = result == SSDGS_ERR_IO && strstr(error[0] ? error : ssdgs_error_message(context), path) &&
-           memory.live == live && held() == before && !files_with(".tmp.", 1) && (!old || holds(path, old));
+    const int good = result == SSDGS_ERR_IO &&
+                     strstr(error[0] ? error : ssdgs_error_message(context), path) && memory.live == live &&
+                     held() == before && !files_with(".tmp.", 1) && (!old || holds(path, old));
     if (!good)
         printf("%s, %s: %s, \"%s\"\n", w->name, path, ssdgs_result_string(result),
                error[0] ? error : ssdgs_error_message(context));
@@ -674,29 +659,26 @@ static int save_where_not_allowed(void) {
 static void test_disk(void) {
     static const char text[] = "what was here before";
     bytes old = {NULL, 0};
-    int w;
     old.data = (unsigned char *)malloc(sizeof text);
     memcpy(old.data, text, old.size = sizeof text);
     after_control();
     signal(SIGXFSZ, SIG_IGN);
-    for (w = 0; w < 3; w++) {
+    for (int w = 0; w < 3; w++) {
         const writer *const by = &writers[w];
-        bytes whole;
-        size_t k;
-        int wrong = 0, i;
-        struct rlimit limit, tight;
+        int wrong = 0;
         CHECK(!by->save(file_path));
-        whole = slurp(file_path);
+        bytes whole = slurp(file_path);
         spill(file_path, text, sizeof text);
-        for (k = 0; k < whole.size;
+        for (size_t k = 0; k < whole.size;
              k += full || k < 8 || k + 9 > whole.size ? 1 : 1 + draw_below(whole.size / 64)) {
             disk.room = 1 + k; /* full after k bytes */
             disk.part = k % 3 ? 0 : 1 + draw_below(5000);
             wrong += !fails_cleanly(by, file_path, &old);
         }
+        struct rlimit limit;
         getrlimit(RLIMIT_FSIZE, &limit);
-        for (i = 0; i < 3; i++) { /* the system itself refuses: most bytes that a file may have */
-            tight = limit;
+        for (int i = 0; i < 3; i++) { /* the system itself refuses: most bytes that a file may have */
+            struct rlimit tight = limit;
             tight.rlim_cur = (rlim_t)(i == 0 ? 0 : i == 1 ? whole.size / 2 : whole.size - 1);
             setrlimit(RLIMIT_FSIZE, &tight);
             wrong += !fails_cleanly(by, file_path, &old);
@@ -717,7 +699,7 @@ static void test_disk(void) {
         wrong +=
             !fails_cleanly(by, FOLDER "/folder", NULL) || rmdir(FOLDER "/folder"); /* in a file's place */
         if (!CHECK(!wrong)) printf("    %d things wrong with the %s's writer\n", wrong, by->name);
-        for (i = 0; i < 3; i++) { /* a slow disk is no fault */
+        for (int i = 0; i < 3; i++) { /* a slow disk is no fault */
             disk.interrupts = i > 0;
             disk.part = i == 1 ? 7 : 1000;
             disk.taken = 9 * i;
@@ -735,10 +717,10 @@ static void test_disk(void) {
     remove(FOLDER "/locked/file");
     rmdir(FOLDER "/locked");
     io_points += 3; /* of that process */
-    for (w = 0; w < 3;
+    for (int w = 0; w < 3;
          w++) { /* saving must not put a file where a device or a pipe was: root could lose /dev/null */
-        struct stat info;
         mkfifo(FOLDER "/pipe", 0666);
+        struct stat info;
         CHECK(fails_cleanly(&writers[w], FOLDER "/pipe", NULL) && !stat(FOLDER "/pipe", &info) &&
               S_ISFIFO(info.st_mode));
         remove(FOLDER "/pipe");
@@ -768,9 +750,9 @@ static ssdgs_result (*const readers[3])(void) = {read_model, read_run, read_png}
 
 static int refuses_odd_file(void) {
     const uint64_t before = held();
-    int r, wrong = 0;
+    int wrong = 0;
     memory.limit = (size_t)1 << 26; /* an endless file must not fill the memory either */
-    for (r = 0; r < 3; r++) {
+    for (int r = 0; r < 3; r++) {
         error[0] = 0;
         wrong += readers[r]() != SSDGS_ERR_IO ||
                  !strstr(error[0] ? error : ssdgs_error_message(context), odd_path);
@@ -791,12 +773,11 @@ static void change_size(void) { CHECK(!truncate(changing_path, (off_t)changed_si
 static void test_odd_files(void) {
     static const char *const odd[3] = {FOLDER, FOLDER "/pipe", "/dev/zero"};
     static const char *const sources[3] = {FOLDER "/start", FOLDER "/run", FOLDER "/a.png"};
-    uint64_t before;
-    int i, r, k, wrong = 0;
+    int wrong = 0;
     with_trainer();
-    before = held();
+    const uint64_t before = held();
     mkfifo(FOLDER "/pipe", 0666);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         odd_path = odd[i];
         bad_inputs += 3;
         if (access(odd_path, R_OK)) continue;
@@ -804,15 +785,14 @@ static void test_odd_files(void) {
     }
     remove(FOLDER "/pipe");
     odd_path = changing_path = file_path;
-    for (r = 0; r < 3; r++) {
+    for (int r = 0; r < 3; r++) {
         bytes whole = slurp(sources[r]);
-        for (k = 0; k < 40; k++) {
+        for (int k = 0; k < 40; k++) {
             const long live = memory.live;
-            ssdgs_result result;
             spill(file_path, whole.data, whole.size);
             changed_size = k < 30 ? draw_below(whole.size) : whole.size + 1 + draw_below(300000);
             memory.meanwhile = change_size;
-            result = readers[r]();
+            const ssdgs_result result = readers[r]();
             /* a model's and a PNG's end is told by what stands before it */
             wrong += k < 30 || r == 1 ? result == SSDGS_OK || memory.live != live || held() != before
                                       : result != SSDGS_OK;
@@ -830,10 +810,9 @@ static void test_odd_files(void) {
 /* ---- damaged and made-up checkpoints: refused with a message, the trainer stays as it was ---- */
 
 static int run_refused(const void *data, size_t size, uint64_t before) {
-    ssdgs_result result;
     spill(file_path, data, size);
     bad_inputs++;
-    result = ssdgs_trainer_load(trainer, file_path);
+    const ssdgs_result result = ssdgs_trainer_load(trainer, file_path);
     if (result == SSDGS_ERR_FORMAT && strstr(ssdgs_error_message(context), file_path) && held() == before)
         return 1;
     printf("checkpoint: %s, \"%s\"%s\n", ssdgs_result_string(result), ssdgs_error_message(context),
@@ -846,17 +825,15 @@ enum { WORD, REAL, DOUBLE };
 static void test_checkpoints(void) {
     typedef ssdgs__checkpoint_head head;
     const double nan_value = (double)NAN, infinite = HUGE_VAL;
-    ssdgs_train_options other;
-    ssdgs_settings settings;
     bytes whole = slurp(run_path);
     head h;
-    size_t n, parameters = sizeof h, moments, squares, statistics, order, corrections, k;
-    uint64_t before, sum;
+    size_t parameters = sizeof h;
     ssdgs_real most = 0;
-    int i, wrong = 0;
+    int wrong = 0;
     with_steps(14); /* all that training knows comes back: by now every statistic counts */
-    before = held();
-    for (i = 0; i < model->count; i++) most = trainer->half_shadow[i] > most ? trainer->half_shadow[i] : most;
+    uint64_t before = held();
+    for (int i = 0; i < model->count; i++)
+        most = trainer->half_shadow[i] > most ? trainer->half_shadow[i] : most;
     CHECK(most > 0 && trainer->corrections[0].steps[1] > 0 && !ssdgs_trainer_save(trainer, file_path));
     end_world();
     with_trainer();
@@ -865,14 +842,14 @@ static void test_checkpoints(void) {
     with_trainer();
     before = held();
     memcpy(&h, whole.data, sizeof h);
-    n = (size_t)h.count * sizeof(ssdgs_real);
-    moments = parameters + n * SSDGS_CHANNELS + (size_t)h.global_count * sizeof(ssdgs_real);
-    squares = 2 * moments - parameters;
-    statistics = 3 * moments - 2 * parameters;
-    order = statistics + n * SSDGS__STATISTICS;
-    corrections = order + PHOTOS * sizeof(uint32_t);
+    const size_t n = (size_t)h.count * sizeof(ssdgs_real);
+    const size_t moments = parameters + n * SSDGS_CHANNELS + (size_t)h.global_count * sizeof(ssdgs_real);
+    const size_t squares = 2 * moments - parameters;
+    const size_t statistics = 3 * moments - 2 * parameters;
+    const size_t order = statistics + n * SSDGS__STATISTICS;
+    const size_t corrections = order + PHOTOS * sizeof(uint32_t);
     CHECK(whole.size == corrections + PHOTOS * sizeof(ssdgs__correction) + 8);
-    for (k = 0; k < whole.size && wrong < 9;
+    for (size_t k = 0; k < whole.size && wrong < 9;
          k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
         const unsigned char was = whole.data[k];
         whole.data[k] = (unsigned char)(was ^ 1 << draw_below(8));
@@ -881,6 +858,7 @@ static void test_checkpoints(void) {
         wrong += !run_refused(whole.data, k, before); /* cut */
     }
     CHECK(!wrong);
+    ssdgs_settings settings;
     {
         const struct {
             const char *what;
@@ -929,7 +907,7 @@ static void test_checkpoints(void) {
                     {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
                     {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
                     {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}};
-        for (k = 0; k <= sizeof lies / sizeof *lies; k++) {
+        for (size_t k = 0; k <= sizeof lies / sizeof *lies; k++) {
             const int last = k == sizeof lies / sizeof *lies; /* another rounding: taken, and told */
             unsigned char *lie = (unsigned char *)malloc(whole.size);
             const int32_t word = last ? !h.fused : lies[k].type == WORD ? (int32_t)lies[k].value : 0;
@@ -939,7 +917,7 @@ static void test_checkpoints(void) {
             else if (lies[k].type == WORD) memcpy(lie + lies[k].at, &word, sizeof word);
             else if (lies[k].type == REAL) memcpy(lie + lies[k].at, &real, sizeof real);
             else memcpy(lie + lies[k].at, &lies[k].value, sizeof lies[k].value);
-            sum = ssdgs__fold(SEED, lie, whole.size - 8);
+            uint64_t sum = ssdgs__fold(SEED, lie, whole.size - 8);
             memcpy(lie + whole.size - 8, &sum, 8);
             if (!last &&
                 !CHECK(run_refused(lie, whole.size, before))) { /* what has been taken in may not last */
@@ -955,11 +933,11 @@ static void test_checkpoints(void) {
             free(lie);
         }
     }
-    for (i = 0; i < 3; i++) CHECK(!step());
+    for (int i = 0; i < 3; i++) CHECK(!step());
     end_world();
-    other = options;
+    const ssdgs_train_options other = options;
     settings = small_settings(8);
-    for (i = 0; i < 11; i++) { /* another run's checkpoint */
+    for (int i = 0; i < 11; i++) { /* another run's checkpoint */
         ssdgs_photo shots[PHOTOS];
         memcpy(shots, photos, sizeof shots);
         options = other;
@@ -992,21 +970,19 @@ static int taken_or_refused(const void *data, size_t size, int draws) {
     unsigned char *copy = (unsigned char *)malloc(size + !size); /* a sanitizer sees what is read beyond */
     const long live = memory.live;
     ssdgs_camera camera = photos[0].camera;
-    ssdgs_image image;
-    ssdgs_result result;
-    int good;
     memcpy(copy, data, size);
     bad_inputs++;
-    result = ssdgs_model_load_memory(context, copy, size, &made, NULL);
+    const ssdgs_result result = ssdgs_model_load_memory(context, copy, size, &made, NULL);
     free(copy);
     if (result)
         return (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !made && memory.live == live &&
                ssdgs_error_message(context)[0];
-    good = finite_model(made);
+    int good = finite_model(made);
     if (draws) {
         camera.width = camera.height = 8;
         camera.fx = camera.fy = 10;
         camera.cx = camera.cy = 4;
+        ssdgs_image image;
         memset(&image, 0, sizeof image);
         image.color = color;
         good = good && !ssdgs_render(made, &camera, &photos[1].light, 1, &image);
@@ -1018,16 +994,14 @@ static int taken_or_refused(const void *data, size_t size, int draws) {
 }
 
 static void test_damaged_models(void) {
-    bytes whole;
-    size_t k;
-    int i, wrong = 0;
+    int wrong = 0;
     with_context();
     model = random_model(3, 2);
     CHECK(!do_save());
-    whole = slurp(file_path);
-    for (k = 0; k < whole.size && wrong < 9; k++) {
+    bytes whole = slurp(file_path);
+    for (size_t k = 0; k < whole.size && wrong < 9; k++) {
         const unsigned char was = whole.data[k];
-        for (i = 1; i < 256; i += full ? 1 : 1 + (int)draw_below(200)) {
+        for (int i = 1; i < 256; i += full ? 1 : 1 + (int)draw_below(200)) {
             whole.data[k] = (unsigned char)(was ^ i);
             if (!taken_or_refused(whole.data, whole.size, draw() < (full ? 0.05 : 0.3)))
                 wrong++, printf("byte %lu of %lu, %d instead of %d\n", (unsigned long)k,
@@ -1053,9 +1027,8 @@ static void test_damaged_models(void) {
 static bytes repeat(const char *start, const char *repeated, int times, const char *end) {
     bytes b;
     char *text = (char *)malloc(strlen(start) + (size_t)times * (strlen(repeated) + 8) + strlen(end) + 1);
-    int i;
     b.size = (size_t)sprintf(text, "%s", start);
-    for (i = 0; i < times; i++)
+    for (int i = 0; i < times; i++)
         if (!repeated[0]) text[b.size++] = 0;
         else b.size += (size_t)sprintf(text + b.size, repeated, i);
     b.size += (size_t)sprintf(text + b.size, "%s", end);
@@ -1100,10 +1073,9 @@ static void test_hostile_headers(void) {
         {PLY "element vertex 1\n" ROW, "", 0, ""},
         {PLY "element vertex 1\n" ROW "end_heade", "r", 1, ""},
         {PLY "element vertex 1\n" ROW "\nend_header\n", "x", 12, ""}};
-    size_t a;
     with_context();
     memory.limit = (size_t)1 << 26;
-    for (a = 0; a < sizeof attacks / sizeof *attacks; a++) {
+    for (size_t a = 0; a < sizeof attacks / sizeof *attacks; a++) {
         const bytes b = repeat(attacks[a].start, attacks[a].repeated, attacks[a].times, attacks[a].end);
         memory.peak = memory.bytes;
         if (!CHECK(ssdgs_model_load_memory(context, b.data, b.size, &made, NULL) != SSDGS_OK && !made))
@@ -1124,21 +1096,19 @@ static void test_proportion(void) {
                                           "blue",  "opacity", "scale_0", "scale_1", "scale_2",
                                           "rot_0", "rot_1",   "rot_2",   "rot_3"};
     enum { ROWS = 20000 };
-    double ratio[2];
     char *text = (char *)malloc(ROWS * 14 + 1000);
-    size_t size, i;
-    bytes whole;
     with_context();
     model = random_model(2000, 8);
     CHECK(!do_save());
-    whole = slurp(file_path);
+    bytes whole = slurp(file_path);
     memory.peak = memory.bytes;
     CHECK(!ssdgs_model_load(context, file_path, &made, NULL));
     ssdgs_model_destroy(made);
+    double ratio[2];
     ratio[0] = (double)(memory.peak - memory.bytes) / (double)whole.size;
     free(whole.data);
-    size = (size_t)sprintf(text, PLY "element vertex %d\n", ROWS);
-    for (i = 0; i < 14; i++) size += (size_t)sprintf(text + size, "property uchar %s\n", names[i]);
+    size_t size = (size_t)sprintf(text, PLY "element vertex %d\n", ROWS);
+    for (size_t i = 0; i < 14; i++) size += (size_t)sprintf(text + size, "property uchar %s\n", names[i]);
     size += (size_t)sprintf(text + size, "end_header\n");
     memset(text + size, 1, ROWS * 14);
     size += ROWS * 14;
@@ -1179,16 +1149,13 @@ static void test_datasets(void) {
     enum { CHUNKS = 100000 };
     bytes png = slurp(FOLDER "/a.png");
     unsigned char *longer = (unsigned char *)malloc(png.size + CHUNKS * 12);
-    ssdgs_pixels format;
     void *got = NULL;
-    int width, height;
-    size_t k;
     CHECK(!symlink("/dev/zero", FOLDER "/zero.png") && !symlink("self.png", FOLDER "/self.png"));
-    for (k = 0; k < sizeof sets / sizeof *sets; k++) {
+    for (size_t k = 0; k < sizeof sets / sizeof *sets; k++) {
         const bytes b = repeat(sets[k].start, sets[k].repeated, sets[k].times, sets[k].end);
-        olat_dataset set;
         spill(FOLDER "/odd.json", b.data, b.size);
         error[0] = 0;
+        olat_dataset set;
         if (!CHECK(olat_load(FOLDER, "odd.json", 0, &set, error)
                        ? sets[k].message && strstr(error, sets[k].message)
                        : !sets[k].message))
@@ -1199,8 +1166,10 @@ static void test_datasets(void) {
         CHECK(memory.live == 0);
     }
     memcpy(longer, png.data, 33); /* an image in pieces, nearly all of them empty */
-    for (k = 0; k < CHUNKS; k++) memcpy(longer + 33 + 12 * k, empty, 12);
+    for (size_t k = 0; k < CHUNKS; k++) memcpy(longer + 33 + 12 * k, empty, 12);
     memcpy(longer + 33 + 12 * CHUNKS, png.data + 33, png.size - 33);
+    ssdgs_pixels format;
+    int width, height;
     CHECK(!olat_decode_png(longer, png.size + CHUNKS * 12, &width, &height, &format, &got, error) &&
           width == SIDE && !memcmp(got, pixels[1], SIDE * SIDE * 4));
     meter_free(got);
@@ -1231,27 +1200,25 @@ static double seconds(void) {
 
 static void test_kills(void) {
     const int wanted = full ? 200 : 20;
-    int kills = 0, torn = 0, runs = 0, wrong = 0, status;
-    double start = seconds(), life;
-    bytes want;
+    int kills = 0, torn = 0, runs = 0, wrong = 0;
+    double start = seconds();
     remove(file_path);
     CHECK(apart(whole_run) == 0);
-    life = seconds() - start;
-    want = slurp(FOLDER "/final");
+    const double life = seconds() - start;
+    bytes want = slurp(FOLDER "/final");
     CHECK(want.size > 1000);
+    int status;
     while (kills < wanted && wrong < 5 && runs < 10 * wanted) {
         runs++;
         remove(file_path);
         remove(FOLDER "/final");
         for (;;) {
             const double patience = kills < wanted ? 0.7 * life * draw() : 1e9;
-            struct timespec moment;
-            pid_t child;
-            int half;
             fflush(stdout);
-            child = fork();
+            const pid_t child = fork();
             if (child == 0) _exit(whole_run());
             if (patience < 1e9) {
+                struct timespec moment;
                 moment.tv_sec = (time_t)patience;
                 moment.tv_nsec = (long)(1e9 * (patience - (double)moment.tv_sec));
                 nanosleep(&moment, NULL);
@@ -1260,7 +1227,7 @@ static void test_kills(void) {
             if (child < 0 || waitpid(child, &status, 0) != child) exit(1);
             if (!WIFSIGNALED(status)) break;
             kills++;
-            half = files_with(".tmp.", 1); /* a process that dies while it writes leaves that */
+            const int half = files_with(".tmp.", 1); /* a process that dies while it writes leaves that */
             torn += half;
             wrong += half > 1;
             with_trainer(); /* the name is absent or whole */

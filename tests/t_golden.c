@@ -15,27 +15,27 @@ static double value_bound(void) { return real64 ? 1e-9 : 2e-5; }
 static ssdgs_real *reals(size_t n) { return (ssdgs_real *)calloc(n + 64, sizeof(ssdgs_real)); }
 
 static ssdgs_real *gold_reals(const char *name) {
-    size_t n, i;
+    size_t n;
     const double *from = gold(&file, name, &n);
     ssdgs_real *to = reals(n);
-    for (i = 0; i < n; i++) to[i] = (ssdgs_real)from[i];
+    for (size_t i = 0; i < n; i++) to[i] = (ssdgs_real)from[i];
     return to;
 }
 
 /* (n, width) rows of a golden array into planes of a stride. */
 static void to_planes(const char *name, ssdgs_real *planes, size_t stride) {
     const gold_array *a = gold_find(&file, name);
-    size_t i, c, width = a->count / a->dims[0];
-    for (i = 0; i < a->dims[0]; i++)
-        for (c = 0; c < width; c++) planes[c * stride + i] = (ssdgs_real)a->data[i * width + c];
+    size_t width = a->count / a->dims[0];
+    for (size_t i = 0; i < a->dims[0]; i++)
+        for (size_t c = 0; c < width; c++) planes[c * stride + i] = (ssdgs_real)a->data[i * width + c];
 }
 
 static void check_planes(const char *name, const ssdgs_real *planes, size_t stride, double bound) {
     const gold_array *a = gold_find(&file, name);
-    size_t i, c, width = a->count / a->dims[0];
+    size_t width = a->count / a->dims[0];
     double *rows = (double *)malloc(a->count * sizeof *rows);
-    for (i = 0; i < a->dims[0]; i++)
-        for (c = 0; c < width; c++) rows[i * width + c] = (double)planes[c * stride + i];
+    for (size_t i = 0; i < a->dims[0]; i++)
+        for (size_t c = 0; c < width; c++) rows[i * width + c] = (double)planes[c * stride + i];
     CHECK_L2(rows, a->data, a->count, bound, name);
     free(rows);
 }
@@ -46,27 +46,25 @@ static void check_image(const char *name, const ssdgs_real *planes, double bound
     const gold_array *a = gold_find(&file, name);
     const size_t pixels = (size_t)a->dims[0] * a->dims[1], channels = a->dims[2];
     double *rows = (double *)malloc(a->count * sizeof *rows);
-    size_t i;
-    for (i = 0; i < a->count; i++) rows[i] = (double)planes[pixels * (i % channels) + i / channels];
+    for (size_t i = 0; i < a->count; i++) rows[i] = (double)planes[pixels * (i % channels) + i / channels];
     CHECK_NEAR(rows, a->data, a->count, bound, 0, name);
-    for (i = 0; i < a->count; i++) image_error = fmax(image_error, fabs(rows[i] - a->data[i]));
+    for (size_t i = 0; i < a->count; i++) image_error = fmax(image_error, fabs(rows[i] - a->data[i]));
     free(rows);
 }
 
 static void gold_planes(const char *name, ssdgs_real *planes) {
     const gold_array *a = gold_find(&file, name);
     const size_t pixels = (size_t)a->dims[0] * a->dims[1], channels = a->dims[2];
-    size_t i;
-    for (i = 0; i < a->count; i++) planes[pixels * (i % channels) + i / channels] = (ssdgs_real)a->data[i];
+    for (size_t i = 0; i < a->count; i++)
+        planes[pixels * (i % channels) + i / channels] = (ssdgs_real)a->data[i];
 }
 
 static ssdgs_camera gold_camera(void) {
     const double *view = gold(&file, "view", NULL), *intrinsics = gold(&file, "intrinsics", NULL),
                  *size = gold(&file, "size", NULL);
     ssdgs_camera c;
-    int i;
     memset(&c, 0, sizeof c);
-    for (i = 0; i < 12; i++) c.view[i] = (ssdgs_real)view[i];
+    for (int i = 0; i < 12; i++) c.view[i] = (ssdgs_real)view[i];
     c.fx = (ssdgs_real)intrinsics[0];
     c.fy = (ssdgs_real)intrinsics[1];
     c.cx = (ssdgs_real)intrinsics[2];
@@ -79,10 +77,9 @@ static ssdgs_camera gold_camera(void) {
 /* dL/d(transmittance) of an image with the background behind it. */
 static void through_background(ssdgs_frame *frame) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    size_t i, c;
-    for (i = 0; i < pixels; i++) {
+    for (size_t i = 0; i < pixels; i++) {
         frame->pixel_gradient[3 * pixels + i] = 0;
-        for (c = 0; c < 3; c++)
+        for (size_t c = 0; c < 3; c++)
             frame->pixel_gradient[3 * pixels + i] +=
                 frame->pixel_gradient[c * pixels + i] * frame->options.background[c];
     }
@@ -90,10 +87,9 @@ static void through_background(ssdgs_frame *frame) {
 
 static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
     ssdgs_model *model = NULL;
-    ssdgs_model_view view;
     if (!CHECK(!ssdgs_model_create(context, settings, (int)gold_find(&file, "mean")->dims[0], &model)))
         exit(1);
-    view = ssdgs_model_arrays(model);
+    ssdgs_model_view view = ssdgs_model_arrays(model);
     to_planes("mean", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
     to_planes("quat", view.gaussians + SSDGS_ROTATION * view.stride, view.stride);
     to_planes("log_scale", view.gaussians + SSDGS_LOG_SCALE * view.stride, view.stride);
@@ -104,34 +100,27 @@ static ssdgs_model *gold_geometry(const ssdgs_settings *settings) {
 static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
                   const ssdgs_light *lights, int light_count, const double *background) {
     ssdgs_render_options options = ssdgs_render_options_default();
-    int i;
     options.stop = 0;
-    for (i = 0; i < 3 && background; i++) options.background[i] = (ssdgs_real)background[i];
+    for (int i = 0; i < 3 && background; i++) options.background[i] = (ssdgs_real)background[i];
     if (!CHECK(!ssdgs__frame_begin(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
 }
 
 static void test_raster(void) {
     ssdgs_settings settings = ssdgs_settings_published();
-    ssdgs_model *model;
-    ssdgs_camera camera;
-    ssdgs_frame frame;
-    ssdgs_real *color, *image;
-    double *out, expected[16];
-    size_t n, i, pixels;
-    int c;
     if (!gold_open(&file, "raster")) return;
-    model = gold_geometry(&settings);
-    camera = gold_camera();
-    n = (size_t)model->count;
-    pixels = (size_t)camera.width * (size_t)camera.height;
+    ssdgs_model *model = gold_geometry(&settings);
+    ssdgs_camera camera = gold_camera();
+    const size_t n = (size_t)model->count;
+    const size_t pixels = (size_t)camera.width * (size_t)camera.height;
+    ssdgs_frame frame;
     begin(&frame, model, &camera, NULL, 0, gold(&file, "background", NULL));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
-    color = gold_reals("color");
-    for (i = 0; i < n; i++)
-        for (c = 0; c < 3; c++) frame.color[4 * i + (size_t)c] = color[3 * i + (size_t)c];
+    ssdgs_real *color = gold_reals("color");
+    for (size_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++) frame.color[4 * i + (size_t)c] = color[3 * i + (size_t)c];
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
-    out = (double *)malloc(n * 8 * sizeof *out);
-    for (i = 0; i < n; i++) {
+    double *out = (double *)malloc(n * 8 * sizeof *out);
+    for (size_t i = 0; i < n; i++) {
         const ssdgs_real *r = frame.views[0].record + 8 * i;
         out[2 * i] = (double)r[0];
         out[2 * i + 1] = (double)r[1];
@@ -143,9 +132,9 @@ static void test_raster(void) {
     CHECK_NEAR(out, gold(&file, "mean2d", NULL), 2 * n, value_bound(), 1e-6, "raster: mean2d");
     CHECK_NEAR(out + 2 * n, gold(&file, "conic", NULL), 4 * n, value_bound(), 1e-5, "raster: conic");
     CHECK_NEAR(out + 6 * n, gold(&file, "depth", NULL), n, value_bound(), 0, "raster: depth");
-    image = reals(pixels * 3);
-    for (c = 0; c < 3; c++)
-        for (i = 0; i < pixels; i++)
+    ssdgs_real *image = reals(pixels * 3);
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < pixels; i++)
             image[pixels * (size_t)c + i] =
                 frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
     check_image("image", image, value_bound());
@@ -156,9 +145,10 @@ static void test_raster(void) {
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD));
     memset(frame.gradient, 0, frame.gaussians.stride * SSDGS_CHANNELS * sizeof(ssdgs_real));
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_PROJECT_BACKWARD));
-    for (i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++) {
         out[i] = (double)frame.splat_gradient[SSDGS_SPLAT_GRADIENTS * i + 6];
-        for (c = 0; c < 3; c++) out[n + 3 * i + (size_t)c] = (double)frame.color_gradient[4 * i + (size_t)c];
+        for (int c = 0; c < 3; c++)
+            out[n + 3 * i + (size_t)c] = (double)frame.color_gradient[4 * i + (size_t)c];
     }
     CHECK_L2(out, gold(&file, "blend_weight", NULL), n, gradient_bound(), "raster: blend_weight");
     CHECK_L2(out + n, gold(&file, "grad_color", NULL), 3 * n, gradient_bound(), "raster: grad_color");
@@ -170,6 +160,7 @@ static void test_raster(void) {
                  frame.gaussians.stride, gradient_bound());
     check_planes("grad_opacity_logit", frame.gradient + SSDGS_OPACITY * frame.gaussians.stride,
                  frame.gaussians.stride, gradient_bound());
+    double expected[16];
     memcpy(expected, gold(&file, "grad_view", NULL), sizeof expected);
     CHECK_L2(frame.view_gradient, expected, 12, gradient_bound(), "raster: grad_view");
     free(out);
@@ -181,28 +172,22 @@ static void test_raster(void) {
 
 static void test_light_pass(const char *name) {
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_light light;
-    ssdgs_camera camera;
-    ssdgs_frame frame;
-    ssdgs_model *model;
-    ssdgs_splat_view *v;
-    const double *at;
-    size_t n;
-    int i;
     if (!gold_open(&file, name)) return;
     settings.light_bias = (ssdgs_real)gold(&file, "bias", NULL)[0] / settings.length_unit;
     settings.light_blur = SSDGS_BLUR_ADD;
-    model = gold_geometry(&settings);
-    camera = gold_camera();
-    at = gold(&file, "light", NULL);
+    ssdgs_model *model = gold_geometry(&settings);
+    ssdgs_camera camera = gold_camera();
+    const double *at = gold(&file, "light", NULL);
+    ssdgs_light light;
     memset(&light, 0, sizeof light);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         light.position[i] = (ssdgs_real)at[i];
         light.intensity[i] = 1;
     }
+    ssdgs_frame frame;
     begin(&frame, model, &camera, &light, 1, NULL);
     frame.view_count = 2; /* the file's own light camera in place of the fitted one */
-    v = frame.views + 1;
+    ssdgs_splat_view *v = frame.views + 1;
     memcpy(v->view, camera.view, sizeof v->view);
     v->orthographic = 0;
     v->by_distance = 1;
@@ -213,7 +198,7 @@ static void test_light_pass(const char *name) {
     v->cx = camera.cx;
     v->cy = camera.cy;
     v->near_plane = (ssdgs_real)0.01;
-    n = (size_t)model->count;
+    const size_t n = (size_t)model->count;
     frame.flux = reals(n);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     CHECK_NEAR(v->depth, gold(&file, "distance", NULL), n, value_bound(), 0, "light pass: distance");
@@ -238,19 +223,17 @@ typedef struct asg_run {
 } asg_run;
 
 static void asg_forward(asg_run *run) {
-    size_t at;
-    for (at = 0; at < run->stride; at += BLOCK)
+    for (size_t at = 0; at < run->stride; at += BLOCK)
         context->k->reflect(&run->k, run->gauss + at * SSDGS_CHANNELS, run->rows + at * SSDGS__ROWS);
 }
 
 /* Adds to dgauss and sums. */
 static void asg_backward(asg_run *run) {
     ssdgs_real *lanes = reals(SSDGS__LANE_SUMS * 16);
-    size_t at;
-    for (at = 0; at < run->stride; at += BLOCK)
+    for (size_t at = 0; at < run->stride; at += BLOCK)
         context->k->reflect_backward(&run->k, run->gauss + at * SSDGS_CHANNELS, run->drows + at * SSDGS__ROWS,
                                      run->dgauss + at * SSDGS_CHANNELS, lanes);
-    for (at = 0; at < SSDGS__LANE_SUMS * 16; at++) run->sums[at / 16] += lanes[at];
+    for (size_t at = 0; at < SSDGS__LANE_SUMS * 16; at++) run->sums[at / 16] += lanes[at];
     free(lanes);
 }
 
@@ -260,8 +243,7 @@ static ssdgs_real *row_of(ssdgs_real *blocks, int rows, int row, size_t point) {
 
 static void check_points(asg_run *run, const char *name, int channel, int width, double bound) {
     double *d = (double *)malloc(run->n * (size_t)width * sizeof *d);
-    size_t i;
-    for (i = 0; i < run->n * (size_t)width; i++)
+    for (size_t i = 0; i < run->n * (size_t)width; i++)
         d[i] = (double)*row_of(run->dgauss, SSDGS_CHANNELS, channel + (int)(i % (size_t)width),
                                i / (size_t)width);
     CHECK_L2(d, gold(&file, name, NULL), run->n * (size_t)width, bound, name);
@@ -270,50 +252,47 @@ static void check_points(asg_run *run, const char *name, int channel, int width,
 
 static void test_asg(void) {
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_light lamp;
-    ssdgs_camera camera;
-    ssdgs_frame frame;
-    ssdgs_model_view view;
-    asg_run run;
-    double *value;
-    size_t i, first[SSDGS__GLOBAL_GROUPS + 1];
-    int c;
     if (!gold_open(&file, "shading")) return;
+    asg_run run;
     memset(&run, 0, sizeof run);
     settings.asg = SSDGS_ASG_GEOMETRIC;
     run.n = gold_find(&file, "position")->dims[0];
     run.stride = (run.n + BLOCK - 1) / BLOCK * BLOCK;
     if (!CHECK(!ssdgs_model_create(context, &settings, (int)run.n, &run.model))) exit(1);
-    view = ssdgs_model_arrays(run.model);
+    ssdgs_model_view view = ssdgs_model_arrays(run.model);
     to_planes("position", view.gaussians + SSDGS_POSITION * view.stride, view.stride);
     to_planes("frame_quat", view.gaussians + SSDGS_FRAME * view.stride, view.stride);
     to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * view.stride, view.stride);
-    for (i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
-    for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
+    for (size_t i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
+    for (size_t i = 0; i < 16; i++)
+        view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
+    ssdgs_light lamp;
     memset(&lamp, 0, sizeof lamp);
+    ssdgs_camera camera;
     memset(&camera, 0, sizeof camera);
     camera.width = camera.height = 8;
     camera.fx = camera.fy = 8;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         lamp.position[c] = (ssdgs_real)gold(&file, "light", NULL)[c];
         lamp.intensity[c] = 1;
         camera.view[4 * c + c] = 1;
         camera.view[4 * c + 3] = (ssdgs_real)-gold(&file, "camera", NULL)[c];
     }
+    ssdgs_frame frame;
     begin(&frame, run.model, &camera, &lamp, 1, NULL);
     run.k = ssdgs__lighting_of(&frame, 0);
     run.gauss = reals(run.stride * SSDGS_CHANNELS);
     run.dgauss = reals(run.stride * SSDGS_CHANNELS);
     run.rows = reals(run.stride * SSDGS__ROWS);
     run.drows = reals(run.stride * SSDGS__ROWS);
-    value = (double *)malloc(3 * run.n * sizeof *value);
-    for (i = 0; i < run.stride; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+    double *value = (double *)malloc(3 * run.n * sizeof *value);
+    for (size_t i = 0; i < run.stride; i++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             *row_of(run.gauss, SSDGS_CHANNELS, c, i) =
                 view.gaussians[(size_t)c * view.stride + (i < run.n ? i : run.n - 1)];
     {
         asg_forward(&run);
-        for (i = 0; i < run.n;
+        for (size_t i = 0; i < run.n;
              i++) { /* the file's objective is (f_s, f_d) / d^2 against the given gradients */
             const double fs = value[i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__GLOSS, i);
             const double fd = value[run.n + i] = (double)*row_of(run.rows, SSDGS__ROWS, SSDGS__COSINE, i);
@@ -338,6 +317,7 @@ static void test_asg(void) {
     check_points(&run, "grad_position", SSDGS_POSITION, 3, gradient_bound());
     check_points(&run, "grad_frame_quat", SSDGS_FRAME, 4, gradient_bound());
     ssdgs__asg_backward(&frame, run.sums + 6);
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&settings, first);
     CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(),
              "grad_asg_quat");
@@ -355,37 +335,27 @@ static void test_asg(void) {
 /* A network with its inputs and its head, in one block of 64. */
 static void test_network(const char *name, int shadow, int residual, int defaults) {
     ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
-    ssdgs_frame frame;
-    ssdgs__row_lists lists;
-    ssdgs__block_layout l;
-    ssdgs__lighting k;
-    ssdgs_real *memory, *scratch, *inputs, *part, *gauss, *outs, *dgauss, *drows, *dnet, *spare, *transposed,
-        *dweights, *slot, *dinputs, *dvisibility, *dother, *weights, one[3 * BLOCK];
     const char *prefix = shadow && residual ? "res_" : "";
-    char key[64];
-    double *out;
-    int s, c, layers;
-    const int *sizes;
-    size_t count;
     if (!gold_open(&file, name)) return;
     settings.view_octaves = settings.light_octaves = 4;
     settings.transport = 0;
     settings.residual_shadow = residual;
     settings.shadow_width = 32;
     settings.shadow_layers = 4;
+    ssdgs_frame frame;
     memset(&frame, 0, sizeof frame);
     frame.context = context;
     frame.settings = settings;
     frame.terms = SSDGS_ALL_TERMS;
     frame.light_count = 1;
     if (defaults || residual) frame.settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
-    l = ssdgs__layout(&frame);
-    memory = reals(l.size);
-    gauss = memory + l.gauss;
-    scratch = reals(l.scratch);
-    outs = scratch + l.outs;
-    inputs = scratch + l.inputs;
-    part = memory + l.lights;
+    ssdgs__block_layout l = ssdgs__layout(&frame);
+    ssdgs_real *memory = reals(l.size);
+    ssdgs_real *gauss = memory + l.gauss;
+    ssdgs_real *scratch = reals(l.scratch);
+    ssdgs_real *outs = scratch + l.outs;
+    ssdgs_real *inputs = scratch + l.inputs;
+    ssdgs_real *part = memory + l.lights;
     to_planes("x", gauss + SSDGS_POSITION * BLOCK, BLOCK);
     to_planes("material", gauss + SSDGS_MATERIAL * BLOCK, BLOCK);
     to_planes("wi", part + SSDGS__WI * BLOCK, BLOCK);
@@ -395,17 +365,19 @@ static void test_network(const char *name, int shadow, int residual, int default
         to_planes("normal", part + SSDGS__NORMAL * BLOCK, BLOCK);
         if (defaults) to_planes("depth_cue", part + l.cue, BLOCK);
     }
-    for (s = 0; s < BLOCK; s++) { /* unit irradiance, c = 1 */
+    for (int s = 0; s < BLOCK; s++) { /* unit irradiance, c = 1 */
         part[SSDGS__IRRADIANCE * BLOCK + s] = 1;
         part[SSDGS__COSINE * BLOCK + s] = 1;
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             gauss[(SSDGS_SCATTERING + c) * BLOCK + s] = gauss[(SSDGS_DIFFUSE + c) * BLOCK + s] =
                 (ssdgs_real)0.54132485461291811;
     }
-    weights = gold_reals("weights");
+    ssdgs_real *weights = gold_reals("weights");
+    size_t count;
     gold(&file, "weights", &count);
+    ssdgs__lighting k;
     memset(&k, 0, sizeof k);
-    for (c = 0; c < 3; c++) k.intensity[c] = 1;
+    for (int c = 0; c < 3; c++) k.intensity[c] = 1;
     k.scattering = !shadow;
     k.shadow = k.diffuse = shadow;
     k.refined_shadow = shadow;
@@ -415,10 +387,14 @@ static void test_network(const char *name, int shadow, int residual, int default
         const double eta = 1.3, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
         k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
     }
+    ssdgs__row_lists lists;
     ssdgs__row_lists_fill(&lists);
-    sizes = shadow ? l.shadow : l.scattering;
-    layers = shadow ? l.shadow_layers : l.scattering_layers;
+    const int *sizes = shadow ? l.shadow : l.scattering;
+    const int layers = shadow ? l.shadow_layers : l.scattering_layers;
     CHECK((size_t)sizes[0] == (size_t)gold(&file, "layer_sizes", NULL)[0]);
+    ssdgs_real *dgauss, *drows, *dnet, *spare, *transposed, *dweights, *slot, *dvisibility, *dother;
+    char key[64];
+    double *out;
     {
         ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at),
                    *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
@@ -427,21 +403,22 @@ static void test_network(const char *name, int shadow, int residual, int default
         context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head,
                            outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
+        ssdgs_real one[3 * BLOCK];
         memset(one, 0, sizeof one);
         if (shadow) {
-            for (s = 0; s < BLOCK; s++) out[s] = (double)outs[9 * BLOCK + s];
+            for (int s = 0; s < BLOCK; s++) out[s] = (double)outs[9 * BLOCK + s];
             snprintf(key, sizeof key, "%sS", prefix);
             CHECK_NEAR(out, gold(&file, key, NULL), BLOCK, value_bound(), 0, key);
-            for (s = 0; s < BLOCK; s++)
+            for (int s = 0; s < BLOCK; s++)
                 one[s] = (ssdgs_real)(gold(&file, "grad_S", NULL)[s] * 3.14159265358979323846);
         } else {
             const int per = defaults ? 3 : 1;
-            for (s = 0; s < BLOCK; s++)
-                for (c = 0; c < per; c++) out[s * per + c] = (double)outs[(6 + c) * BLOCK + s];
+            for (int s = 0; s < BLOCK; s++)
+                for (int c = 0; c < per; c++) out[s * per + c] = (double)outs[(6 + c) * BLOCK + s];
             CHECK_NEAR(out, gold(&file, "f_sss", NULL), BLOCK * per, real64 ? 1e-12 : 2e-9,
                        real64 ? 1e-9 : 2e-5, name);
-            for (s = 0; s < BLOCK; s++)
-                for (c = 0; c < per; c++)
+            for (int s = 0; s < BLOCK; s++)
+                for (int c = 0; c < per; c++)
                     one[c * BLOCK + s] = (ssdgs_real)gold(&file, "grad_f", NULL)[s * per + c];
         }
         dgauss = reals(SSDGS_CHANNELS * BLOCK);
@@ -457,8 +434,8 @@ static void test_network(const char *name, int shadow, int residual, int default
                                     shadow ? NULL : head, one, one, one, dgauss, drows,
                                     shadow ? dnet : dother, shadow ? dother : dnet, dvisibility);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs, dnet, spare,
-                                          transposed, &lists, sizes[0], slot);
+        ssdgs_real *dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs,
+                                                      dnet, spare, transposed, &lists, sizes[0], slot);
         ssdgs__sum_slots(sizes, layers, slot, 0, 1, 0, 1, dweights);
         ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
     }
@@ -494,37 +471,35 @@ static void test_network(const char *name, int shadow, int residual, int default
 }
 
 static void test_loss(void) {
-    ssdgs_real *image, *target, *gradient;
     ssdgs__buffer memory = {0, 0};
-    ssdgs__loss_values values;
-    const gold_array *a;
-    double *rows, got[4], want[4];
-    size_t pixels, i;
     if (!gold_open(&file, "loss")) return;
-    a = gold_find(&file, "image");
-    pixels = (size_t)a->dims[0] * a->dims[1];
-    image = reals(3 * pixels);
-    target = reals(3 * pixels);
-    gradient = reals(3 * pixels);
+    const gold_array *a = gold_find(&file, "image");
+    const size_t pixels = (size_t)a->dims[0] * a->dims[1];
+    ssdgs_real *image = reals(3 * pixels);
+    ssdgs_real *target = reals(3 * pixels);
+    ssdgs_real *gradient = reals(3 * pixels);
     gold_planes("image", image);
     gold_planes("target", target);
+    ssdgs__loss_values values;
     CHECK(!ssdgs__loss(context, &memory, image, target, (int)a->dims[1], (int)a->dims[0],
                        (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient, &values));
+    double got[4];
     got[0] = values.l1;
     got[1] = values.ssim;
     got[2] = values.loss;
     got[3] = ssdgs__psnr(values.mse);
+    double want[4];
     want[0] = gold(&file, "l1", NULL)[0];
     want[1] = gold(&file, "ssim", NULL)[0];
     want[2] = gold(&file, "loss", NULL)[0];
     want[3] = gold(&file, "psnr", NULL)[0];
     CHECK_NEAR(got, want, 4, real64 ? 1e-10 : 1e-6, real64 ? 1e-9 : 1e-6, "loss: l1, ssim, loss, psnr");
-    rows = (double *)malloc(3 * pixels * sizeof *rows);
-    for (i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
+    double *rows = (double *)malloc(3 * pixels * sizeof *rows);
+    for (size_t i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
     CHECK_L2(rows, gold(&file, "grad_image", NULL), 3 * pixels, gradient_bound(), "loss: grad_image");
     CHECK(!ssdgs__loss(context, &memory, target, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)0.2,
                        gradient, &values));
-    for (i = 0; i < 3 * pixels; i++)
+    for (size_t i = 0; i < 3 * pixels; i++)
         rows[i] = 0; /* equal images pull at nothing, where one grey level makes 1e-4 */
     CHECK_NEAR(gradient, rows, 3 * pixels, real64 ? 1e-15 : 1e-8, 0, "loss: gradient of equal images");
     free(rows);
@@ -538,26 +513,29 @@ static void test_loss(void) {
 /* Sum of weight . conic (px^-2) + weight[3] ln opacity of a Gaussian under an orthographic view of 1 px a
    unit, from its quaternion (4) and log scales (3). */
 static double weighted_conic(const double raw[7], const double weight[4], double variance, int compensated) {
-    double q[4], r[6], m[2][3], cov[3] = {0, 0, 0}, det, blurred, length = 0;
-    int i, j;
-    for (i = 0; i < 4; i++) length += raw[i] * raw[i];
-    for (i = 0; i < 4; i++) q[i] = raw[i] / sqrt(length);
+    double cov[3] = {0, 0, 0}, length = 0;
+    for (int i = 0; i < 4; i++) length += raw[i] * raw[i];
+    double q[4];
+    for (int i = 0; i < 4; i++) q[i] = raw[i] / sqrt(length);
+    double r[6];
     r[0] = 1 - 2 * (q[2] * q[2] + q[3] * q[3]);
     r[1] = 2 * (q[1] * q[2] - q[0] * q[3]);
     r[2] = 2 * (q[1] * q[3] + q[0] * q[2]);
     r[3] = 2 * (q[1] * q[2] + q[0] * q[3]);
     r[4] = 1 - 2 * (q[1] * q[1] + q[3] * q[3]);
     r[5] = 2 * (q[2] * q[3] - q[0] * q[1]);
-    for (i = 0; i < 2; i++)
-        for (j = 0; j < 3; j++) m[i][j] = r[3 * i + j] * exp(raw[4 + j]);
-    for (j = 0; j < 3; j++) {
+    double m[2][3];
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 3; j++) m[i][j] = r[3 * i + j] * exp(raw[4 + j]);
+    for (int j = 0; j < 3; j++) {
         cov[0] += m[0][j] * m[0][j];
         cov[1] += m[0][j] * m[1][j];
         cov[2] += m[1][j] * m[1][j];
     }
-    det = pow(m[0][0] * m[1][1] - m[0][1] * m[1][0], 2) + pow(m[0][1] * m[1][2] - m[0][2] * m[1][1], 2) +
-          pow(m[0][2] * m[1][0] - m[0][0] * m[1][2], 2);
-    blurred = det + variance * (cov[0] + cov[2] + variance);
+    const double det = pow(m[0][0] * m[1][1] - m[0][1] * m[1][0], 2) +
+                       pow(m[0][1] * m[1][2] - m[0][2] * m[1][1], 2) +
+                       pow(m[0][2] * m[1][0] - m[0][0] * m[1][2], 2);
+    const double blurred = det + variance * (cov[0] + cov[2] + variance);
     return (weight[0] * (cov[2] + variance) - weight[1] * cov[1] + weight[2] * (cov[0] + variance)) /
                blurred +
            (compensated ? 0.5 * weight[3] * (log(det) - log(blurred)) : 0);
@@ -568,12 +546,10 @@ static double weighted_conic(const double raw[7], const double weight[4], double
 static void test_needles(void) {
     enum { MANY = 16, VALUES = SSDGS_CHANNELS * MANY };
     static const double long_side[4] = {3, 30, 100, 300}, thin_side[2] = {0.1, 1};
-    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT),
-               slot[12];
-    ssdgs__projection view;
-    int compensated, i, j;
-    for (compensated = 0; compensated < 2; compensated++) {
+    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT);
+    for (int compensated = 0; compensated < 2; compensated++) {
         double worst[2] = {0, 0};
+        ssdgs__projection view;
         memset(&view, 0, sizeof view);
         view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
         view.orthographic = 1;
@@ -581,24 +557,26 @@ static void test_needles(void) {
         view.variance = (ssdgs_real)0.1;
         view.blur = SSDGS_BLUR_ADD;
         memset(gradient, 0, VALUES * sizeof *gradient);
-        for (i = 0; i < MANY; i++) {
-            for (j = 0; j < 4; j++) {
+        for (int i = 0; i < MANY; i++) {
+            for (int j = 0; j < 4; j++) {
                 gaussians[(SSDGS_ROTATION + j) * MANY + i] =
                     (ssdgs_real)(2 * ssdgs__uniform(1, (uint64_t)(4 * i + j)) - 1);
                 splat[i * SSDGS__SPLAT + 2 + j] =
                     (ssdgs_real)(2 * ssdgs__uniform(2, (uint64_t)(4 * i + j)) - 1);
             }
-            for (j = 0; j < 3; j++)
+            for (int j = 0; j < 3; j++)
                 gaussians[(SSDGS_LOG_SCALE + j) * MANY + i] =
                     (ssdgs_real)log(j == i % 3 ? long_side[i % 4] : thin_side[i / 4 % 2]);
         }
+        ssdgs_real slot[12];
         context->k->project_backward(&view, gaussians, MANY, 0, MANY, splat, gradient, MANY, slot);
-        for (i = 0; i < MANY; i++) {
-            double raw[7], weight[4], error[2] = {0, 0}, norm[2] = {0, 0};
-            for (j = 0; j < 7; j++)
+        for (int i = 0; i < MANY; i++) {
+            double raw[7], error[2] = {0, 0}, norm[2] = {0, 0};
+            for (int j = 0; j < 7; j++)
                 raw[j] = (double)gaussians[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
-            for (j = 0; j < 4; j++) weight[j] = (double)splat[i * SSDGS__SPLAT + 2 + j];
-            for (j = 0; j < 7; j++) {
+            double weight[4];
+            for (int j = 0; j < 4; j++) weight[j] = (double)splat[i * SSDGS__SPLAT + 2 + j];
+            for (int j = 0; j < 7; j++) {
                 const double start = raw[j], step = 1e-5,
                              got = (double)
                                  gradient[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
@@ -611,7 +589,7 @@ static void test_needles(void) {
                 error[j > 3] += (got - want) * (got - want);
                 norm[j > 3] += want * want;
             }
-            for (j = 0; j < 2; j++) worst[j] = fmax(worst[j], sqrt(error[j] / norm[j]));
+            for (int j = 0; j < 2; j++) worst[j] = fmax(worst[j], sqrt(error[j] / norm[j]));
         }
         if (!CHECK(worst[0] < (real64 ? 1e-6 : 1e-2) && worst[1] < (real64 ? 1e-6 : 1e-3)))
             printf("    needles%s: rotations off by %.3g, scales by %.3g\n",
@@ -623,18 +601,16 @@ static void test_needles(void) {
 }
 
 static void test_adam(void) {
-    ssdgs_real *p, *g, *m, *v;
-    size_t n, steps, t;
-    ssdgs_real rate;
     if (!gold_open(&file, "adam")) return;
-    p = gold_reals("start");
-    g = gold_reals("grads");
+    ssdgs_real *p = gold_reals("start");
+    ssdgs_real *g = gold_reals("grads");
+    size_t n;
     gold(&file, "start", &n);
-    steps = gold_find(&file, "grads")->dims[0];
-    m = reals(n);
-    v = reals(n);
-    rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
-    for (t = 0; t < steps; t++) {
+    const size_t steps = gold_find(&file, "grads")->dims[0];
+    ssdgs_real *m = reals(n);
+    ssdgs_real *v = reals(n);
+    const ssdgs_real rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
+    for (size_t t = 0; t < steps; t++) {
         context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1),
                          ssdgs__bias_correction(0.999, (int)t + 1), (ssdgs_real)1e-15);
         CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6,
@@ -650,58 +626,51 @@ static void test_adam(void) {
 /* All four terms, both networks, the loss, and back to every parameter, the light and the pose. */
 static void test_full(const char *name, int defaults) {
     ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
-    ssdgs_model *model;
-    ssdgs_model_view view;
-    ssdgs_camera camera;
-    ssdgs_light light;
-    ssdgs_photo photo;
-    ssdgs_frame frame;
     ssdgs__buffer memory = {0, 0};
-    ssdgs__loss_values values;
-    ssdgs_real *image, *slope, *target;
-    double *rows, pose[6], zero[9], loss[1];
-    size_t n, i, pixels, first[SSDGS__GLOBAL_GROUPS + 1], stride;
-    int c;
     if (!gold_open(&file, name)) return;
     settings.asg = SSDGS_ASG_GEOMETRIC;
     settings.transport = 0;
     settings.pixel_variance = (ssdgs_real)0.3;
     settings.view_octaves = settings.light_octaves = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
-    model = gold_geometry(&settings);
-    view = ssdgs_model_arrays(model);
-    stride = view.stride;
+    ssdgs_model *model = gold_geometry(&settings);
+    ssdgs_model_view view = ssdgs_model_arrays(model);
+    size_t stride = view.stride;
     to_planes("kd_raw", view.gaussians + SSDGS_DIFFUSE * stride, stride);
     to_planes("ks_raw", view.gaussians + SSDGS_SPECULAR * stride, stride);
     to_planes("ksss_raw", view.gaussians + SSDGS_SCATTERING * stride, stride);
     to_planes("frame_quat", view.gaussians + SSDGS_FRAME * stride, stride);
     to_planes("asg_weight_raw", view.gaussians + SSDGS_ASG_WEIGHT * stride, stride);
     to_planes("material", view.gaussians + SSDGS_MATERIAL * stride, stride);
-    for (i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
-    for (i = 0; i < 16; i++) view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
+    for (size_t i = 0; i < 32; i++) view.asg_basis[i] = (ssdgs_real)gold(&file, "asg_quat", NULL)[i];
+    for (size_t i = 0; i < 16; i++)
+        view.asg_sharpness[i] = (ssdgs_real)gold(&file, "asg_log_lambda_mu", NULL)[i];
     CHECK(gold_find(&file, "sss_weights")->count == view.scattering_count);
     CHECK(gold_find(&file, "shadow_weights")->count == view.shadow_count);
-    for (i = 0; i < view.scattering_count; i++)
+    for (size_t i = 0; i < view.scattering_count; i++)
         view.scattering[i] = (ssdgs_real)gold(&file, "sss_weights", NULL)[i];
-    for (i = 0; i < view.shadow_count; i++)
+    for (size_t i = 0; i < view.shadow_count; i++)
         view.shadow[i] = (ssdgs_real)gold(&file, "shadow_weights", NULL)[i];
-    camera = gold_camera();
-    n = (size_t)model->count;
-    pixels = (size_t)camera.width * (size_t)camera.height;
+    ssdgs_camera camera = gold_camera();
+    size_t n = (size_t)model->count;
+    const size_t pixels = (size_t)camera.width * (size_t)camera.height;
+    ssdgs_light light;
     memset(&light, 0, sizeof light);
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         light.position[c] = (ssdgs_real)gold(&file, "light", NULL)[c];
         light.intensity[c] = 1;
     }
+    ssdgs_frame frame;
     begin(&frame, model, &camera, &light, 1, gold(&file, "background", NULL));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
+    size_t i;
     for (i = 0; i < n; i++) { /* given and fixed; every Gaussian is compared, so every one is shaded */
         frame.visibility[i] = (ssdgs_real)gold(&file, "visibility", NULL)[i];
         frame.depth_cue[i] = (ssdgs_real)gold(&file, "depth_cue", NULL)[i];
         frame.seen[i] = 1;
     }
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
-    rows = (double *)malloc((3 * pixels + 3 * n) * sizeof *rows);
+    double *rows = (double *)malloc((3 * pixels + 3 * n) * sizeof *rows);
 #define COMPONENT(array, golden, width) \
     do { \
         for (i = 0; i < n * (width); i++) rows[i] = (double)frame.array[4 * (i / (width)) + i % (width)]; \
@@ -709,7 +678,7 @@ static void test_full(const char *name, int defaults) {
     } while (0)
     COMPONENT(color, "color", 3);
     COMPONENT(shadow, "shadow", 1);
-    for (c = 0; c < 3; c++) { /* the file's diffuse and specular are before S */
+    for (int c = 0; c < 3; c++) { /* the file's diffuse and specular are before S */
         const char *const names[3] = {"diffuse", "specular", "scatter"};
         const ssdgs_real *from[3];
         from[0] = frame.diffuse;
@@ -719,18 +688,20 @@ static void test_full(const char *name, int defaults) {
             rows[i] = (double)from[c][4 * (i / 3) + i % 3] / (c < 2 ? gold(&file, "shadow", NULL)[i / 3] : 1);
         CHECK_NEAR(rows, gold(&file, names[c], NULL), 3 * n, value_bound(), 0, names[c]);
     }
-    image = reals(3 * pixels);
-    slope = reals(3 * pixels);
-    target = reals(3 * pixels);
-    for (c = 0; c < 3; c++)
+    ssdgs_real *image = reals(3 * pixels);
+    ssdgs_real *slope = reals(3 * pixels);
+    ssdgs_real *target = reals(3 * pixels);
+    for (int c = 0; c < 3; c++)
         for (i = 0; i < pixels; i++)
             image[pixels * (size_t)c + i] =
                 frame.pixels[pixels * (size_t)c + i] + frame.transmittance[i] * frame.options.background[c];
     check_image("image", image, value_bound());
     if (defaults) context->k->srgb_encode(image, slope, image, 3 * pixels);
     gold_planes("target", target);
+    ssdgs__loss_values values;
     CHECK(!ssdgs__loss(context, &memory, image, target, camera.width, camera.height, 0, frame.pixel_gradient,
                        &values));
+    double loss[1];
     loss[0] = values.loss;
     CHECK_NEAR(loss, gold(&file, "loss", NULL), 1, value_bound(), 0, "full: loss");
     for (i = 0; i < 3 * pixels && defaults; i++) frame.pixel_gradient[i] *= slope[i];
@@ -748,6 +719,7 @@ static void test_full(const char *name, int defaults) {
     GRADIENT("grad_frame_quat", SSDGS_FRAME);
     GRADIENT("grad_asg_weight_raw", SSDGS_ASG_WEIGHT);
     GRADIENT("grad_material", SSDGS_MATERIAL);
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&settings, first);
     CHECK_L2(frame.global_gradient, gold(&file, "grad_asg_quat", NULL), 32, gradient_bound(),
              "full: grad_asg_quat");
@@ -758,9 +730,12 @@ static void test_full(const char *name, int defaults) {
     CHECK_L2(frame.global_gradient + first[4], gold(&file, "grad_shadow_weights", NULL), view.shadow_count,
              gradient_bound(), "full: grad_shadow_weights");
     CHECK_L2(frame.light_gradient, gold(&file, "grad_light", NULL), 3, gradient_bound(), "full: grad_light");
+    ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
+    double zero[9];
     memset(zero, 0, sizeof zero);
     photo.camera = camera;
+    double pose[6];
     ssdgs__correct_backward(&photo, zero, frame.view_gradient, pose);
     CHECK_L2(pose, gold(&file, "grad_pose", NULL), 6, gradient_bound(), "full: grad_pose");
     free(rows);
@@ -774,8 +749,8 @@ static void test_full(const char *name, int defaults) {
 
 int main(void) {
     const char *only = getenv("SSDGS_TEST_ISA");
-    int isa, found = 0;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    int found = 0;
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.isa = (ssdgs_isa)isa;

@@ -25,23 +25,20 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 static void fill(ssdgs_model *model) {
     ssdgs_model_view v = ssdgs_model_arrays(model);
     uint64_t at = 0;
-    size_t i;
-    int c;
-    for (i = 0; i < COUNT; i++) {
+    for (size_t i = 0; i < COUNT; i++) {
         ssdgs_real *p = v.gaussians + i;
-        for (c = 0; c < SSDGS_CHANNELS; c++) p[(size_t)c * v.stride] = 2 * draw(at++) - 1;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < SSDGS_CHANNELS; c++) p[(size_t)c * v.stride] = 2 * draw(at++) - 1;
+        for (int c = 0; c < 3; c++) {
             p[(size_t)(SSDGS_POSITION + c) * v.stride] *= 0.4;
             p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = -2.2 + 0.5 * draw(at++);
         }
     }
-    for (i = 0; i < model->global_count; i++) model->globals[i] += 0.3 * (2 * draw(at++) - 1);
+    for (size_t i = 0; i < model->global_count; i++) model->globals[i] += 0.3 * (2 * draw(at++) - 1);
 }
 
 /* One Gaussian behind the others, so wide and opaque that its alpha reaches its bound in some pixels. */
 static void build_wall(ssdgs_model *model) {
-    int c;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity] = c == 1 ? 0.4 : 0;
         model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] = c == 1 ? -2 : 1;
     }
@@ -56,7 +53,6 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
     const size_t pixels = SIDE * SIDE, n = COUNT * (size_t)s->light_count;
     static ssdgs_real normal_gradient[4 * SIDE * SIDE];
     double sum = 0;
-    size_t i, c;
     if (ssdgs__frame_begin(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
     if (ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
     if (fixed) { /* visibility, depth cue and flux are held fixed */
@@ -68,10 +64,10 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
             memcpy(frame->pixel_visibility, fixed->pixel_visibility,
                    pixels * (size_t)s->light_count * sizeof(ssdgs_real));
     }
-    for (i = 0; i < COUNT; i++) frame->seen[i] = 1;
+    for (size_t i = 0; i < COUNT; i++) frame->seen[i] = 1;
     if (ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE)) exit(1);
-    for (c = 0; c < 3; c++)
-        for (i = 0; i < pixels; i++) {
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < pixels; i++) {
             const double weight = sin(0.37 * (double)i + 1.3 * (double)c);
             sum +=
                 weight * (frame->pixels[pixels * c + i] + frame->transmittance[i] * s->options.background[c]);
@@ -80,10 +76,10 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
                 (c ? frame->pixel_gradient[pixels * 3 + i] : 0) + weight * s->options.background[c];
         }
     frame->normal_gradient = frame->layer_count ? normal_gradient : NULL;
-    for (c = 0; frame->layer_count && c < 4; c++) {
+    for (size_t c = 0; frame->layer_count && c < 4; c++) {
         const ssdgs_real *plane =
             c < 3 ? ssdgs__layer_plane(frame, 4, (int)c) : ssdgs__layer_plane(frame, 3, 2);
-        for (i = 0; i < pixels; i++) {
+        for (size_t i = 0; i < pixels; i++) {
             normal_gradient[pixels * c + i] = 0.3 * sin(0.29 * (double)i + 0.9 * (double)c + 2);
             sum += normal_gradient[pixels * c + i] * plane[i];
         }
@@ -118,10 +114,9 @@ static void compare(const scene *s, ssdgs_model *model, ssdgs_camera *camera, ss
                     const ssdgs_frame *fixed, ssdgs_real *value, double analytic, tally *t) {
     const double start = *value;
     double side[4];
-    ssdgs_frame frame;
-    int i;
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         *value = start + steps[i];
+        ssdgs_frame frame;
         side[i] = objective(s, model, camera, lights, fixed, &frame, 0);
     }
     *value = start;
@@ -140,24 +135,19 @@ static void run(const scene *s) {
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     ssdgs_light lights[2];
     ssdgs_model *model = NULL;
-    ssdgs_frame frame, fixed;
-    ssdgs_photo photo;
-    ssdgs_real *gradient, *global_gradient, *visibility, *pixel_visibility, *cue, *flux;
-    double value[9], pose[6], light_gradient[3];
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], stride;
-    int group, c, i;
     memcpy(lights, s->lights, sizeof lights);
     if (!CHECK(!ssdgs_model_create(context, &s->settings, COUNT, &model))) exit(1);
     fill(model);
     if (s->wall) build_wall(model);
-    stride = model->capacity;
+    const size_t stride = model->capacity;
+    ssdgs_frame frame;
     objective(s, model, &camera, lights, NULL, &frame, 1);
-    gradient = (ssdgs_real *)malloc(stride * SSDGS_CHANNELS * sizeof *gradient);
-    global_gradient = (ssdgs_real *)malloc(model->global_count * sizeof *gradient);
-    visibility = (ssdgs_real *)malloc(COUNT * 2 * sizeof *visibility);
-    pixel_visibility = (ssdgs_real *)malloc(SIDE * SIDE * 2 * sizeof *pixel_visibility);
-    cue = (ssdgs_real *)malloc(COUNT * 2 * sizeof *cue);
-    flux = (ssdgs_real *)malloc(COUNT * 2 * sizeof *flux);
+    ssdgs_real *gradient = (ssdgs_real *)malloc(stride * SSDGS_CHANNELS * sizeof *gradient);
+    ssdgs_real *global_gradient = (ssdgs_real *)malloc(model->global_count * sizeof *gradient);
+    ssdgs_real *visibility = (ssdgs_real *)malloc(COUNT * 2 * sizeof *visibility);
+    ssdgs_real *pixel_visibility = (ssdgs_real *)malloc(SIDE * SIDE * 2 * sizeof *pixel_visibility);
+    ssdgs_real *cue = (ssdgs_real *)malloc(COUNT * 2 * sizeof *cue);
+    ssdgs_real *flux = (ssdgs_real *)malloc(COUNT * 2 * sizeof *flux);
     memcpy(gradient, frame.gradient, stride * SSDGS_CHANNELS * sizeof *gradient);
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
@@ -166,19 +156,23 @@ static void run(const scene *s) {
         memcpy(pixel_visibility, frame.pixel_visibility,
                SIDE * SIDE * (size_t)s->light_count * sizeof *pixel_visibility);
     if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
-    fixed = frame;
+    ssdgs_frame fixed = frame;
     fixed.flux = flux;
     fixed.visibility = visibility;
     fixed.pixel_visibility = pixel_visibility;
     fixed.depth_cue = cue;
+    ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
     photo.camera = camera;
+    double value[9];
     memset(value, 0, sizeof value);
+    double pose[6];
     ssdgs__correct_backward(&photo, value, frame.view_gradient, pose);
-    for (c = 0; c < 3; c++) light_gradient[c] = frame.light_gradient[c];
-    for (i = 0; i < COUNT; i++) { /* gradient . q = 0 for both rotations */
+    double light_gradient[3];
+    for (int c = 0; c < 3; c++) light_gradient[c] = frame.light_gradient[c];
+    for (int i = 0; i < COUNT; i++) { /* gradient . q = 0 for both rotations */
         double dot = 0, dot2 = 0;
-        for (c = 0; c < 4; c++) {
+        for (int c = 0; c < 4; c++) {
             dot += gradient[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i] *
                    model->gaussians[(size_t)(SSDGS_ROTATION + c) * stride + (size_t)i];
             dot2 += gradient[(size_t)(SSDGS_FRAME + c) * stride + (size_t)i] *
@@ -186,27 +180,27 @@ static void run(const scene *s) {
         }
         CHECK(fabs(dot) < 1e-12 && fabs(dot2) < 1e-12);
     }
-    for (group = 0; group < SSDGS__PLANE_GROUPS; group++) {
+    for (int group = 0; group < SSDGS__PLANE_GROUPS; group++) {
         tally t = {0, 0, 0, 0};
         if (s->settings.transport && group == SSDGS__G_POSITION) continue;
-        for (i = 0; i < COUNT; i += 2)
-            for (c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++)
+        for (int i = 0; i < COUNT; i += 2)
+            for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++)
                 compare(s, model, &camera, lights, &fixed, model->gaussians + (size_t)c * stride + (size_t)i,
                         gradient[(size_t)c * stride + (size_t)i], &t);
         finish(s, ssdgs__group_names[group], &t);
     }
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&s->settings, first);
-    for (group = 0; group < SSDGS__GLOBAL_GROUPS; group++) {
+    for (int group = 0; group < SSDGS__GLOBAL_GROUPS; group++) {
         tally t = {0, 0, 0, 0};
         const size_t step = (first[group + 1] - first[group]) / 40 + 1;
-        size_t at;
-        for (at = first[group]; at < first[group + 1]; at += step)
+        for (size_t at = first[group]; at < first[group + 1]; at += step)
             compare(s, model, &camera, lights, &fixed, model->globals + at, global_gradient[at], &t);
         if (t.tried) finish(s, ssdgs__group_names[SSDGS__PLANE_GROUPS + group], &t);
     }
     {
         tally t = {0, 0, 0, 0};
-        for (c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++)
+        for (int c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++)
             compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
         if (t.tried) finish(s, "light", &t);
     }
@@ -218,10 +212,10 @@ static void run(const scene *s) {
         ssdgs__correct(&photo, at, &moved, &lamp);
         objective(s, model, &moved, lights, &fixed, &frame, 1);
         ssdgs__correct_backward(&photo, at, frame.view_gradient, pose);
-        for (c = 0; c < 6; c++) {
+        for (int c = 0; c < 6; c++) {
             const double start = at[c];
             double side[4];
-            for (i = 0; i < 4; i++) {
+            for (int i = 0; i < 4; i++) {
                 at[c] = start + steps[i];
                 ssdgs__correct(&photo, at, &moved, &lamp);
                 side[i] = objective(s, model, &moved, lights, &fixed, &frame, 0);
@@ -242,23 +236,23 @@ static void run(const scene *s) {
 
 /* The left Jacobian and the exponential stay continuous where the series takes over. */
 static void test_rotation(void) {
-    int i;
-    for (i = 0; i < 40; i++) {
+    for (int i = 0; i < 40; i++) {
         const double angle = i < 20 ? pow(10, -i) : 0.0316 + 1e-4 * (i - 30);
-        double w[3] = {0.6 * angle, 0, 0.8 * angle}, e[9], j[9], f[9], k[9], product[9], trace = 0;
-        int a, b, c;
+        double w[3] = {0.6 * angle, 0, 0.8 * angle}, e[9], j[9], trace = 0;
         ssdgs__rotate_by(w, e, j);
         w[0] *= 1 + 1e-9;
         w[2] *= 1 + 1e-9;
+        double f[9], k[9];
         ssdgs__rotate_by(w, f, k);
-        for (a = 0; a < 9; a++) CHECK(fabs(e[a] - f[a]) < 1e-8 && fabs(j[a] - k[a]) < 1e-8);
-        for (a = 0; a < 3; a++)
-            for (b = 0; b < 3; b++) {
+        for (int a = 0; a < 9; a++) CHECK(fabs(e[a] - f[a]) < 1e-8 && fabs(j[a] - k[a]) < 1e-8);
+        double product[9];
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++) {
                 product[3 * a + b] = 0;
-                for (c = 0; c < 3; c++) product[3 * a + b] += e[3 * a + c] * e[3 * b + c];
+                for (int c = 0; c < 3; c++) product[3 * a + b] += e[3 * a + c] * e[3 * b + c];
                 CHECK(fabs(product[3 * a + b] - (a == b)) < 1e-12);
             }
-        for (a = 0; a < 3; a++) trace += e[4 * a];
+        for (int a = 0; a < 3; a++) trace += e[4 * a];
         CHECK(fabs((trace - 1) / 2 - cos(angle)) < 1e-12);
     }
 }
@@ -271,34 +265,33 @@ static void test_shared_sums(void) {
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    ssdgs_frame frame;
     ssdgs_light light;
-    double *sum, difference = 0, norm = 0;
-    size_t i;
-    int part, c;
+    double difference = 0, norm = 0;
     memset(&light, 0, sizeof light);
     settings.scattering_width = 16;
     settings.light_map_size = 64;
-    for (c = 0; c < 3; c++) light.position[c] = light.intensity[c] = 1 + c;
+    for (int c = 0; c < 3; c++) light.position[c] = light.intensity[c] = 1 + c;
     if (!CHECK(!ssdgs_model_create(context, &settings, MANY, &model))) exit(1);
-    sum = (double *)calloc(model->global_count, sizeof *sum);
-    for (i = 0; i < MANY; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+    double *sum = (double *)calloc(model->global_count, sizeof *sum);
+    for (size_t i = 0; i < MANY; i++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             model->gaussians[(size_t)c * model->capacity + i] =
                 (c < 3 ? 0.4 : 1) * (2 * draw(i * 40 + (size_t)c) - 1);
-    for (part = 0; part < 3; part++) {
+    ssdgs_frame frame;
+    for (int part = 0; part < 3; part++) {
         if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1)) exit(1);
         if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
-        for (i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
+        for (size_t i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
-        for (i = 0; i < 4 * MANY; i++) frame.color_gradient[i] = draw(i) - 0.5;
-        for (i = 0; i < 4 * MANY * (size_t)frame.layer_count; i++)
+        for (size_t i = 0; i < 4 * MANY; i++) frame.color_gradient[i] = draw(i) - 0.5;
+        for (size_t i = 0; i < 4 * MANY * (size_t)frame.layer_count; i++)
             frame.layer_gradient[i] = draw(4 * MANY + i) - 0.5;
         memset(frame.global_gradient, 0, model->global_count * sizeof *frame.global_gradient);
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
-        for (i = 0; i < model->global_count; i++) sum[i] += (part == 2 ? -1 : 1) * frame.global_gradient[i];
+        for (size_t i = 0; i < model->global_count; i++)
+            sum[i] += (part == 2 ? -1 : 1) * frame.global_gradient[i];
     }
-    for (i = 0; i < model->global_count; i++) {
+    for (size_t i = 0; i < model->global_count; i++) {
         difference += sum[i] * sum[i];
         norm += frame.global_gradient[i] * frame.global_gradient[i];
     }
@@ -313,28 +306,26 @@ static void test_moved_camera(void) {
     static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     ssdgs_model *model = NULL;
-    ssdgs_frame frame;
-    size_t i;
-    int c, j;
     if (!CHECK(!ssdgs_model_create(context, NULL, MANY, &model))) exit(1);
-    for (i = 0; i < MANY; i++)
-        for (c = 0; c < 3; c++) {
+    for (size_t i = 0; i < MANY; i++)
+        for (int c = 0; c < 3; c++) {
             model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + i] =
                 0.8 * draw(3 * i + (size_t)c) - 0.4;
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + i] =
                 -3 - draw(10000 + 3 * i + (size_t)c);
         }
+    ssdgs_frame frame;
     if (ssdgs__frame_begin(&frame, model, &camera, NULL, 0, NULL, 0, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE)) exit(1);
-    for (i = 0; i < 4 * MANY; i++) frame.color[i] = draw(20000 + i);
+    for (size_t i = 0; i < 4 * MANY; i++) frame.color[i] = draw(20000 + i);
     if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE)) exit(1);
-    for (i = 0; i < 4 * SIDE * SIDE; i++) frame.pixel_gradient[i] = draw(40000 + i) - 0.5;
+    for (size_t i = 0; i < 4 * SIDE * SIDE; i++) frame.pixel_gradient[i] = draw(40000 + i) - 0.5;
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD)) exit(1);
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         double moved = 0, camera_moved = 0;
-        for (i = 0; i < MANY; i++)
+        for (size_t i = 0; i < MANY; i++)
             moved += frame.gradient[(size_t)(SSDGS_POSITION + c) * frame.gaussians.stride + i];
-        for (j = 0; j < 3; j++) camera_moved += camera.view[4 * j + c] * frame.view_gradient[4 * j + 3];
+        for (int j = 0; j < 3; j++) camera_moved += camera.view[4 * j + c] * frame.view_gradient[4 * j + 3];
         CHECK(fabs(moved) > 0.1 && fabs(moved - camera_moved) < 1e-10 * fabs(moved));
     }
     ssdgs_model_destroy(model);
@@ -347,34 +338,32 @@ static void test_edges(void) {
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    ssdgs_frame frame;
-    ssdgs_light light;
-    int i, c, j;
     settings.asg = SSDGS_ASG_GEOMETRIC;
+    ssdgs_light light;
     memset(&light, 0, sizeof light);
     light.position[1] = 2;
-    for (c = 0; c < 3; c++) light.intensity[c] = 1;
+    for (int c = 0; c < 3; c++) light.intensity[c] = 1;
     if (!CHECK(!ssdgs_model_create(context, &settings, 2, &model))) exit(1);
-    v = ssdgs_model_arrays(model);
+    ssdgs_model_view v = ssdgs_model_arrays(model);
     v.gaussians[SSDGS_OPACITY * v.stride] =
         -8; /* too faint for the light's map: nothing is known to be in its way */
     memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);
+    ssdgs_frame frame;
     if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 1, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
     CHECK(frame.visibility[0] == 1);
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         frame.seen[i] = 1;
         frame.visibility[i] = i;
     }
     if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
-    for (i = 0; i < 8; i++) frame.color_gradient[i] = 1;
+    for (int i = 0; i < 8; i++) frame.color_gradient[i] = 1;
     memset(frame.view_gradient, 0, sizeof frame.view_gradient);
     if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE_BACKWARD)) exit(1);
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         CHECK(fabs(frame.shadow[4 * i] - (i ? 0.99 : 0.01)) < 1e-12);
-        for (c = 0; c < 3; c++) CHECK(frame.specular[4 * i + c] == 0);
-        for (j = 0; j < 8; j++)
+        for (int c = 0; c < 3; c++) CHECK(frame.specular[4 * i + c] == 0);
+        for (int j = 0; j < 8; j++)
             CHECK(frame.gradient[(size_t)(SSDGS_ASG_WEIGHT + j) * frame.gaussians.stride + (size_t)i] == 0);
     }
     ssdgs_model_destroy(model);
@@ -385,15 +374,14 @@ static void test_sharpest(void) {
     static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK],
         dgauss[SSDGS_CHANNELS * SSDGS__BLOCK];
     static const double raw[4] = {-SSDGS__SHARPEST - 1, -1, 1, SSDGS__SHARPEST + 1};
-    int s, i;
-    for (s = 0; s < SSDGS__BLOCK; s++) {
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
         gauss[SSDGS_FRAME * SSDGS__BLOCK + s] = 1;
-        for (i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[s % 4];
-        for (i = 0; i < SSDGS__LOBE; i++) drows[i * SSDGS__BLOCK + s] = 1;
+        for (int i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[s % 4];
+        for (int i = 0; i < SSDGS__LOBE; i++) drows[i * SSDGS__BLOCK + s] = 1;
     }
     context->k->lobe_backward(gauss, drows, dgauss);
-    for (s = 0; s < SSDGS__BLOCK; s++)
-        for (i = 0; i < 2; i++) {
+    for (int s = 0; s < SSDGS__BLOCK; s++)
+        for (int i = 0; i < 2; i++) {
             const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s],
                          want = s % 4 == 0 || s % 4 == 3 ? 0 : exp(raw[s % 4]);
             CHECK(fabs(d - want) < 1e-14);
@@ -410,18 +398,18 @@ static void test_empty_tiles(void) {
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_light light;
     ssdgs_model *model = NULL;
-    ssdgs_frame frame;
-    size_t i, count;
     int blended = 0, left = 0;
     memset(&light, 0, sizeof light);
     light.position[0] = light.intensity[0] = light.intensity[1] = light.intensity[2] = 2;
     if (!CHECK(!ssdgs_model_create(context, &settings, 1, &model))) exit(1);
-    for (i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
+    for (size_t i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
+    ssdgs_frame frame;
     if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 1)) exit(1);
-    count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
-    for (i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
+    const size_t count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
+    for (size_t i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
-    for (i = 0; i < count; i++) left += frame.layer_pixels[i] == 0.7, blended += frame.layer_pixels[i] > 0;
+    for (size_t i = 0; i < count; i++)
+        left += frame.layer_pixels[i] == 0.7, blended += frame.layer_pixels[i] > 0;
     CHECK(!left && blended > 0 && blended < (int)count / 4);
     ssdgs_model_destroy(model);
 }
@@ -435,32 +423,31 @@ static void test_photo(int transfer, double intensity) {
     static unsigned char pixels[SIDE * SIDE * 4];
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    ssdgs__loss_values values;
-    ssdgs_photo photo;
-    ssdgs_frame frame;
     tally t = {0, 0, 0, 0};
-    ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
-    size_t i, stride;
-    int side;
     settings.transfer = transfer;
+    ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
     photo.camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
     photo.light.position[0] = photo.light.position[1] = -2;
     photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = intensity;
     photo.pixels = pixels;
-    for (i = 0; i < sizeof pixels; i++)
+    for (size_t i = 0; i < sizeof pixels; i++)
         pixels[i] = (unsigned char)(intensity > 9 && i / 4 % 3 ? 255 : 255.9 * draw(7000 + i));
     if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
     fill(model);
-    stride = model->capacity;
+    const size_t stride = model->capacity;
+    ssdgs__loss_values values;
+    ssdgs_frame frame;
     if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
                               SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
         exit(1);
-    for (i = 0; i < SSDGS_CHANNELS * COUNT; i++) gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
-    for (i = 0; i < COUNT * SSDGS_SPECULAR; i += 5) { /* geometry, opacity, diffuse colour */
+    ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
+    for (size_t i = 0; i < SSDGS_CHANNELS * COUNT; i++)
+        gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
+    for (size_t i = 0; i < COUNT * SSDGS_SPECULAR; i += 5) { /* geometry, opacity, diffuse colour */
         ssdgs_real *value = model->gaussians + i / COUNT * stride + i % COUNT, start = *value;
-        double loss[2], slope;
-        for (side = 0; side < 2; side++) {
+        double loss[2];
+        for (int side = 0; side < 2; side++) {
             *value = start + (side ? 1e-6 : -1e-6);
             if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
                                       SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
@@ -468,7 +455,7 @@ static void test_photo(int transfer, double intensity) {
             loss[side] = values.loss;
         }
         *value = start;
-        slope = (loss[1] - loss[0]) / 2e-6;
+        const double slope = (loss[1] - loss[0]) / 2e-6;
         t.tried++;
         t.norm += slope * slope;
         t.error += (slope - gradient[i]) * (slope - gradient[i]);
@@ -483,16 +470,16 @@ static void test_photo(int transfer, double intensity) {
    like. */
 static void test_compose(void) {
     static const ssdgs_real background[3] = {0.7, 0.2, 0.5}, stored[3] = {0.9, 0.4, 0.02};
-    ssdgs_real color[6], alpha[2] = {0.25, 0}, out[6];
-    int transfer, c;
-    for (transfer = 0; transfer < 2; transfer++) {
-        for (c = 0; c < 3; c++) {
+    ssdgs_real color[6], alpha[2] = {0.25, 0};
+    for (int transfer = 0; transfer < 2; transfer++) {
+        for (int c = 0; c < 3; c++) {
             color[c] =
                 alpha[0] * (transfer == SSDGS_TRANSFER_SRGB ? ssdgs_srgb_decode(stored[c]) : stored[c]);
             color[3 + c] = 0;
         }
+        ssdgs_real out[6];
         ssdgs_compose(color, alpha, 2, transfer, background, out);
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             CHECK(fabs(out[c] - (0.25 * stored[c] + 0.75 * background[c])) < 1e-9 &&
                   fabs(out[3 + c] - background[c]) < 1e-15);
     }
@@ -502,10 +489,7 @@ static void test_compose(void) {
    light_octaves, n. */
 static void test_octaves(void) {
     ssdgs_frame frame;
-    ssdgs__block_layout l;
-    ssdgs_real *gauss, *part, *rows;
-    double want[27 + 15 + 9 + 3];
-    int n = 0, i, c, k;
+    int n = 0;
     memset(&frame, 0, sizeof frame);
     frame.context = context;
     frame.settings = ssdgs_settings_default();
@@ -514,44 +498,44 @@ static void test_octaves(void) {
     frame.settings.light_octaves = 1;
     frame.terms = SSDGS_SCATTERING_TERM;
     frame.light_count = 1;
-    l = ssdgs__layout(&frame);
+    ssdgs__block_layout l = ssdgs__layout(&frame);
     CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + 9 + SSDGS__LENGTHS);
-    gauss =
+    ssdgs_real *gauss =
         (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
-    part = gauss + l.lights;
-    rows = part + l.light_size;
-    for (i = 0; i < 4; i++) {
+    ssdgs_real *part = gauss + l.lights;
+    ssdgs_real *rows = part + l.light_size;
+    double want[27 + 15 + 9 + 3];
+    for (int i = 0; i < 4; i++) {
         static const int octaves[4] = {4, 2, 1, 0},
                          from[4] = {SSDGS_POSITION, SSDGS__WO, SSDGS__WI, SSDGS__NORMAL};
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             (i ? part : gauss)[(from[i] + c) * SSDGS__BLOCK] = want[n++] = 0.2 + 0.3 * i - 0.5 * c;
-        for (k = 0; k < 6 * octaves[i]; k++, n++) {
+        for (int k = 0; k < 6 * octaves[i]; k++, n++) {
             const double angle = (0.2 + 0.3 * i - 0.5 * (k % 3)) * (1 << k / 3 % octaves[i]);
             want[n] = k < 3 * octaves[i] ? sin(angle) : cos(angle);
         }
     }
     ssdgs__encode_inputs(&frame, &l, 0, gauss, part, rows);
-    for (i = 0; i < n; i++) rows[i] = rows[i * SSDGS__BLOCK];
+    for (int i = 0; i < n; i++) rows[i] = rows[i * SSDGS__BLOCK];
     CHECK_NEAR(rows, want, n, 1e-12, 0, "the scattering network's inputs");
     free(gauss);
 }
 
 int main(void) {
-    scene base, s;
-    int transfer, i;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
     test_shared_sums();
     test_moved_camera();
     test_edges();
     test_sharpest();
-    for (transfer = 0; transfer < 2; transfer++) {
+    for (int transfer = 0; transfer < 2; transfer++) {
         test_photo(transfer, 9);
         test_photo(transfer, 300);
     }
     test_compose();
     test_octaves();
     test_empty_tiles();
+    scene base;
     memset(&base, 0, sizeof base);
     base.name = "default without transport";
     base.settings = ssdgs_settings_default();
@@ -564,14 +548,15 @@ int main(void) {
     base.options.background[0] = 0.3;
     base.options.background[1] = 0.5;
     base.light_count = 1;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         base.lights[0].position[i] = i == 1 ? -1.2 : 1.1;
         base.lights[0].intensity[i] = 2 + i;
         base.lights[1].position[i] = i == 2 ? 0.8 : i == 1 ? -0.6 : 0;
         base.lights[1].intensity[i] = 1;
     }
     run(&base);
-    s = base, s.name = "default", s.settings.transport = 1;
+    scene s = base;
+    s.name = "default", s.settings.transport = 1;
     run(&s);
     s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
     run(&s);
@@ -599,7 +584,7 @@ int main(void) {
     s = base, s.name = "directional and point light", s.light_count = 2,
     s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
     run(&s);
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         static const char *const names[4] = {"diffuse only", "specular only", "shadow and diffuse",
                                              "scattering only"};
         static const int terms[4] = {SSDGS_DIFFUSE_TERM, SSDGS_SPECULAR_TERM,

@@ -11,9 +11,8 @@
 static long live, calls, fail_at; /* blocks; allocations so far; the one to refuse, 0 = none */
 
 static void *meter_resize(void *old, size_t size) {
-    void *memory;
     if (++calls == fail_at) return NULL;
-    memory = realloc(old, size);
+    void *memory = realloc(old, size);
     if (memory && !old) live++;
     return memory;
 }
@@ -95,18 +94,19 @@ static void put_header(int width, int height, int depth, int color, int interlac
 
 /* The rows of one pass, with every filter in turn. */
 static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigned char *raw) {
-    unsigned char row[600], above[600];
     size_t done = 0;
-    int channels = picture_channels(p), x, y, c, filter = 0;
+    int channels = picture_channels(p), filter = 0;
     int bytes = ((p->width - x0 + dx - 1) / dx * channels * p->depth + 7) / 8,
-        back = (channels * p->depth + 7) / 8, i;
+        back = (channels * p->depth + 7) / 8;
     if (x0 >= p->width) return 0;
+    unsigned char above[600];
     memset(above, 0, sizeof above);
-    for (y = y0; y < p->height; y += dy, filter = (filter + 1) % 5) {
+    for (int y = y0; y < p->height; y += dy, filter = (filter + 1) % 5) {
         int bit = 0;
+        unsigned char row[600];
         memset(row, 0, sizeof row);
-        for (x = x0; x < p->width; x += dx) {
-            for (c = 0; c < channels; c++, bit += p->depth) {
+        for (int x = x0; x < p->width; x += dx) {
+            for (int c = 0; c < channels; c++, bit += p->depth) {
                 unsigned s = sample(p, x, y, c);
                 if (p->depth == 16)
                     row[bit / 8] = (unsigned char)(s >> 8), row[bit / 8 + 1] = (unsigned char)(s & 255);
@@ -114,7 +114,7 @@ static size_t put_rows(const picture *p, int x0, int y0, int dx, int dy, unsigne
             }
         }
         raw[done++] = (unsigned char)filter;
-        for (i = 0; i < bytes; i++) {
+        for (int i = 0; i < bytes; i++) {
             int a = i < back ? 0 : row[i - back], b = above[i], d = i < back ? 0 : above[i - back],
                 e = a + b - d, guess = 0;
             if (filter == 1) guess = a;
@@ -136,23 +136,24 @@ static void encode(const picture *p) {
     static const int passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
                                      {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}, {0, 0, 1, 1}};
     static unsigned char raw[1 << 14], packed[1 << 15];
-    unsigned char palette[768], key[6];
     size_t size = 0, used = 2, at = 0;
-    int i;
     put_header(p->width, p->height, p->depth, p->color, p->interlaced);
     put_chunk("teXt", raw, 5); /* ancillary: to be skipped */
-    for (i = 0; i < 3 * palette_size(p) && p->color == 3; i++)
+    unsigned char palette[768];
+    for (int i = 0; i < 3 * palette_size(p) && p->color == 3; i++)
         palette[i] = (unsigned char)palette_value(i / 3, i % 3);
     if (p->color == 3) put_chunk("PLTE", palette, (size_t)(3 * palette_size(p)));
-    for (i = 0; i < 3; i++) { /* the colour of pixel (1, 1), with bits beyond the depth that must be masked */
+    unsigned char key[6];
+    for (int i = 0; i < 3;
+         i++) { /* the colour of pixel (1, 1), with bits beyond the depth that must be masked */
         unsigned s = sample(p, 1, 1, i) | (p->depth < 16 ? 0xA0u << p->depth : 0);
         key[2 * i] = (unsigned char)(s >> 8 & 255), key[2 * i + 1] = (unsigned char)(s & 255);
     }
-    for (i = 0; i < palette_size(p) / 2 && p->color == 3; i++)
+    for (int i = 0; i < palette_size(p) / 2 && p->color == 3; i++)
         palette[i] = (unsigned char)palette_value(i, 3);
     if (p->transparent && p->color == 3) put_chunk("tRNS", palette, (size_t)palette_size(p) / 2);
     else if (p->transparent) put_chunk("tRNS", key, p->color == 2 ? 6 : 2);
-    for (i = p->interlaced ? 0 : 7; i < (p->interlaced ? 7 : 8); i++) {
+    for (int i = p->interlaced ? 0 : 7; i < (p->interlaced ? 7 : 8); i++) {
         size += put_rows(p, passes[i][0], passes[i][1], passes[i][2], passes[i][3], raw + size);
     }
     packed[0] = 0x78, packed[1] = 1;
@@ -175,14 +176,13 @@ static void encode(const picture *p) {
 
 static void expected(const picture *p, int x, int y, unsigned rgba[4]) {
     unsigned top = (1u << p->depth) - 1, scale = p->depth < 8 ? 255 / top : 1, s[4];
-    int c;
-    for (c = 0; c < 4; c++) s[c] = sample(p, x, y, c);
+    for (int c = 0; c < 4; c++) s[c] = sample(p, x, y, c);
     if (p->color == 3) {
-        for (c = 0; c < 3; c++) rgba[c] = palette_value((int)s[0], c);
+        for (int c = 0; c < 3; c++) rgba[c] = palette_value((int)s[0], c);
         rgba[3] = p->transparent && s[0] < (unsigned)palette_size(p) / 2 ? palette_value((int)s[0], 3) : 255;
         return;
     }
-    for (c = 0; c < 3; c++) rgba[c] = scale * s[p->color & 2 ? c : 0];
+    for (int c = 0; c < 3; c++) rgba[c] = scale * s[p->color & 2 ? c : 0];
     rgba[3] = scale * (p->color == 4 ? s[1] : p->color == 6 ? s[3] : top);
     if (!p->transparent || s[0] != sample(p, 1, 1, 0)) return;
     if (p->color == 2 && (s[1] != sample(p, 1, 1, 1) || s[2] != sample(p, 1, 1, 2))) return;
@@ -190,20 +190,21 @@ static void expected(const picture *p, int x, int y, unsigned rgba[4]) {
 }
 
 static int decodes_right(const picture *p) {
-    int width, height, x, y, c, wrong = 0;
+    int wrong = 0;
+    encode(p);
+    int width, height;
     ssdgs_pixels format;
     void *pixels;
-    encode(p);
     if (olat_decode_png(file, file_size, &width, &height, &format, &pixels, error)) {
         printf("%d x %d, colour %d, depth %d: %s\n", p->width, p->height, p->color, p->depth, error);
         return 0;
     }
     wrong = width != p->width || height != p->height || (format == SSDGS_PIXELS_RGBA16) != (p->depth == 16);
-    for (y = 0; y < p->height && !wrong; y++) {
-        for (x = 0; x < p->width; x++) {
+    for (int y = 0; y < p->height && !wrong; y++) {
+        for (int x = 0; x < p->width; x++) {
             unsigned rgba[4];
             expected(p, x, y, rgba);
-            for (c = 0; c < 4; c++) {
+            for (int c = 0; c < 4; c++) {
                 size_t i = 4 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c;
                 uint16_t wide = 0;
                 if (p->depth == 16) memcpy(&wide, (const unsigned char *)pixels + 2 * i, 2);
@@ -223,12 +224,11 @@ static void test_kinds(void) {
     static const int kinds[15][2] = {{0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {2, 8}, {2, 16}, {3, 1},
                                      {3, 2}, {3, 4}, {3, 8}, {4, 8}, {4, 16}, {6, 8}, {6, 16}};
     static const int sides[8] = {1, 2, 3, 4, 5, 8, 9, 33};
-    int kind, i, k, interlaced, transparent;
-    for (kind = 0; kind < 15; kind++) {
-        for (i = 0; i < 8; i++) {
-            for (k = 0; k < 8; k++) {
-                for (interlaced = 0; interlaced < 2; interlaced++) {
-                    for (transparent = 0; transparent < (kinds[kind][0] & 4 ? 1 : 2); transparent++) {
+    for (int kind = 0; kind < 15; kind++) {
+        for (int i = 0; i < 8; i++) {
+            for (int k = 0; k < 8; k++) {
+                for (int interlaced = 0; interlaced < 2; interlaced++) {
+                    for (int transparent = 0; transparent < (kinds[kind][0] & 4 ? 1 : 2); transparent++) {
                         picture p;
                         p.width = sides[i], p.height = sides[k], p.color = kinds[kind][0],
                         p.depth = kinds[kind][1];
@@ -248,13 +248,13 @@ static void test_kinds(void) {
    decoded, 0: wrong. */
 static int refused(const unsigned char *bytes, size_t size) {
     unsigned char *copy = (unsigned char *)malloc(size + !size);
-    int width, height, failed;
-    ssdgs_pixels format;
     void *pixels = NULL;
     if (!copy) return 0;
     memcpy(copy, bytes, size);
     memset(error, 0, sizeof error);
-    failed = olat_decode_png(copy, size, &width, &height, &format, &pixels, error);
+    int width, height;
+    ssdgs_pixels format;
+    const int failed = olat_decode_png(copy, size, &width, &height, &format, &pixels, error);
     free(copy);
     if (!failed) meter_free(pixels);
     if (live != 0) return 0;
@@ -299,12 +299,12 @@ static const unsigned char dynamic_png[] = {
     69,  78,  68,  174, 66,  96,  130};
 
 static void check_dynamic(const unsigned char *bytes, size_t size) {
-    int width, height, x, y, wrong = 0;
+    int width, height, wrong = 0;
     ssdgs_pixels format;
     void *pixels;
     if (!CHECK(!olat_decode_png(bytes, size, &width, &height, &format, &pixels, error))) return;
-    for (y = 0; y < height; y++) {
-        for (x = 0; x < width; x++) {
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) {
             const unsigned char *p = (const unsigned char *)pixels + 4 * (y * width + x);
             wrong |= p[0] != ((x * x + 3 * y) & 63) || p[1] != ((7 * y) & 63) || p[2] != ((5 * x * y) & 31) ||
                      p[3] != 255;
@@ -321,10 +321,10 @@ static void test_dynamic(void) { check_dynamic(dynamic_png, sizeof dynamic_png);
 static void test_splits(void) {
     static const unsigned char bomb[11] = {'a', 0, 0, 0x78, 0xDA, 0xEC, 0xC1, 1, 1, 0, 0};
     const size_t idat = 33, length = olat__be32(dynamic_png + idat);
-    size_t i;
     memcpy(file, dynamic_png, file_size = idat);
     put_chunk("zTXt", bomb, sizeof bomb);
-    for (i = 0; i < length; i++) put_chunk("IDAT", dynamic_png + idat + 8 + i, 1), put_chunk("IDAT", NULL, 0);
+    for (size_t i = 0; i < length; i++)
+        put_chunk("IDAT", dynamic_png + idat + 8 + i, 1), put_chunk("IDAT", NULL, 0);
     put_chunk("iCCP", bomb, sizeof bomb);
     CHECK(refused_with("ends early"));
     put_chunk("IEND", NULL, 0);
@@ -335,14 +335,15 @@ static void test_splits(void) {
 
 static void test_damage(void) {
     picture p = {5, 4, 3, 4, 1, 1};
-    size_t i, idat = 33, length = olat__be32(dynamic_png + idat);
-    int which, k, wrong;
-    for (which = 0; which < 2; which++) {
+    size_t idat = 33, length = olat__be32(dynamic_png + idat);
+    for (int which = 0; which < 2; which++) {
         if (which) encode(&p);
         else memcpy(file, dynamic_png, file_size = sizeof dynamic_png);
-        for (i = 0; i < file_size; i++) CHECK(refused(file, i) == 1);
+        for (size_t i = 0; i < file_size; i++) CHECK(refused(file, i) == 1);
+        size_t i;
+        int wrong;
         for (i = 0, wrong = 0; i < file_size; i++) {
-            for (k = 1; k < 256; k++) {
+            for (int k = 1; k < 256; k++) {
                 file[i] ^= (unsigned char)k;
                 wrong |= refused(file, file_size) == 0;
                 file[i] ^= (unsigned char)k;
@@ -352,6 +353,8 @@ static void test_damage(void) {
         CHECK(refused(file, file_size) == 2);
     }
     memcpy(file, dynamic_png, file_size = sizeof dynamic_png);
+    size_t i;
+    int wrong;
     for (i = 0, wrong = 0; i < 8 * length; i++) { /* with the CRC mended, damage reaches inflate */
         file[idat + 8 + i / 8] ^= (unsigned char)(1 << i % 8);
         olat__put_be32(file + idat + 8 + length, olat__crc32(file + idat + 4, length + 4));
@@ -393,8 +396,7 @@ static void test_streams(void) {
         {"1 01 00000 00000 0000 000 000 100 100 1 1111111 1 1011011", "end of a block"}};
     static unsigned char raw[8 * 9 + 1];
     unsigned char packed[128] = {0x78, 1, 1, 72, 0, 255 - 72, 255};
-    size_t i;
-    for (i = 0; i < sizeof streams / sizeof *streams; i++) {
+    for (size_t i = 0; i < sizeof streams / sizeof *streams; i++) {
         put_stream(streams[i][0]);
         CHECK(refused_with(streams[i][1]));
     }
@@ -453,10 +455,10 @@ static void test_chunks(void) {
     {
         picture p = {5, 4, 3, 4, 0, 0}; /* all sixteen entries are used: cut the palette */
         picture wide = {9, 9, 3, 4, 0, 0};
-        size_t at = 33 + 17, length;
+        size_t at = 33 + 17;
         CHECK(decodes_right(&p));
         encode(&wide);
-        length = olat__be32(file + at);
+        const size_t length = olat__be32(file + at);
         memmove(file + at + 8 + 3, file + at + 8 + length, file_size - (at + 8 + length));
         file_size -= length - 3;
         olat__put_be32(file + at, 3);
@@ -476,22 +478,22 @@ static long file_bytes(const char *path) {
 }
 
 static int round_trip(int width, int height, int channels, int pattern) {
-    size_t count = (size_t)width * (size_t)height, i;
-    int got_width, got_height, c, wrong;
+    size_t count = (size_t)width * (size_t)height;
     unsigned char *pixels = (unsigned char *)malloc(count * (size_t)channels);
-    ssdgs_pixels format;
     void *got = NULL;
-    for (i = 0; i < count * (size_t)channels; i++) {
+    for (size_t i = 0; i < count * (size_t)channels; i++) {
         size_t x = i / (size_t)channels % (size_t)width, y = i / (size_t)channels / (size_t)width;
         size_t value = pattern == 0 ? random_bits() : pattern == 1 ? 200 : pattern == 2 ? x + 2 * y : i % 700;
         pixels[i] = (unsigned char)(value & 255);
     }
-    wrong = olat_write_png(FOLDER "/written.png", width, height, channels, pixels, error) ||
-            olat_read_png(FOLDER "/written.png", &got_width, &got_height, &format, &got, error) ||
-            got_width != width || got_height != height;
-    for (i = 0; i < count && !wrong; i++) {
+    int got_width, got_height;
+    ssdgs_pixels format;
+    int wrong = olat_write_png(FOLDER "/written.png", width, height, channels, pixels, error) ||
+                olat_read_png(FOLDER "/written.png", &got_width, &got_height, &format, &got, error) ||
+                got_width != width || got_height != height;
+    for (size_t i = 0; i < count && !wrong; i++) {
         const unsigned char *p = (const unsigned char *)got + 4 * i, *q = pixels + (size_t)channels * i;
-        for (c = 0; c < 4; c++)
+        for (int c = 0; c < 4; c++)
             wrong |= p[c] != (c == 3 ? (channels == 4 ? q[3] : 255) : q[channels == 1 ? 0 : c]);
     }
     meter_free(got);
@@ -503,11 +505,9 @@ static void test_writer(void) {
     static const int channels[3] = {1, 3, 4},
                      sizes[6][2] = {{1, 1}, {3, 2}, {17, 9}, {1, 300}, {256, 3}, {301, 199}};
     static unsigned char flat[256 * 256 * 3];
-    char name[128];
-    int c, s, pattern;
-    for (c = 0; c < 3; c++) {
-        for (s = 0; s < 6; s++) {
-            for (pattern = 0; pattern < 4; pattern++)
+    for (int c = 0; c < 3; c++) {
+        for (int s = 0; s < 6; s++) {
+            for (int pattern = 0; pattern < 4; pattern++)
                 CHECK(round_trip(sizes[s][0], sizes[s][1], channels[c], pattern));
         }
     }
@@ -517,6 +517,7 @@ static void test_writer(void) {
           strstr(error, "none/written.png"));
     CHECK(olat_write_png(FOLDER "/dir.png", 1, 1, 3, flat, error) &&
           strstr(error, "dir.png")); /* a folder: rename fails */
+    char name[128];
     snprintf(name, sizeof name, FOLDER "/dir.png.tmp.%ld.0", (long)getpid());
     CHECK(file_bytes(name) < 0);
     CHECK(olat_write_png(FOLDER "/x.png", 0, 1, 3, flat, error) &&
@@ -642,12 +643,11 @@ static void test_json(void) {
     static const char text[] = "{\"frames\": [ {\"name\": \"\\u00e9\\\"x\", \"m\": [[1, -2.5e-3],"
                                " [true, null]]},\n {} ], \"w\": 12}";
     static char deep[200], buffer[sizeof text];
-    size_t i;
-    int k, wrong = 0;
-    for (i = 0; i < sizeof good / sizeof *good; i++) {
+    int wrong = 0;
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         if (!CHECK(parse(good[i], strlen(good[i])) && live == 0)) printf("%s: %s\n", good[i], error);
     }
-    for (i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(refuses(bad[i][0], bad[i][1]));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(refuses(bad[i][0], bad[i][1]));
     CHECK(!parse("[1\0]", 4) && !parse("\"a\0b\"", 5) && !parse("1\0", 2));
     CHECK(!parse("{\0}\0", 4) && strstr(error, "UTF-16") && !parse("\0{\0}", 4) && strstr(error, "UTF-16"));
     CHECK(!parse("\0\0", 2) && !strstr(error, "UTF-16") && !parse("\0", 1) && !strstr(error, "UTF-16"));
@@ -656,9 +656,9 @@ static void test_json(void) {
     memset(deep, '[', 65), memset(deep + 65, ']', 65);
     CHECK(refuses(deep, "64 levels"));
     CHECK(parse(text, sizeof text - 1));
-    for (i = 0; i < sizeof text - 1; i++) CHECK(!parse(text, i) && error[0] && live == 0);
-    for (i = 0; i < sizeof text - 1; i++) {
-        for (k = 0; k < 256; k++) {
+    for (size_t i = 0; i < sizeof text - 1; i++) CHECK(!parse(text, i) && error[0] && live == 0);
+    for (size_t i = 0; i < sizeof text - 1; i++) {
+        for (int k = 0; k < 256; k++) {
             memcpy(buffer, text, sizeof text);
             buffer[i] = (char)(unsigned char)k;
             if (!parse(buffer, sizeof text - 1)) wrong |= !error[0];
@@ -672,21 +672,19 @@ static void test_json(void) {
 static void print_value(olat__writer *w, int index) {
     static const char *const words[3] = {"null", "false", "true"};
     const olat__node *node = &json.nodes[index];
-    char text[8];
-    size_t i;
-    int child;
     if (node->key) olat__write(w, node->key), olat__write(w, "=");
     if (node->type < OLAT__NUMBER) olat__write(w, words[node->type]);
     else if (node->type == OLAT__NUMBER) olat__write_numbers(w, "", &node->number, 1, 17, "");
     else if (node->type == OLAT__STRING) {
-        for (i = 0; i < node->text_length; i++) {
+        for (size_t i = 0; i < node->text_length; i++) {
             const unsigned char c = (unsigned char)node->text[i];
+            char text[8];
             snprintf(text, sizeof text, c < 33 || c > 126 ? "<%02x>" : "%c", c);
             olat__write(w, text);
         }
     } else {
         olat__write(w, node->type == OLAT__ARRAY ? "[" : "{");
-        for (child = node->child; child; child = json.nodes[child].next) {
+        for (int child = node->child; child; child = json.nodes[child].next) {
             print_value(w, child);
             if (json.nodes[child].next) olat__write(w, ",");
         }
@@ -740,12 +738,12 @@ static void test_strings(void) {
         {"{\"\\u00e9\":\"\\u00e9\"}", "{\xc3\xa9=<c3><a9>}"},
         {"\xEF\xBB\xBF[1]", "[1]"}};
     static char text[4096 * 12 + 3], want[4096 * 4 + 1];
-    unsigned long code, first;
-    size_t i, used, size;
-    int letters, wrong = 0;
-    for (i = 0; i < sizeof values / sizeof *values; i++) CHECK(has_value(values[i][0], values[i][1]));
-    for (letters = 0; letters < 2; letters++) {
-        for (first = 0; first < 0x110000; first += 4096) {
+    int wrong = 0;
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++) CHECK(has_value(values[i][0], values[i][1]));
+    for (int letters = 0; letters < 2; letters++) {
+        for (unsigned long first = 0; first < 0x110000; first += 4096) {
+            unsigned long code;
+            size_t used, size;
             for (code = first, used = 1, size = 0, text[0] = '"'; code < first + 4096; code++) {
                 if (code >= 0xD800 && code < 0xE000) continue;
                 if (code < 0x10000)
@@ -760,10 +758,11 @@ static void test_strings(void) {
                      memcmp(json.nodes->text, want, size) != 0;
             parse_close();
         }
-        for (code = 0xD800; code < 0xE000; code++) {
+        for (unsigned long code = 0xD800; code < 0xE000; code++) {
             static const char *const next[6] = {"", "a", "\\n", "\\u0041", "\\uD800", "\\uE000"};
-            for (i = 0; i < 6; i++) {
-                used = (size_t)sprintf(text, letters ? "\"\\u%04lX%s\"" : "\"\\u%04lx%s\"", code, next[i]);
+            for (size_t i = 0; i < 6; i++) {
+                const size_t used =
+                    (size_t)sprintf(text, letters ? "\"\\u%04lX%s\"" : "\"\\u%04lx%s\"", code, next[i]);
                 wrong += parse(text, used) || !strstr(error, "bad escape");
             }
         }
@@ -780,8 +779,7 @@ static void test_strings(void) {
 static void test_write_string(void) {
     olat__writer w = {(char *)malloc(1), 0, 1};
     char text[256];
-    int i;
-    for (i = 1; i < 128; i++) text[i - 1] = (char)i;
+    for (int i = 1; i < 128; i++) text[i - 1] = (char)i;
     strcpy(text + 127, "\xc3\xa9\xf0\x9f\x98\x80");
     olat__write_string(&w, text);
     CHECK(parse_open(w.text, w.size) && json.nodes->text_length == strlen(text) &&
@@ -811,7 +809,6 @@ static int same_number(const char *text, double want) {
 
 static void test_numbers(void) {
     static char text[3000];
-    int i, k, n;
     CHECK(same_number("0", 0.0) && same_number("0.000", 0.0) && same_number("0e999999999999999999", 0.0));
     CHECK(same_number("9007199254740993", 9007199254740992.0) &&
           same_number("9007199254740995", 9007199254740996.0));
@@ -831,17 +828,18 @@ static void test_numbers(void) {
     CHECK(same_number(text, 1000.0));
     strcpy(text + 2001, "1e-9223372036854775808");
     CHECK(same_number(text, 0.0));
-    for (i = 0; i < 6000; i++) {
-        n = 0;
+    for (int i = 0; i < 6000; i++) {
+        int n = 0;
         if (random_bits() & 1) text[n++] = '-';
         text[n++] = (char)('1' + random_bits() % 9);
-        for (k = (int)(random_bits() % (i % 10 ? 20 : 900)); k > 0; k--)
+        for (int k = (int)(random_bits() % (i % 10 ? 20 : 900)); k > 0; k--)
             text[n++] = (char)('0' + random_bits() % 10);
         if (random_bits() & 3) {
             text[n++] = '.';
-            for (k = 1 + (int)(random_bits() % 20); k > 0; k--) text[n++] = (char)('0' + random_bits() % 10);
+            for (int k = 1 + (int)(random_bits() % 20); k > 0; k--)
+                text[n++] = (char)('0' + random_bits() % 10);
         }
-        k = (int)(random_bits() % 600) - 330;
+        const int k = (int)(random_bits() % 600) - 330;
         if (n < 50 && i % 3) n += sprintf(text + n, i % 2 ? "e%d" : "E%+d", k);
         text[n] = 0;
         CHECK(same_number(text, strtod(text, NULL)));
@@ -874,19 +872,18 @@ static int loads(const char *text, int flags) {
 }
 
 static int load_fails(const char *text, int flags, const char *message) {
-    int good;
     write_text(FOLDER "/set.json", text);
     memset(error, 0, sizeof error);
-    good = olat_load(FOLDER, "set.json", flags, &set, error) && !set.frames && !set.count && live == 0 &&
-           strstr(error, message);
+    const int good = olat_load(FOLDER, "set.json", flags, &set, error) && !set.frames && !set.count &&
+                     live == 0 && strstr(error, message);
     if (!good) printf("%s\n    wanted \"%s\", got \"%s\"\n", text, message, error);
     if (live) olat_free(&set);
     return good;
 }
 
 static int near_all(const ssdgs_real *got, const double *want, int count) {
-    int i, good = 1;
-    for (i = 0; i < count; i++) good &= fabs((double)got[i] - want[i]) <= 1e-6 * (1 + fabs(want[i]));
+    int good = 1;
+    for (int i = 0; i < count; i++) good &= fabs((double)got[i] - want[i]) <= 1e-6 * (1 + fabs(want[i]));
     return good;
 }
 
@@ -962,10 +959,7 @@ static void test_datasets(void) {
         {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
         {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
     unsigned char pixels[6 * 4 * 3];
-    char text[1200];
-    size_t i;
-    ssdgs_photo *photos;
-    for (i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
+    for (size_t i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
     mkdir(FOLDER "/b", 0777);
     CHECK(!olat_write_png(FOLDER "/a.png", 6, 4, 3, pixels, error) &&
           !olat_write_png(FOLDER "/b/c.png", 3, 2, 1, pixels, error));
@@ -989,7 +983,7 @@ static void test_datasets(void) {
               near_all(a->light.intensity, rgb, 3) && a->light.kind == SSDGS_LIGHT_POINT);
         CHECK(near_all(b->camera.view, turned, 12) && near_all(b->light.position, dir, 3) &&
               near_all(b->light.intensity, one, 3) && b->light.kind == SSDGS_LIGHT_DIRECTIONAL);
-        photos = olat_photos(&set);
+        ssdgs_photo *photos = olat_photos(&set);
         CHECK(photos && photos[1].pixels == b->pixels && photos[1].camera.width == 3 &&
               photos[0].light.intensity[0] == a->light.intensity[0]);
         meter_free(photos);
@@ -1030,8 +1024,9 @@ static void test_datasets(void) {
     olat_free(&set);
     CHECK(live == 0);
 
-    for (i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(load_fails(bad[i][0], 0, bad[i][1]));
-    for (i = 0; i < sizeof bad_paths / sizeof *bad_paths; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(load_fails(bad[i][0], 0, bad[i][1]));
+    for (size_t i = 0; i < sizeof bad_paths / sizeof *bad_paths; i++) {
+        char text[1200];
         snprintf(text, sizeof text, TOP "{\"file_path\":\"%s\"," LIGHT POSE "}]}", bad_paths[i][0]);
         CHECK(load_fails(text, 0, bad_paths[i][1]));
         CHECK(!strchr(error, 27));
@@ -1044,9 +1039,8 @@ static void test_datasets(void) {
 static int lens_is(const char *top, const char *frame, double fx, double fy) {
     const double want[2] = {fx, fy};
     char text[1200];
-    int good;
     snprintf(text, sizeof text, "{%s\"w\":60,\"h\":40,\"frames\":[{%s" LIGHT POSE "}]}", top, frame);
-    good = loads(text, OLAT_NO_IMAGES) && near_all(&set.frames->camera.fx, want, 2);
+    const int good = loads(text, OLAT_NO_IMAGES) && near_all(&set.frames->camera.fx, want, 2);
     if (!good)
         printf("%s %s: %g %g\n", top, frame, set.count ? (double)set.frames->camera.fx : 0,
                set.count ? (double)set.frames->camera.fy : 0);
@@ -1055,20 +1049,19 @@ static int lens_is(const char *top, const char *frame, double fx, double fy) {
 }
 
 static int lens_fails(const char *key, const char *value, const char *message) {
-    char text[1200], wanted[200];
-    int good;
+    char wanted[200];
     snprintf(wanted, sizeof wanted, "frames[0].%s: %s", key, message);
+    char text[1200];
     snprintf(text, sizeof text, TOP "{" LIGHT POSE ",\"%s\":%s}]}", key, value);
-    good = load_fails(text, OLAT_NO_IMAGES, wanted);
+    const int good = load_fails(text, OLAT_NO_IMAGES, wanted);
     snprintf(text, sizeof text, "{\"%s\":%s,\"camera_angle_x\":1,\"frames\":[{" LIGHT POSE "}]}", key, value);
     return good & load_fails(text, OLAT_NO_IMAGES, strchr(wanted, '.') + 1);
 }
 
 static int lens_loads(const char *key, const char *value) {
     char text[1200];
-    int good;
     snprintf(text, sizeof text, TOP "{" LIGHT POSE ",\"%s\":%s}]}", key, value);
-    good = loads(text, OLAT_NO_IMAGES);
+    const int good = loads(text, OLAT_NO_IMAGES);
     olat_free(&set);
     return good;
 }
@@ -1123,8 +1116,6 @@ static void test_lenses(void) {
                                          "distortion_coefficients",
                                          "rolling_shutter"};
     const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
-    char key[8];
-    size_t i, k;
     CHECK(lens_is("\"camera_angle_x\":1,", "", of_x, of_x) &&
           lens_is("\"camera_angle_y\":0.8,", "", of_y, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "", of_x, of_y));
@@ -1149,12 +1140,13 @@ static void test_lenses(void) {
     CHECK(loads("{\"camera_angle_x\":1,\"camera_angle_y\":0.7,\"fl_x\":5,\"frames\":[" FRAME "]}", 0) &&
           !set.notes[0]);
     olat_free(&set);
-    for (i = 0; i < sizeof models / sizeof *models; i++)
+    for (size_t i = 0; i < sizeof models / sizeof *models; i++)
         CHECK(*models[i][1] == '1' ? lens_loads("camera_model", models[i][0])
                                    : lens_fails("camera_model", models[i][0], models[i][1]));
-    for (k = 0; k < 27 + sizeof others / sizeof *others; k++) {
+    for (size_t k = 0; k < 27 + sizeof others / sizeof *others; k++) {
+        char key[8];
         snprintf(key, sizeof key, "%c%d", "kps"[k / 9 % 3], (int)(k % 9) + 1);
-        for (i = 0; i < sizeof values / sizeof *values; i++)
+        for (size_t i = 0; i < sizeof values / sizeof *values; i++)
             CHECK(*values[i][1] == '1'
                       ? lens_loads(k < 27 ? key : others[k - 27], values[i][0])
                       : lens_fails(k < 27 ? key : others[k - 27], values[i][0], values[i][1]));
@@ -1169,27 +1161,28 @@ static void test_lenses(void) {
 /* Axes rounded to three decimals become a rotation; a light's direction of two decimals a unit vector. */
 static void test_rounding(void) {
     double axes[9], worst = 0;
-    char text[1200];
-    int turn, i, k, m;
-    for (turn = 0; turn < 200; turn++) {
-        double q[4], length = 0, dot;
-        for (i = 0; i < 4; i++) q[i] = random_bits() / 8388608.0 - 1, length += q[i] * q[i];
-        for (i = 0; i < 4; i++) q[i] /= sqrt(length);
-        for (i = 0; i < 9; i++) {
+    for (int turn = 0; turn < 200; turn++) {
+        double q[4], length = 0;
+        for (int i = 0; i < 4; i++) q[i] = random_bits() / 8388608.0 - 1, length += q[i] * q[i];
+        for (int i = 0; i < 4; i++) q[i] /= sqrt(length);
+        for (int i = 0; i < 9; i++) {
             const int r = i / 3, c = i % 3, o = 3 - r - c; /* o: the axis that is neither */
             axes[i] = r == c ? 1 - 2 * (q[1 + (r + 1) % 3] * q[1 + (r + 1) % 3] +
                                         q[1 + (r + 2) % 3] * q[1 + (r + 2) % 3])
                              : 2 * (q[1 + r] * q[1 + c] + ((c + 1) % 3 == r ? 1 : -1) * q[0] * q[1 + o]);
             axes[i] = floor(axes[i] * 1000 + 0.5) / 1000;
         }
+        char text[1200];
         snprintf(text, sizeof text,
                  TOP "{\"pl_dir\":[0.267,-0.535,0.802],\"transform_matrix\":[[%.3f,%.3f,%.3f,0],"
                      "[%.3f,%.3f,%.3f,0],[%.3f,%.3f,%.3f,0]]}]}",
                  axes[0], axes[1], axes[2], axes[3], axes[4], axes[5], axes[6], axes[7], axes[8]);
         if (!CHECK(loads(text, OLAT_NO_IMAGES))) continue;
-        for (i = 0; i < 3; i++)
-            for (k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++) {
                 const ssdgs_real *view = set.frames->camera.view;
+                int m;
+                double dot;
                 for (m = 0, dot = i == k ? -1 : 0; m < 3; m++)
                     dot += (double)(view[4 * i + m] * view[4 * k + m]);
                 if (fabs(dot) > worst) worst = fabs(dot);
@@ -1237,27 +1230,27 @@ static void insert_chunk(size_t at, const char *type, const unsigned char *data,
 /* Is the file, as g.png, loaded with colours on the sRGB curve, from light to the power of gamma / 100000 (0:
    as it is)? */
 static int photo_is(const picture *p, double gamma) {
-    const olat_frame *frame;
     const double top = p->depth == 16 ? 65535 : 255;
-    char text[1200];
-    int x, y, c, wrong = 0, width, height;
-    ssdgs_pixels format;
-    void *stored;
+    int wrong = 0;
     write_bytes(FOLDER "/g.png");
+    char text[1200];
     snprintf(text, sizeof text, PHOTO, "");
     if (!loads(text, 0)) return 0;
-    frame = set.frames;
+    const olat_frame *frame = set.frames;
     wrong |= (gamma > 0) != (strstr(set.notes, "1 of the 1 photographs is ") != NULL) ||
              (gamma <= 0 && set.notes[0]);
     wrong |= (gamma > 0 || p->depth == 16) != (frame->format == SSDGS_PIXELS_RGBA16) ||
              frame->camera.width != p->width;
+    int width, height;
+    ssdgs_pixels format;
+    void *stored;
     wrong |= olat_read_png(FOLDER "/g.png", &width, &height, &format, &stored, error);
     wrong |= (format == SSDGS_PIXELS_RGBA16) != (p->depth == 16);
-    for (y = 0; y < p->height && !wrong; y++)
-        for (x = 0; x < p->width; x++) {
+    for (int y = 0; y < p->height && !wrong; y++)
+        for (int x = 0; x < p->width; x++) {
             unsigned rgba[4];
             expected(p, x, y, rgba);
-            for (c = 0; c < 4; c++) {
+            for (int c = 0; c < 4; c++) {
                 const size_t i = 4 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c;
                 const double got = olat__sample(frame->pixels, frame->format, i),
                              linear = pow(rgba[c] / top, 1e5 / gamma);
@@ -1280,21 +1273,20 @@ static void test_curves(void) {
                      gammas[8] = {100000, 55555, 220000, 16, 39999, 50001, 20000, 625000000};
     static const unsigned char linear[4] = {1, 8, 0, 1}, curved[4] = {1, 13, 0, 1}, intent[4] = {0, 0, 0, 0};
     static const picture rgba = {9, 7, 6, 8, 0, 0};
-    unsigned char gama[5] = {0, 0, 0, 0, 0}, plain[4];
-    size_t at;
-    int k, g;
-    for (k = 0; k < 4; k++) {
+    unsigned char gama[5] = {0, 0, 0, 0, 0};
+    for (int k = 0; k < 4; k++) {
         const picture p = {9, 7, kinds[k][0], kinds[k][1], 0, k > 1};
-        for (g = 0; g < 8; g++) {
+        for (int g = 0; g < 8; g++) {
             olat__put_be32(gama, (uint32_t)gammas[g]);
             encode(&p), insert_chunk(33, "gAMA", gama, 4, 0);
             CHECK(photo_is(&p, gammas[g]));
         }
-        for (g = 40000; g <= 50000; g += 5000) {
+        for (int g = 40000; g <= 50000; g += 5000) {
             olat__put_be32(gama, (uint32_t)g);
             encode(&p), insert_chunk(33, "gAMA", gama, 4, 0);
             CHECK(photo_is(&p, 0));
         }
+        unsigned char plain[4];
         olat__put_be32(plain, 45455);
         olat__put_be32(gama, 100000);
         encode(&p), insert_chunk(33, "cICP", linear, 4, 0);
@@ -1302,14 +1294,14 @@ static void test_curves(void) {
         encode(&p), insert_chunk(33, "cICP", linear, 4, 0), insert_chunk(33, "sRGB", intent, 1, 0),
             insert_chunk(33, "gAMA", plain, 4, 0);
         CHECK(photo_is(&p, 100000)); /* cICP knows more */
-        for (g = 0; g < 20; g++) {
+        for (int g = 0; g < 20; g++) {
             const unsigned char transfer[4] = {1, (unsigned char)g, 0, 1};
             encode(&p), insert_chunk(33, "cICP", transfer, 4, 0);
             CHECK(photo_is(&p, g == 8 ? 100000 : 0));
         }
         encode(&p), insert_chunk(33, "cICP", linear, 3, 0);
         CHECK(photo_is(&p, 0));
-        for (g = 0; g < 2; g++) { /* in either order */
+        for (int g = 0; g < 2; g++) { /* in either order */
             encode(&p), insert_chunk(33, g ? "sRGB" : "gAMA", g ? intent : gama, g ? 1 : 4, 0);
             insert_chunk(33, g ? "gAMA" : "sRGB", g ? gama : intent, g ? 4 : 1, 0);
             CHECK(photo_is(&p, 0));
@@ -1337,6 +1329,7 @@ static void test_curves(void) {
         CHECK(photo_is(&p, 0));
         encode(&p), insert_chunk(file_size - 12, "gAMA", gama, 4, 0);
         CHECK(photo_is(&p, 0)); /* behind the pixels */
+        size_t at;
         for (encode(&p), at = 33; memcmp(file + at + 4, "IDAT", 4); at += 12 + olat__be32(file + at)) {}
         insert_chunk(at, "gAMA", gama, 4, 0);
         CHECK(photo_is(&p, kinds[k][0] == 3 ? 0 : 100000)); /* behind the palette it is out of place */
@@ -1365,10 +1358,9 @@ static void test_masks(void) {
         {",\"mask_path\":\"broken.png\"", "broken.png: byte 0"},
         {",\"mask_path\":\"\"", "mask_path: the path is empty"}};
     char text[1200];
-    size_t i;
-    int m, p, x, y, c, wrong = 0;
-    for (m = 0; m < 6; m++)
-        for (p = 0; p < 3; p++) {
+    int wrong = 0;
+    for (int m = 0; m < 6; m++)
+        for (int p = 0; p < 3; p++) {
             const double top = masks[m].depth == 16 ? 65535 : 255;
             encode(&masks[m]), write_bytes(FOLDER "/m.png");
             encode(&photos[p]), write_bytes(FOLDER "/g.png");
@@ -1377,14 +1369,15 @@ static void test_masks(void) {
             if (!CHECK(loads(text, 0))) continue;
             CHECK(!strcmp(set.frames->mask, m & 1 ? FOLDER "/./m.png" : FOLDER "/m.PNG") &&
                   !strcmp(set.notes, "masks of 1 of the 1 photographs are used"));
-            for (y = 0; y < 7; y++)
-                for (x = 0; x < 9; x++) {
-                    unsigned of_mask[4], of_photo[4], most;
+            for (int y = 0; y < 7; y++)
+                for (int x = 0; x < 9; x++) {
+                    unsigned of_mask[4];
                     expected(&masks[m], x, y, of_mask);
+                    unsigned of_photo[4];
                     expected(&photos[p], x, y, of_photo);
-                    most = of_mask[0] > of_mask[1] ? of_mask[0] : of_mask[1];
+                    unsigned most = of_mask[0] > of_mask[1] ? of_mask[0] : of_mask[1];
                     if (of_mask[2] > most) most = of_mask[2];
-                    for (c = 0; c < 4; c++) {
+                    for (int c = 0; c < 4; c++) {
                         const double got = olat__sample(set.frames->pixels, set.frames->format,
                                                         (size_t)(4 * (9 * y + x) + c));
                         wrong |= fabs(got - (c < 3 ? of_photo[c]
@@ -1395,7 +1388,7 @@ static void test_masks(void) {
             olat_free(&set);
         }
     CHECK(!wrong);
-    for (i = 0; i < sizeof bad / sizeof *bad; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         snprintf(text, sizeof text, PHOTO, bad[i][0]);
         CHECK(load_fails(text, 0, bad[i][1]));
     }
@@ -1437,10 +1430,10 @@ static void test_kinds_of_image(void) {
                  {"B", 1, "not a PNG file"},
                  {"RIFF\1\2\3\4WEB", 11, "not a PNG file"}};
     static const picture converted = {6, 4, 2, 8, 0, 0};
-    char text[1200], wanted[200];
-    size_t i;
-    for (i = 0; i < sizeof names / sizeof *names; i++) {
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char text[1200];
         snprintf(text, sizeof text, TOP "{\"file_path\":\"t/r_000%s\"," LIGHT POSE "}]}", names[i][0]);
+        char wanted[200];
         snprintf(wanted, sizeof wanted,
                  "line 2: frames[0].file_path: t/r_000%s: %s images cannot be read: convert them to PNG, for"
                  " instance with: mogrify -format png *.",
@@ -1459,7 +1452,7 @@ static void test_kinds_of_image(void) {
                     "{\"file_path\":\"jpg\"," LIGHT POSE "}]}",
                 0)); /* the name of an image that was converted, no ending */
     olat_free(&set);
-    for (i = 0; i < sizeof files / sizeof *files; i++) {
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         memcpy(file, files[i].bytes, file_size = files[i].size);
         CHECK(refused_with(files[i].message));
         write_bytes(FOLDER "/odd.png");
@@ -1474,10 +1467,9 @@ static void test_kinds_of_image(void) {
 /* Writes frames of cameras and lights about a place, poses of either kind, as a program in double would. */
 static void write_place(const char *name, const double place[3], int refined, double size) {
     FILE *stream = fopen(name, "wb");
-    int i, k, m;
     if (!CHECK(stream != NULL)) return;
     fprintf(stream, "{\"camera_angle_x\":1.0,\"frames\":[");
-    for (i = 0; i < 12; i++) {
+    for (int i = 0; i < 12; i++) {
         const double a = 0.5 * i, z = 0.6,
                      eye[3] = {2 * cos(a) * size, 2 * sin(a) * size, (0.1 * i - 0.3) * size};
         const double axes[3][3] = {
@@ -1488,17 +1480,17 @@ static void write_place(const char *name, const double place[3], int refined, do
             fprintf(stream, "\"pl_pos\":[%.17g,%.17g,%.17g]", place[0] + eye[1], place[1] - eye[0],
                     place[2] + 0.3 * size);
         fprintf(stream, ",\"%s\":[", refined ? "R_opt" : "transform_matrix");
-        for (k = 0; k < 3; k++) { /* a camera's axes are columns; R_opt has y down and z forward */
+        for (int k = 0; k < 3; k++) { /* a camera's axes are columns; R_opt has y down and z forward */
             fprintf(stream, "%s[", k ? "," : "");
-            for (m = 0; m < 3; m++)
+            for (int m = 0; m < 3; m++)
                 fprintf(stream, "%.17g%s", m && refined ? -axes[m][k] : axes[m][k], m < 2 ? "," : "");
             if (!refined) fprintf(stream, ",%.17g", place[k] + eye[k]);
             fprintf(stream, "]");
         }
         fprintf(stream, "]");
-        for (m = 0; m < 3 && refined; m++) {
+        for (int m = 0; m < 3 && refined; m++) {
             double t = 0;
-            for (k = 0; k < 3; k++) t -= (m ? -axes[m][k] : axes[m][k]) * (place[k] + eye[k]);
+            for (int k = 0; k < 3; k++) t -= (m ? -axes[m][k] : axes[m][k]) * (place[k] + eye[k]);
             fprintf(stream, "%s%.17g%s", m ? "," : ",\"T_opt\":[", t, m < 2 ? "" : "]");
         }
         fprintf(stream, "}");
@@ -1510,12 +1502,11 @@ static void write_place(const char *name, const double place[3], int refined, do
 /* How far the frames are from each other, both about the first one's origin. */
 static double apart(const olat_dataset *a, const olat_dataset *b) {
     double most = a->count == b->count && a->count > 0 ? 0 : 1e9, d;
-    int i, k;
-    for (i = 0; i < a->count && i < b->count; i++) {
-        for (k = 0; k < 12; k++)
+    for (int i = 0; i < a->count && i < b->count; i++) {
+        for (int k = 0; k < 12; k++)
             if ((d = fabs((double)(a->frames[i].camera.view[k] - b->frames[i].camera.view[k]))) > most)
                 most = d;
-        for (k = 0; k < 3; k++)
+        for (int k = 0; k < 3; k++)
             if ((d = fabs((double)(a->frames[i].light.position[k] - b->frames[i].light.position[k]))) > most)
                 most = d;
         if (a->frames[i].light.kind != b->frames[i].light.kind) most = 1e9;
@@ -1527,17 +1518,15 @@ static void test_far_places(void) {
     static const double places[6][3] = {{5e5, 6.5e5, 5e4},      {5e6, -5e6, 5e6}, {0, 0, 2e4},
                                         {-123456.789, 0.25, 7}, {0, 0, 0},        {90, 0, 0}};
     static const double zero[3] = {0, 0, 0};
-    olat_dataset there, again, nearby;
-    char wanted[200];
-    int i, k, refined;
-    for (i = 0; i < 6; i++)
-        for (refined = 0; refined < 2; refined++) {
-            double offset[3];
+    olat_dataset there;
+    for (int i = 0; i < 6; i++)
+        for (int refined = 0; refined < 2; refined++) {
             write_place(FOLDER "/there.json", places[i], refined, 1);
             write_place(FOLDER "/near.json", zero, refined, 1);
             if (!CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &there, error)))
                 printf("%s\n", error);
-            for (k = 0; k < 3; k++) {
+            double offset[3];
+            for (int k = 0; k < 3; k++) {
                 offset[k] = there.origin[k] -
                             places[i][k]; /* of the origin that was chosen, in the scene's coordinates */
                 CHECK(i < 4
@@ -1545,18 +1534,21 @@ static void test_far_places(void) {
                           : fabs(there.origin[k]) <= 0);
                 if (i >= 4) offset[k] = -places[i][k];
             }
+            olat_dataset nearby;
             CHECK(!olat_load_at(FOLDER, "near.json", OLAT_NO_IMAGES, offset, &nearby, error));
             if (!CHECK(apart(&there, &nearby) < (i < 5 ? 1e-6 : 1e-4)))
                 printf("    %d, %d: %g\n", i, refined, apart(&there, &nearby));
+            char wanted[200];
             snprintf(wanted, sizeof wanted, "coordinates are taken relative to %.9g, %.9g, %.9g",
                      there.origin[0], there.origin[1], there.origin[2]);
             CHECK(!strcmp(there.notes, i < 4 ? wanted : ""));
             CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &there, error));
+            olat_dataset again;
             CHECK(!olat_load_at(FOLDER, "saved.json", OLAT_NO_IMAGES, there.origin, &again, error));
             CHECK(apart(&there, &again) < (i < 5 ? 1e-6 : 1e-4));
             olat_free(&again);
             CHECK(!olat_load(FOLDER, "saved.json", OLAT_NO_IMAGES, &again, error));
-            for (k = 0; k < 3; k++) CHECK(fabs(again.origin[k] - there.origin[k]) < 1);
+            for (int k = 0; k < 3; k++) CHECK(fabs(again.origin[k] - there.origin[k]) < 1);
             olat_free(&again);
             olat_free(&nearby);
             olat_free(&there);
@@ -1577,23 +1569,21 @@ static void test_far_places(void) {
 /* Positions are written to 1e-8 of a scene of size 1 that lies at 5e6. */
 static void test_saved_digits(void) {
     static const double place[3] = {5e6, -5e6, 5e6};
-    const olat__node *frame;
-    double worst = 0, v[3], origin[3];
-    unsigned char *text;
-    size_t size;
-    int i, k;
+    double worst = 0;
     write_place(FOLDER "/there.json", place, 0, 1);
     CHECK(!olat_load(FOLDER, "there.json", OLAT_NO_IMAGES, &set, error) &&
           !olat_save(FOLDER "/saved.json", FOLDER, &set, error));
+    unsigned char *text;
+    size_t size;
     if (!CHECK(!olat__read_file(FOLDER "/saved.json", &text, &size, error) && parse_open((char *)text, size)))
         return;
-    frame = &json.nodes[olat__find(&json, json.nodes, "frames")->child];
-    for (i = 0; i < set.count; i++, frame = &json.nodes[frame->next]) {
-        double axes[3][3];
+    const olat__node *frame = &json.nodes[olat__find(&json, json.nodes, "frames")->child];
+    for (int i = 0; i < set.count; i++, frame = &json.nodes[frame->next]) {
         ssdgs_real eye[3];
         olat_eye(&set.frames[i].camera, eye);
+        double origin[3], axes[3][3];
         CHECK(olat__get_pose(&json, frame, "transform_matrix", 1, axes, origin));
-        for (k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++) {
             const double exact =
                 -(double)set.frames[i].camera.view[k] * (double)set.frames[i].camera.view[3] -
                 (double)set.frames[i].camera.view[4 + k] * (double)set.frames[i].camera.view[7] -
@@ -1601,8 +1591,9 @@ static void test_saved_digits(void) {
             if (fabs(origin[k] - set.origin[k] - exact) > worst)
                 worst = fabs(origin[k] - set.origin[k] - exact);
         }
+        double v[3];
         if (!olat__get(&json, frame, "pl_pos", 3, v)) continue;
-        for (k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++) {
             const double off = fabs(v[k] - set.origin[k] - (double)set.frames[i].light.position[k]);
             if (off > worst) worst = off;
         }
@@ -1616,22 +1607,21 @@ static void test_saved_digits(void) {
 
 /* What is saved loads again: the same up to the rounding of the origin. */
 static void test_saving(void) {
-    olat_dataset again;
-    int i, k;
     CHECK(loads("{\"fl_x\":3.2512345,\"fl_y\":3.5432109,\"cx\":2.7654321,\"cy\":2.1234567,\"frames\":[" FRAME
                 ",\n{" FILE_A "\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[0.12345678,1.2345678e-7,3.4567891e8],"
                 "\"transform_matrix\":[[0,-0.6,0.8,0.3],[0,0.8,0.6,-7.1],[-1,0,0,2.2],[0,0,0,1]]}]}",
                 0));
     if (!CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))) printf("%s\n", error);
+    olat_dataset again;
     if (!CHECK(!olat_load(FOLDER, "saved.json", 0, &again, error))) printf("%s\n", error);
     CHECK(again.count == 2 && set.count == 2);
-    for (i = 0; i < again.count; i++) {
+    for (int i = 0; i < again.count; i++) {
         const olat_frame *a = &set.frames[i], *b = &again.frames[i];
         CHECK(!strcmp(b->file, FOLDER "/./a.png") && b->camera.width == 6 && b->camera.height == 4);
         CHECK(a->camera.fx == b->camera.fx && a->camera.fy == b->camera.fy && a->camera.cx == b->camera.cx &&
               a->camera.cy == b->camera.cy && a->light.kind == b->light.kind);
-        for (k = 0; k < 12; k++) CHECK(fabs((double)(a->camera.view[k] - b->camera.view[k])) < 2e-6);
-        for (k = 0; k < 3; k++)
+        for (int k = 0; k < 12; k++) CHECK(fabs((double)(a->camera.view[k] - b->camera.view[k])) < 2e-6);
+        for (int k = 0; k < 3; k++)
             CHECK(fabs((double)(a->light.position[k] - b->light.position[k])) < 1e-7 &&
                   fabs((double)(a->light.intensity[k] / b->light.intensity[k]) - 1) < 1e-7);
     }
@@ -1683,12 +1673,9 @@ static void test_guard(void) {
                                         "out/old.png", "in/set.json", "in/bad.json"};
     static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png",
                                           GUARD "/later/b/new.png"};
-    char path[600], other[200];
-    size_t i;
-    int k, done;
-    long n;
     mkdir(GUARD, 0777), mkdir(GUARD "/in", 0777), mkdir(GUARD "/out", 0777);
-    for (i = 0; i < sizeof names / sizeof *names; i++) {
+    char path[600];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, GUARD "/%s", names[i]);
         write_text(path, names[i]);
     }
@@ -1712,7 +1699,8 @@ static void test_guard(void) {
           !*output(GUARD "/out/a.png"));
     drop_guard();
 
-    for (i = 0; i < sizeof outputs / sizeof *outputs; i++) { /* twice, in whatever letters */
+    char other[200];
+    for (size_t i = 0; i < sizeof outputs / sizeof *outputs; i++) { /* twice, in whatever letters */
         CHECK(!*output(outputs[i]));
         snprintf(other, sizeof other, "%.*s/./%s", (int)(strrchr(outputs[i], '/') - outputs[i]), outputs[i],
                  strrchr(outputs[i], '/') + 1);
@@ -1753,6 +1741,8 @@ static void test_guard(void) {
     CHECK(!*output(GUARD "/in/c.png"));
     drop_guard();
 
+    int done;
+    long n;
     for (n = 1, done = 0; !done && n < 100; n++) { /* memory fails at every place */
         calls = 0, fail_at = n;
         memset(error, 0, sizeof error);
@@ -1766,7 +1756,7 @@ static void test_guard(void) {
     fail_at = 0;
     CHECK(done && n > 15);
 
-    for (k = 0; k < 5000; k++) {
+    for (int k = 0; k < 5000; k++) {
         snprintf(path, sizeof path, GUARD "/in/many_%d.png", k);
         snprintf(other, sizeof other, GUARD "/out/many_%d.png", k);
         if (olat_guard_input(&guard, path, error) || *output(other)) CHECK(0);
@@ -1779,10 +1769,10 @@ static void test_memory(void) {
     static const unsigned char grey[4] = {1, 2, 3, 4};
     static const unsigned char linear[4] = {0, 1, 0x86, 0xA0};
     static const picture rgba = {6, 4, 6, 8, 0, 0};
-    long n;
-    int done;
     encode(&rgba), insert_chunk(33, "gAMA", linear, 4, 0), write_bytes(FOLDER "/g.png");
     write_text(FOLDER "/set.json", TOP FRAME ",{\"file_path\":\"g\",\"mask_path\":\"a\"," LIGHT POSE "}]}");
+    long n;
+    int done;
     for (n = 1, done = 0; !done && n < 100; n++) {
         calls = 0, fail_at = n;
         memset(error, 0, sizeof error);
@@ -1820,17 +1810,18 @@ static void test_views(void) {
     static const ssdgs_real view[12] = {0, -1, 0, -2, 0, 0, -1, (ssdgs_real)1.25, 1, 0, 0, (ssdgs_real)-0.5};
     static const double place[3] = {0.5, -2, 1.25};
     olat_frame frame;
-    ssdgs_real out[6], eye[3];
-    unsigned char pixels[8];
-    uint16_t wide[8];
     memset(&frame, 0, sizeof frame);
+    unsigned char pixels[8];
     memcpy(pixels, bytes, sizeof pixels);
+    uint16_t wide[8];
     memcpy(wide, words, sizeof wide);
     frame.camera.width = 2;
     frame.camera.height = 1;
     memcpy(frame.camera.view, view, sizeof view);
+    ssdgs_real eye[3];
     olat_eye(&frame.camera, eye);
     CHECK(near_all(eye, place, 3));
+    ssdgs_real out[6];
     olat_compose(&frame, background, out);
     CHECK(near_all(out, bare, 6));
     frame.pixels = pixels;
@@ -1845,16 +1836,15 @@ static void test_views(void) {
 static void test_cow(void) {
     static const char *const splits[2] = {"transforms_train.json", "transforms_test.json"};
     FILE *stream = fopen("examples/data/waxcow/transforms_test.json", "rb");
-    int s, i;
     if (!stream) {
         printf("examples/data/waxcow: skipped\n");
         return;
     }
     fclose(stream);
-    for (s = 0; s < 2; s++) {
+    for (int s = 0; s < 2; s++) {
         if (!CHECK(!olat_load("examples/data/waxcow", splits[s], 0, &set, error))) printf("%s\n", error);
         CHECK(set.count == (s ? 14 : 50));
-        for (i = 0; i < set.count; i++) {
+        for (int i = 0; i < set.count; i++) {
             const olat_frame *f = &set.frames[i];
             const unsigned char *p = (const unsigned char *)f->pixels;
             CHECK(f->camera.width == 128 && f->camera.height == 128 &&

@@ -22,10 +22,9 @@ typedef struct meter {
 
 static void *meter_allocate(void *user, size_t bytes) {
     meter *m = (meter *)user;
-    void *memory;
     m->calls++;
     if (m->fail_at && (m->calls == m->fail_at || (m->for_ever && m->calls > m->fail_at))) return NULL;
-    memory = malloc(bytes);
+    void *memory = malloc(bytes);
     if (memory) m->live++;
     return memory;
 }
@@ -56,9 +55,6 @@ static ssdgs_real uniform(double low, double high) { /* a float in every build *
 static ssdgs_model *make_model(int count) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    ssdgs_model_view view;
-    size_t k;
-    int channel, i;
     settings.scattering_layers = settings.shadow_layers = 2;
     settings.scattering_width = 2;
     settings.shadow_width = 3;
@@ -69,20 +65,20 @@ static ssdgs_model *make_model(int count) {
     settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
-    view = ssdgs_model_arrays(model);
-    for (channel = 0; channel < SSDGS_CHANNELS; channel++)
-        for (i = 0; i < count; i++)
+    ssdgs_model_view view = ssdgs_model_arrays(model);
+    for (int channel = 0; channel < SSDGS_CHANNELS; channel++)
+        for (int i = 0; i < count; i++)
             view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
     if (count > 2) { /* least, largest, minus zero */
         view.gaussians[SSDGS_DIFFUSE * view.stride] = from_bits(0x00800000u);
         view.gaussians[SSDGS_DIFFUSE * view.stride + 1] = from_bits(0xff7fffffu);
         view.gaussians[SSDGS_DIFFUSE * view.stride + 2] = from_bits(0x80000000u);
     }
-    for (k = 0; k < SSDGS_ASG_COUNT * 4; k++) view.asg_basis[k] = uniform(-1, 1);
-    for (k = 0; k < SSDGS_ASG_COUNT * 2; k++) view.asg_sharpness[k] = uniform(-1, 1);
-    for (k = 0; k < SSDGS_ASG_COUNT; k++) view.asg_sigma[k] = uniform(-1, 1);
-    for (k = 0; k < view.scattering_count; k++) view.scattering[k] = uniform(-1, 1);
-    for (k = 0; k < view.shadow_count; k++) view.shadow[k] = uniform(-1, 1);
+    for (size_t k = 0; k < SSDGS_ASG_COUNT * 4; k++) view.asg_basis[k] = uniform(-1, 1);
+    for (size_t k = 0; k < SSDGS_ASG_COUNT * 2; k++) view.asg_sharpness[k] = uniform(-1, 1);
+    for (size_t k = 0; k < SSDGS_ASG_COUNT; k++) view.asg_sigma[k] = uniform(-1, 1);
+    for (size_t k = 0; k < view.scattering_count; k++) view.scattering[k] = uniform(-1, 1);
+    for (size_t k = 0; k < view.shadow_count; k++) view.shadow[k] = uniform(-1, 1);
     return model;
 }
 
@@ -99,8 +95,8 @@ static int same_globals(ssdgs_model *a, ssdgs_model *b) {
 
 static int same_gaussians(ssdgs_model *a, ssdgs_model *b) {
     const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
-    int channel, equal = u.count == v.count;
-    for (channel = 0; equal && channel < SSDGS_CHANNELS; channel++)
+    int equal = u.count == v.count;
+    for (int channel = 0; equal && channel < SSDGS_CHANNELS; channel++)
         equal = !memcmp(u.gaussians + (size_t)channel * u.stride, v.gaussians + (size_t)channel * v.stride,
                         (size_t)u.count * sizeof(ssdgs_real));
     return equal;
@@ -143,10 +139,9 @@ static bytes slurp(const char *path) {
 /* Loads from a block of the exact size, so that a sanitizer sees every byte read beyond it. */
 static ssdgs_result load(const void *data, size_t size, ssdgs_model **model, ssdgs_load_stats *stats) {
     void *copy = malloc(size ? size : 1);
-    ssdgs_result result;
     if (!copy) exit(1);
     if (size) memcpy(copy, data, size);
-    result = ssdgs_model_load_memory(context, copy, size, model, stats);
+    const ssdgs_result result = ssdgs_model_load_memory(context, copy, size, model, stats);
     free(copy);
     return result;
 }
@@ -188,8 +183,6 @@ typedef struct document {
 static document parse(const bytes *file) {
     document d;
     const char *line = (const char *)file->data;
-    const unsigned char *data;
-    int i;
     memset(&d, 0, sizeof d);
     for (; strncmp(line, "end_header", 10) != 0; line = strchr(line, '\n') + 1) {
         table *t = d.tables ? &d.table[d.tables - 1] : NULL;
@@ -198,8 +191,8 @@ static document parse(const bytes *file) {
         else if (t && sscanf(line, "property %7s %31s", type, t->column[t->columns].name) == 2)
             t->column[t->columns++].integer = !strcmp(type, "int");
     }
-    data = (const unsigned char *)line + 11;
-    for (i = 0; i < d.tables; i++) {
+    const unsigned char *data = (const unsigned char *)line + 11;
+    for (int i = 0; i < d.tables; i++) {
         d.table[i].data = data;
         data += (size_t)d.table[i].rows * (size_t)d.table[i].columns * 4;
     }
@@ -218,56 +211,58 @@ typedef struct variant {
 } variant;
 
 static void put_value(bytes *to, const variant *v, const char *type, double value) {
-    unsigned char raw[8];
-    size_t size = 0, i;
-    char digits[40];
+    size_t size = 0;
     if (v->format == ASCII) {
+        char digits[40];
         sprintf(digits, type[0] == 'f' ? "%.9g " : type[0] == 'd' ? "%.17E\t" : "%.0f ", value);
         text(to, digits);
         return;
     }
+    unsigned char raw[8];
     if (type[0] == 'f') {
         const float x = (float)value;
         uint32_t bits;
         memcpy(&bits, &x, 4);
+        size_t i;
         for (size = 4, i = 0; i < 4; i++) raw[i] = (unsigned char)(bits >> 8 * i);
     } else if (type[0] == 'd') {
         uint64_t bits;
         memcpy(&bits, &value, 8);
+        size_t i;
         for (size = 8, i = 0; i < 8; i++) raw[i] = (unsigned char)(bits >> 8 * i);
     } else {
         const int32_t x = (int32_t)value;
         size = strstr(type, "short") ? 2 : strstr(type, "char") ? 1 : 4;
-        for (i = 0; i < size; i++) raw[i] = (unsigned char)((uint32_t)x >> 8 * i);
+        for (size_t i = 0; i < size; i++) raw[i] = (unsigned char)((uint32_t)x >> 8 * i);
     }
-    for (i = 0; i < size; i++) put(to, &raw[v->format == BIG ? size - 1 - i : i], 1);
+    for (size_t i = 0; i < size; i++) put(to, &raw[v->format == BIG ? size - 1 - i : i], 1);
 }
 
 static bytes emit(const document *d, const variant *v) {
     static const char *const formats[3] = {"ascii", "binary_little_endian", "binary_big_endian"};
     const char *real = v->wide ? "double" : "float", *integer = v->wide ? "short" : "int";
     bytes to = {NULL, 0, 0};
-    int pass, t, row, c;
     char line[128];
     sprintf(line, "ply%sformat %s 1.0%sobj_info of a test%s", v->newline, formats[v->format], v->newline,
             v->newline);
     text(&to, line);
-    for (pass = 0; pass < 2; pass++) { /* header, data */
+    for (int pass = 0; pass < 2; pass++) { /* header, data */
         if (v->extras && !pass) {
             sprintf(line,
                     "element face 2%sproperty list uchar int corners%selement void 99999999%scomment  %s",
                     v->newline, v->newline, v->newline, v->newline);
             text(&to, line);
         }
-        for (c = 0; v->extras && pass && c < 8; c++) put_value(&to, v, c == 0 || c == 4 ? "uchar" : "int", 3);
-        for (t = 0; t < d->tables; t++) {
+        for (int c = 0; v->extras && pass && c < 8; c++)
+            put_value(&to, v, c == 0 || c == 4 ? "uchar" : "int", 3);
+        for (int t = 0; t < d->tables; t++) {
             const table *from = &d->table[v->reversed ? d->tables - 1 - t : t];
             if (v->skip && !strcmp(from->name, v->skip)) continue;
             if (!pass) {
                 sprintf(line, "element\t%s  %d %s", from->name, from->rows, v->newline);
                 text(&to, line);
             }
-            for (row = 0; row < (pass ? from->rows : 1); row++) {
+            for (int row = 0; row < (pass ? from->rows : 1); row++) {
                 if (v->extras && !pass) {
                     sprintf(line, "property list ushort double tags%sproperty char sign%s", v->newline,
                             v->newline);
@@ -275,10 +270,10 @@ static bytes emit(const document *d, const variant *v) {
                 }
                 if (v->extras && pass) {
                     put_value(&to, v, "ushort", row % 3);
-                    for (c = 0; c < row % 3; c++) put_value(&to, v, "double", 1e300);
+                    for (int c = 0; c < row % 3; c++) put_value(&to, v, "double", 1e300);
                     put_value(&to, v, "char", -1);
                 }
-                for (c = 0; c < from->columns; c++) {
+                for (int c = 0; c < from->columns; c++) {
                     const int k = v->reversed ? from->columns - 1 - c : c;
                     const unsigned char *raw =
                         from->data + ((size_t)row * (size_t)from->columns + (size_t)k) * 4;
@@ -312,11 +307,10 @@ static bytes saved(const ssdgs_model *model) {
 
 static void test_round_trip(void) {
     static const int counts[3] = {0, 1, 777};
-    ssdgs_load_stats stats;
-    int i;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         ssdgs_model *model = make_model(counts[i]), *back = NULL, *again = NULL;
         bytes file = saved(model);
+        ssdgs_load_stats stats;
         CHECK(ssdgs_model_load(context, path, &back, &stats) == SSDGS_OK && same(model, back));
         CHECK(!stats.plain && !stats.dropped && !stats.zero_rotations && !stats.clamped_opacities &&
               !stats.clamped_scales);
@@ -333,10 +327,9 @@ static void test_round_trip(void) {
 static void test_variants(void) {
     static const char *const newlines[3] = {"\n", "\r\n", "\r"};
     ssdgs_model *model = make_model(20), *back;
-    bytes file = saved(model), other;
+    bytes file = saved(model);
     document d = parse(&file);
-    int k, c;
-    for (k = 0; k < 72; k++) {
+    for (int k = 0; k < 72; k++) {
         variant v;
         v.format = k % 3;
         v.newline = newlines[k / 3 % 3];
@@ -344,7 +337,7 @@ static void test_variants(void) {
         v.reversed = k / 18 % 2;
         v.extras = k / 36 % 2;
         v.skip = NULL;
-        other = emit(&d, &v);
+        bytes other = emit(&d, &v);
         back = NULL;
         CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
         ssdgs_model_destroy(back);
@@ -355,12 +348,12 @@ static void test_variants(void) {
         }
         free(other.data);
     }
-    for (k = 0; k < d.tables; k++) { /* every property of every element is missed by its name, but for those
-                                        that others use or that came later */
-        for (c = 0; c < d.table[k].columns; c++) {
+    for (int k = 0; k < d.tables; k++) { /* every property of every element is missed by its name, but for
+                                        those that others use or that came later */
+        for (int c = 0; c < d.table[k].columns; c++) {
             variant v = {LITTLE, "\n", 0, 0, 0, NULL};
             const char *name = v.skip = d.table[k].column[c].name;
-            other = emit(&d, &v);
+            bytes other = emit(&d, &v);
             if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") ||
                 !strcmp(name, "nz") || strstr(name, "_octaves") || !strncmp(name, "origin_", 7)) {
                 CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
@@ -377,10 +370,10 @@ static void test_variants(void) {
             free(other.data);
         }
     }
-    for (k = 2; k < d.tables; k++) { /* without weights or bases */
+    for (int k = 2; k < d.tables; k++) { /* without weights or bases */
         variant v = {BIG, "\n", 0, 0, 0, NULL};
         v.skip = d.table[k].name;
-        other = emit(&d, &v);
+        bytes other = emit(&d, &v);
         CHECK(refused(other.data, other.size) && strstr(ssdgs_error_message(context), v.skip));
         free(other.data);
     }
@@ -395,13 +388,9 @@ static void test_foreign(void) {
     bytes file = saved(model), other = {NULL, 0, 0};
     document d = parse(&file);
     variant v = {LITTLE, "\n", 0, 0, 0, NULL};
-    ssdgs_load_stats stats;
-    ssdgs_model_view view, neutral;
-    char line[64];
-    int i, j, channel;
-
     d.tables = 1;
     other = emit(&d, &v);
+    ssdgs_load_stats stats;
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && same_gaussians(model, back) &&
           !stats.plain);
     CHECK(ssdgs_model_create(context, &published, 0, &fresh) == SSDGS_OK && back &&
@@ -419,13 +408,14 @@ static void test_foreign(void) {
                  "property float nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty "
                  "float f_dc_1\n"
                  "property float f_dc_2\n");
-    for (i = 0; i < 45; i++) sprintf(line, "property float f_rest_%d\n", i), text(&other, line);
+    char line[64];
+    for (int i = 0; i < 45; i++) sprintf(line, "property float f_rest_%d\n", i), text(&other, line);
     text(&other,
          "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n"
          "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float "
          "rot_3\nend_header\n");
-    for (j = 0; j < 3; j++)
-        for (i = 0; i < 62; i++)
+    for (int j = 0; j < 3; j++)
+        for (int i = 0; i < 62; i++)
             put_value(&other, &v, "float",
                       i == 6    ? -3
                       : i < 9   ? i + 0.5 * j
@@ -434,7 +424,7 @@ static void test_foreign(void) {
                                 : 0.25 * i - 14);
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
-        view = ssdgs_model_arrays(back);
+        ssdgs_model_view view = ssdgs_model_arrays(back);
         CHECK(stats.plain && stats.clamped_opacities == 3 && stats.dropped == 0 &&
               stats.zero_rotations == 0 && view.count == 3);
         CHECK(ssdgs_model_settings(back)->baked == 1 &&
@@ -447,8 +437,9 @@ static void test_foreign(void) {
         CHECK(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) < 2e-6); /* below black */
         CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 -
                    0.28209479 * 7.5) < 1e-6);
+        ssdgs_model_view neutral;
         if (fresh) neutral = ssdgs_model_arrays(fresh);
-        for (channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
+        for (int channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
             CHECK(view.gaussians[(size_t)channel * view.stride] ==
                   neutral.gaussians[(size_t)channel * neutral.stride]);
         file = saved(back); /* a baked model keeps its colours, f_dc shows them */
@@ -473,7 +464,7 @@ static void test_foreign(void) {
          "0\n");
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK);
     if (back) {
-        view = ssdgs_model_arrays(back);
+        ssdgs_model_view view = ssdgs_model_arrays(back);
         CHECK(view.count == 2 && stats.dropped == 3 && stats.zero_rotations == 1);
         CHECK(stats.clamped_opacities == 2 && stats.clamped_scales == 2);
         CHECK(view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
@@ -501,13 +492,12 @@ static int tells(const bytes *file, ssdgs_load_stats *stats, const char *words) 
     ssdgs_context_desc desc;
     ssdgs_context *other = NULL;
     ssdgs_model *model = NULL;
-    int good;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     told[0] = 0;
-    good = !ssdgs_context_create(&desc, &other) &&
-           !ssdgs_model_load_memory(other, file->data, file->size, &model, stats) &&
-           (words ? strstr(told, words) != NULL : !told[0]);
+    const int good = !ssdgs_context_create(&desc, &other) &&
+                     !ssdgs_model_load_memory(other, file->data, file->size, &model, stats) &&
+                     (words ? strstr(told, words) != NULL : !told[0]);
     if (!good) printf("    wanted \"%s\", got \"%s\"\n", words ? words : "", told);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(other);
@@ -520,13 +510,13 @@ static void test_edited(void) {
     ssdgs_model *model = make_model(9), *back = NULL, *baked = NULL;
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_load_stats stats;
-    bytes file = saved(model), other;
+    bytes file = saved(model);
     document d = parse(&file), cut = d;
     variant v = {LITTLE, "\n", 0, 0, 0, NULL};
     const long live = memory.live;
     CHECK(tells(&file, &stats, NULL) && !stats.untrained);
     cut.tables = 1;
-    other = emit(&cut, &v);
+    bytes other = emit(&cut, &v);
     CHECK(tells(&other, &stats, "has no settings, as editors of splats drop them") && stats.untrained == 1 &&
           !stats.plain);
     CHECK(load(other.data, other.size, &back, &stats) == SSDGS_OK && stats.untrained == 1 &&
@@ -572,26 +562,23 @@ static void test_words(void) {
         {"uchar", "51 0 255"}, {"ushort", "13107 0 65535"}, {"float", "0.2 0 1"}, {"double", "0.2 -1 1"}};
     static const double want[3] = {0.2, 0, 1};
     ssdgs_load_stats stats;
-    ssdgs_model *model;
-    char properties[200], rows[200];
-    bytes b;
-    size_t k;
-    int c, kind;
-    for (k = 0; k < 4; k++) {
+    for (size_t k = 0; k < 4; k++) {
+        char properties[200];
         sprintf(properties, "property %s red\nproperty %s green\nproperty %s blue\n", colours[k].type,
                 colours[k].type, colours[k].type);
+        char rows[200];
         sprintf(rows, POINT "%s\n", colours[k].row);
-        b = ascii("1", properties, rows);
+        bytes b = ascii("1", properties, rows);
         CHECK(tells(&b, &stats, "plain splats, which have their colours baked in") && stats.plain);
-        model = NULL;
+        ssdgs_model *model = NULL;
         CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK);
-        for (c = 0; c < 3 && model; c++)
+        for (int c = 0; c < 3 && model; c++)
             CHECK(fabs(log1p(exp((double)model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity])) -
                        want[c]) < 2e-6);
         ssdgs_model_destroy(model);
         free(b.data);
     }
-    b = ascii("1", "property int red\nproperty int green\nproperty int blue\n", POINT "1 1 1\n");
+    bytes b = ascii("1", "property int red\nproperty int green\nproperty int blue\n", POINT "1 1 1\n");
     CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "lacks property f_dc_0"));
     free(b.data);
     b = ascii("3", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n",
@@ -611,16 +598,16 @@ static void test_words(void) {
           strstr(ssdgs_error_message(context), "lacks property opacity: these are no Gaussian splats"));
     CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\n") &&
           strstr(ssdgs_error_message(context), "the file ends within the header"));
-    for (kind = 0; kind < 3; kind++) { /* one long comment, many, too much of them */
+    for (int kind = 0; kind < 3; kind++) { /* one long comment, many, too much of them */
         bytes longer = {NULL, 0, 0};
         text(&longer, "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n");
         text(&longer, "comment ");
-        for (k = 0; k < (kind == 2 ? 1100000 : 70000); k++)
+        for (size_t k = 0; k < (kind == 2 ? 1100000 : 70000); k++)
             text(&longer, kind == 1 && k % 100 == 99 ? "\ncomment " : "x");
         text(&longer, "\n");
         put(&longer, "", 1);
         b = ascii("1", (const char *)longer.data, POINT "0 0 0\n");
-        model = NULL;
+        ssdgs_model *model = NULL;
         if (kind == 2) CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "within 1 MiB"));
         else CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK);
         ssdgs_model_destroy(model);
@@ -633,35 +620,30 @@ static void test_words(void) {
    what they were. */
 static void test_origin(void) {
     const ssdgs_real origin[3] = {5000000, -650000, (ssdgs_real)0.5};
-    ssdgs_settings settings;
     ssdgs_model *home = make_model(7), *model = NULL, *back = NULL;
-    bytes file, plain;
-    const char *header;
-    size_t at;
-    int c, i, format;
-    settings = *ssdgs_model_settings(home);
+    ssdgs_settings settings = *ssdgs_model_settings(home);
     memcpy(settings.origin, origin, sizeof origin);
     CHECK(ssdgs_model_create(context, &settings, 7, &model) == SSDGS_OK);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         memcpy(model->gaussians + (size_t)c * model->capacity, home->gaussians + (size_t)c * home->capacity,
                7 * sizeof(ssdgs_real));
     memcpy(model->globals, home->globals, home->global_count * sizeof(ssdgs_real));
-    file = saved(model);
+    bytes file = saved(model);
     put(&file, "", 1);
-    header = (const char *)file.data;
+    const char *header = (const char *)file.data;
     CHECK(strstr(header, "property double x\nproperty double y\nproperty double z\nproperty float nx\n") !=
           NULL);
-    at = (size_t)(strstr(header, "end_header\n") + 11 - header);
-    for (c = 0; c < 3; c++) {
+    const size_t at = (size_t)(strstr(header, "end_header\n") + 11 - header);
+    for (int c = 0; c < 3; c++) {
         uint64_t bits = 0;
+        for (int i = 7; i >= 0; i--) bits = bits << 8 | file.data[at + (size_t)(8 * c + i)];
         double value;
-        for (i = 7; i >= 0; i--) bits = bits << 8 | file.data[at + (size_t)(8 * c + i)];
         memcpy(&value, &bits, sizeof value);
         CHECK(fabs(value - (double)origin[c] - (double)model->gaussians[(size_t)c * model->capacity]) < 1e-9);
     }
     CHECK(load(file.data, file.size - 1, &back, NULL) == SSDGS_OK);
-    for (c = 0; c < 3 && back; c++)
-        for (i = 0; i < 7; i++) {
+    for (int c = 0; c < 3 && back; c++)
+        for (int i = 0; i < 7; i++) {
             const size_t k = (size_t)c * model->capacity + (size_t)i;
             CHECK(fabs((double)back->gaussians[k] - (double)model->gaussians[k]) < 1e-9);
             back->gaussians[k] = model->gaussians[k];
@@ -677,16 +659,17 @@ static void test_origin(void) {
         put(&cut, body, file.size - 1 - at);
         CHECK(load(cut.data, cut.size, &back, NULL) == SSDGS_OK && back &&
               ssdgs_model_adopt(back, model) == SSDGS_OK);
-        for (c = 0; c < 3 && back; c++)
+        for (int c = 0; c < 3 && back; c++)
             CHECK(fabs((double)back->gaussians[(size_t)c * back->capacity + 6] -
                        (double)model->gaussians[(size_t)c * model->capacity + 6]) < 1e-6);
         ssdgs_model_destroy(back);
         free(cut.data);
     }
     free(file.data);
-    for (format = ASCII; format <= LITTLE;
+    for (int format = ASCII; format <= LITTLE;
          format++) { /* doubles and floats of others, and given back to one without an origin */
         file = saved(home);
+        bytes plain;
         {
             document d = parse(&file);
             variant v = {ASCII, "\n", 1, 0, 0, NULL};
@@ -696,7 +679,7 @@ static void test_origin(void) {
         back = NULL;
         CHECK(load(plain.data, plain.size, &back, NULL) == SSDGS_OK && same(home, back));
         CHECK(back && ssdgs_model_adopt(back, model) == SSDGS_OK);
-        for (c = 0; c < 3 && back; c++)
+        for (int c = 0; c < 3 && back; c++)
             CHECK(fabs((double)back->gaussians[(size_t)c * back->capacity] + (double)origin[c] -
                        (double)home->gaussians[(size_t)c * home->capacity]) < 0.5);
         CHECK(back && !memcmp(ssdgs_model_settings(back)->origin, origin, sizeof origin));
@@ -712,14 +695,11 @@ static void test_mending(void) {
     ssdgs_model *model = make_model(8), *back = NULL;
     ssdgs_model_view view = ssdgs_model_arrays(model);
     const size_t stride = view.stride;
-    ssdgs_load_stats stats;
-    bytes file;
-    int i;
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         view.gaussians[(size_t)(SSDGS_ROTATION + i) * stride + 1] = 0;
         view.gaussians[(size_t)(SSDGS_FRAME + i) * stride + 2] = 0;
     }
-    for (i = 0; i < 4; i++) { /* drawn as any other */
+    for (int i = 0; i < 4; i++) { /* drawn as any other */
         view.gaussians[(size_t)(SSDGS_ROTATION + i) * stride + 5] = (ssdgs_real)(i == 2 ? 2e-37 : 0);
         view.gaussians[(size_t)(SSDGS_FRAME + i) * stride + 5] = (ssdgs_real)(i == 3 ? -9e36 : 0);
     }
@@ -728,7 +708,8 @@ static void test_mending(void) {
     view.gaussians[SSDGS_LOG_SCALE * stride + 4] = from_bits(0xff800000u);
     view.gaussians[SSDGS_MATERIAL * stride + 0] = from_bits(0x7fc00000u);
     view.gaussians[SSDGS_POSITION * stride + 7] = from_bits(0xff800000u);
-    file = saved(model);
+    bytes file = saved(model);
+    ssdgs_load_stats stats;
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK);
     if (back) {
         const ssdgs_model_view now = ssdgs_model_arrays(back);
@@ -792,9 +773,8 @@ static void test_numbers(void) {
                  {"infinit", 0, 0},
                  {"nanx", 0, 0},
                  {"--1", 0, 0}};
-    size_t k;
     int wrong = 0;
-    for (k = 0; k < sizeof cases / sizeof *cases; k++) {
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         ssdgs__ply_token token;
         double value = 0;
         token.text = (const unsigned char *)cases[k].text;
@@ -805,13 +785,13 @@ static void test_numbers(void) {
         printf("%s gives %08x\n", cases[k].text, (unsigned)ssdgs__ply_bits(value));
         wrong++;
     }
-    for (k = 0; k < 100000; k++) { /* nine digits tell every float */
+    for (size_t k = 0; k < 100000; k++) { /* nine digits tell every float */
         const uint32_t want = random_bits() ^ random_bits() << 16;
-        char digits[40];
-        ssdgs__ply_token token;
         double value = 0;
         if ((want & 0x7f800000u) == 0x7f800000u || !(want & 0x7f800000u)) continue;
+        char digits[40];
         sprintf(digits, k % 2 ? "%.9g" : "%.17g", (double)from_bits(want));
+        ssdgs__ply_token token;
         token.text = (const unsigned char *)digits;
         token.length = strlen(digits);
         wrong += !ssdgs__ply_number(token, &value) || ssdgs__ply_bits(value) != want;
@@ -866,18 +846,17 @@ static void test_hostile(void) {
         "ply\nformat ascii 1.0\nelement face 1\nproperty list int int x\nend_header\n3 1 2\n",
         START "element vertex 18446744073709551615\nend_header\n"};
     bytes b = {NULL, 0, 0};
-    char line[64];
-    size_t k;
-    int i;
-    for (k = 0; k < sizeof attacks / sizeof *attacks; k++) {
+    for (size_t k = 0; k < sizeof attacks / sizeof *attacks; k++) {
         CHECK(refused_text(attacks[k]));
         if (!refused_text(attacks[k])) printf("accepted: %s\n", attacks[k]);
     }
-    for (i = 0; i < 2; i++) { /* too many properties, elements */
+    char line[64];
+    for (int i = 0; i < 2; i++) { /* too many properties, elements */
         b.size = 0;
         text(&b, START "element vertex 0\n");
-        for (k = 0; k < 1100 && i == 0; k++) sprintf(line, "property float p%d\n", (int)k), text(&b, line);
-        for (k = 0; k < 70 && i == 1; k++) sprintf(line, "element e%d 0\n", (int)k), text(&b, line);
+        for (size_t k = 0; k < 1100 && i == 0; k++)
+            sprintf(line, "property float p%d\n", (int)k), text(&b, line);
+        for (size_t k = 0; k < 70 && i == 1; k++) sprintf(line, "element e%d 0\n", (int)k), text(&b, line);
         text(&b, "\nend_header\n");
         CHECK(refused(b.data, b.size));
     }
@@ -886,20 +865,20 @@ static void test_hostile(void) {
 
 /* Every truncation is refused; no damaged byte does harm. */
 static void test_damage(void) {
-    ssdgs_model *model = make_model(2), *back;
-    bytes file = saved(model), other;
+    ssdgs_model *model = make_model(2);
+    bytes file = saved(model);
     document d = parse(&file);
     variant v = {ASCII, "\r\n", 0, 1, 1, NULL};
     const long live = memory.live;
-    int format, bad = 0;
-    size_t k;
-    for (k = 0; k < file.size; k++) bad += !refused(file.data, k);
+    int bad = 0;
+    for (size_t k = 0; k < file.size; k++) bad += !refused(file.data, k);
     CHECK(bad == 0);
-    for (format = ASCII; format <= BIG; format++) {
+    for (int format = ASCII; format <= BIG; format++) {
         v.format = format;
-        other = emit(&d, &v);
-        for (k = 0; k < other.size; k++) {
+        bytes other = emit(&d, &v);
+        for (size_t k = 0; k < other.size; k++) {
             const unsigned char good = other.data[k];
+            ssdgs_model *back;
             const ssdgs_result cut = load(other.data, k, &back, NULL);
             ssdgs_model_destroy(back);
             bad += format == ASCII ? k + 20 < other.size && cut == SSDGS_OK : cut == SSDGS_OK;
@@ -932,19 +911,17 @@ static void test_memory(void) {
     ssdgs_model *model = make_model(10), *back;
     bytes file = saved(model);
     const long live = memory.live;
-    int what;
-    for (what = 0; what < 6;
+    for (int what = 0; what < 6;
          what++) { /* load from memory, from a file, save; one failure, failing from then on */
         int n, done = 0;
         for (n = 1; n < 100 && !done; n++) {
-            ssdgs_result result;
             back = NULL;
             memory.calls = 0;
             memory.fail_at = n;
             memory.for_ever = what % 2;
-            result = what / 2 == 0   ? load(file.data, file.size, &back, NULL)
-                     : what / 2 == 1 ? ssdgs_model_load(context, path, &back, NULL)
-                                     : ssdgs_model_save(model, path);
+            const ssdgs_result result = what / 2 == 0   ? load(file.data, file.size, &back, NULL)
+                                        : what / 2 == 1 ? ssdgs_model_load(context, path, &back, NULL)
+                                                        : ssdgs_model_save(model, path);
             memory.fail_at = 0;
             done = memory.calls < n;
             CHECK(done ? result == SSDGS_OK && (what / 2 == 2 || same(model, back))
@@ -977,13 +954,13 @@ static void test_disk(void) {
     CHECK(ssdgs_model_load_memory(context, NULL, 0, &back, NULL) == SSDGS_ERR_ARGUMENT);
 #ifndef _WIN32
     {
-        struct rlimit limit, tight;
         mkdir("build/t_ply.folder", 0777);
         CHECK(ssdgs_model_save(model, "build/t_ply.folder") == SSDGS_ERR_IO); /* the rename fails */
         rmdir("build/t_ply.folder");
         signal(SIGXFSZ, SIG_IGN); /* a disk that is full after 100,000 bytes */
+        struct rlimit limit;
         getrlimit(RLIMIT_FSIZE, &limit);
-        tight = limit;
+        struct rlimit tight = limit;
         tight.rlim_cur = 100000;
         setrlimit(RLIMIT_FSIZE, &tight);
         CHECK(ssdgs_model_save(model, path) == SSDGS_ERR_IO);
@@ -1002,10 +979,9 @@ static void test_disk(void) {
 static double mean_step(ssdgs_model *model) {
     const ssdgs_model_view view = ssdgs_model_arrays(model);
     double sum = 0;
-    int i, c;
-    for (i = 1; i < view.count; i++) {
+    for (int i = 1; i < view.count; i++) {
         double step2 = 0;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             const ssdgs_real *x = view.gaussians + (size_t)c * view.stride + (size_t)i;
             step2 += ((double)x[0] - (double)x[-1]) * ((double)x[0] - (double)x[-1]);
         }
@@ -1017,8 +993,9 @@ static double mean_step(ssdgs_model *model) {
 /* How many Gaussians of b are Gaussian i of a, in every channel. */
 static int found(ssdgs_model *a, int i, ssdgs_model *b) {
     const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
-    int j, channel, count = 0;
-    for (j = 0; j < v.count; j++) {
+    int count = 0;
+    for (int j = 0; j < v.count; j++) {
+        int channel;
         for (channel = 0; channel < SSDGS_CHANNELS; channel++)
             if (u.gaussians[(size_t)channel * u.stride + (size_t)i] !=
                 v.gaussians[(size_t)channel * v.stride + (size_t)j])
@@ -1035,10 +1012,10 @@ static void test_order(void) {
     ssdgs_model *model = make_model(MANY), *back = NULL, *again = NULL, *small = make_model(FEW);
     ssdgs_load_stats stats;
     bytes file = saved(model);
-    int i, once = 0;
+    int once = 0;
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && stats.sorted == 1 &&
           same_globals(model, back));
-    for (i = 0; i < MANY; i++) once += found(model, i, back) == 1;
+    for (int i = 0; i < MANY; i++) once += found(model, i, back) == 1;
     CHECK(once == MANY && ssdgs_model_arrays(back).count == MANY &&
           mean_step(back) < 0.25 * mean_step(model));
     free(file.data);
@@ -1062,7 +1039,7 @@ static void test_order(void) {
     free(file.data);
     ssdgs_model_destroy(model);
     model = make_model(MANY);
-    for (i = 0; i < MANY; i++)
+    for (int i = 0; i < MANY; i++)
         model->gaussians[i] +=
             (ssdgs_real)(100 * (4 * i / MANY)); /* four objects far apart, each in no order */
     file = saved(model);

@@ -131,9 +131,8 @@ static void check_ranges(const field *f, size_t count, void *options, ssdgs_resu
                                           : -1e-3;
         const double values[5] = {f->low, f->high, below, f->real ? f->high * 1.01 : f->high + 1,
                                   f->real ? (double)NAN : f->low - 1};
-        int i;
         memcpy(kept, at, sizeof kept);
-        for (i = 0; i < 5; i++) {
+        for (int i = 0; i < 5; i++) {
             const ssdgs_real real = (ssdgs_real)values[i];
             const int whole = f->real ? 0 : (int)values[i];
             if (f->real) memcpy(at, &real, sizeof real);
@@ -149,9 +148,8 @@ static void check_ranges(const field *f, size_t count, void *options, ssdgs_resu
 }
 
 static void test_bounds(void) {
-    int i, k;
-    for (i = 0; i < 3; i++)
-        for (k = 0; k < 4; k++) {
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 4; k++) {
             const ssdgs_train_options kept = train_options;
             if (k == 0) train_options.bounds_min[i] = train_options.bounds_max[i];
             if (k == 1) train_options.bounds_min[i] = (ssdgs_real)NAN;
@@ -161,9 +159,9 @@ static void test_bounds(void) {
                   strstr(ssdgs_error_message(context), k < 3 ? "bounds_min" : "background"));
             train_options = kept;
         }
-    for (k = 0; k < 4; k++) { /* lengths that a model's file could not hold */
+    for (int k = 0; k < 4; k++) { /* lengths that a model's file could not hold */
         const ssdgs_train_options kept = train_options;
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             train_options.bounds_min[i] = 0;
             train_options.bounds_max[i] = (ssdgs_real)(k == 0   ? 1e-15
                                                        : k == 1 ? 3e-15
@@ -192,11 +190,9 @@ static void test_messages(void) {
     ssdgs_settings wrong = settings;
     ssdgs_light light = photo.light;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_metrics metrics;
     const ssdgs_image image = picture();
     const int numbers[2] = {2, 7}; /* of no format, no kind */
-    int i;
-    for (i = 0; i < 3; i++) shots[i] = photo;
+    for (int i = 0; i < 3; i++) shots[i] = photo;
     shots[2].camera.view[3] = (ssdgs_real)NAN;
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer),
          "photograph 2: camera: view[3] is not finite");
@@ -206,6 +202,7 @@ static void test_messages(void) {
     shots[1] = photo;
     shots[1].pixels = NULL;
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: it has no pixels");
+    ssdgs_metrics metrics;
     SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics),
          "photograph: it has no pixels");
     shots[1] = photo;
@@ -218,8 +215,7 @@ static void test_messages(void) {
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
     SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "ssdgs_compare: reference is NULL");
     options.densify_every = 0;
-    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer),
-         "densify_every = 0 is not within 1 .. ");
+    SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "densify_every = 0 is not within 1 .. ");
     options = train_options;
     options.dssim = (ssdgs_real)-1.5e20;
     SAYS(ssdgs_trainer_create(model, &photo, 1, &options, &trainer), "dssim = -1.5e20 is");
@@ -248,7 +244,6 @@ static void test_missing(void) {
     ssdgs_light light = photo.light;
     ssdgs_model *made = model;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_metrics metrics;
     ssdgs_image narrow = image;
     ssdgs_photo bad = photo;
     MISSING(ssdgs_context_create(NULL, NULL));
@@ -279,6 +274,7 @@ static void test_missing(void) {
     MISSING(ssdgs_render(model, &camera, NULL, 1, &image));
     narrow.stride = camera.width - 1;
     MISSING(ssdgs_render(model, &camera, &light, 1, &narrow));
+    ssdgs_metrics metrics;
     MISSING(ssdgs_compare(NULL, color, color, 4, 4, &metrics));
     MISSING(ssdgs_compare(context, NULL, color, 4, 4, &metrics));
     MISSING(ssdgs_compare(context, color, NULL, 4, 4, &metrics));
@@ -343,8 +339,7 @@ static void test_missing(void) {
 /* The transfer curve leaves alone what is no number. */
 static void test_curve(void) {
     const ssdgs_real values[3] = {(ssdgs_real)NAN, (ssdgs_real)INFINITY, (ssdgs_real)-INFINITY};
-    int i;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         const ssdgs_real encoded = ssdgs_srgb_encode(values[i]), decoded = ssdgs_srgb_decode(values[i]);
         CHECK(!memcmp(&encoded, values + i, sizeof encoded) && !memcmp(&decoded, values + i, sizeof decoded));
     }
@@ -372,8 +367,9 @@ static void test_gaussian(void) {
                {offsetof(ssdgs_gaussian, material), NAN, "material"}};
     const double tolerance = sizeof(ssdgs_real) == 4 ? 2e-6 : 1e-12;
     ssdgs_model *two = NULL;
-    ssdgs_gaussian g = ssdgs_gaussian_default(), back, again;
+    ssdgs_gaussian g = ssdgs_gaussian_default();
     CHECK(!ssdgs_model_create(context, NULL, 2, &two));
+    ssdgs_gaussian back;
     CHECK(!ssdgs_model_get(two, 1, &back) &&
           !memcmp(&g, &back, sizeof g)); /* a new model's are the default's */
     ssdgs_model_view v = ssdgs_model_arrays(two);
@@ -396,6 +392,7 @@ static void test_gaussian(void) {
     const double w = RAW(SSDGS_FRAME), x = RAW(SSDGS_FRAME + 1), y = RAW(SSDGS_FRAME + 2);
     const double turned[4] = {0.8 * w, 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x, 0.6 * w};
     for (size_t i = 0; i < 4; i++) v.gaussians[(SSDGS_FRAME + i) * v.stride + 1] = (ssdgs_real)turned[i];
+    ssdgs_gaussian again;
     CHECK(!ssdgs_model_get(two, 1, &again));
     CHECK_NEAR(again.normal, back.normal, 3, tolerance, 0, "turned about its normal");
     CHECK(!ssdgs_model_set(two, 1, &again) && RAW(SSDGS_FRAME + 3) == (double)(ssdgs_real)turned[3]);

@@ -44,10 +44,9 @@ static int full;
 static uint64_t fnv(uint64_t hash, const void *words, size_t size) {
     const unsigned char *at = (const unsigned char *)words;
     uint32_t word;
-    int k;
     for (; size >= sizeof word; size -= sizeof word, at += sizeof word) {
         memcpy(&word, at, sizeof word);
-        for (k = 0; k < 4; k++) hash = (hash ^ (word >> 8 * k & 255)) * UINT64_C(0x100000001B3);
+        for (int k = 0; k < 4; k++) hash = (hash ^ (word >> 8 * k & 255)) * UINT64_C(0x100000001B3);
     }
     return hash;
 }
@@ -55,8 +54,7 @@ static uint64_t fnv(uint64_t hash, const void *words, size_t size) {
 static uint64_t hash_model(ssdgs_model *model) {
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     uint64_t hash = fnv(FNV_START, &v.count, sizeof v.count);
-    size_t c;
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
         hash = fnv(hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     return fnv(hash, model->globals, model->global_count * sizeof(ssdgs_real));
 }
@@ -65,13 +63,12 @@ static uint64_t hash_model(ssdgs_model *model) {
 static double largest_parameter(ssdgs_model *model) {
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     double most = 0;
-    size_t c, i;
-    for (c = 0; c < SSDGS_CHANNELS; c++)
-        for (i = 0; i < (size_t)v.count; i++) {
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+        for (size_t i = 0; i < (size_t)v.count; i++) {
             const double x = fabs((double)v.gaussians[c * v.stride + i]);
             most = test_finite(x) ? x > most ? x : most : HUGE_VAL;
         }
-    for (i = 0; i < model->global_count; i++) {
+    for (size_t i = 0; i < model->global_count; i++) {
         const double x = fabs((double)model->globals[i]);
         most = test_finite(x) ? x > most ? x : most : HUGE_VAL;
     }
@@ -96,9 +93,8 @@ static void *metered_allocate(void *user, size_t bytes) {
 }
 
 static void metered_release(void *user, void *memory) {
-    size_t *block;
     if (!memory) return;
-    block = (size_t *)(void *)((char *)memory - 64);
+    size_t *block = (size_t *)(void *)((char *)memory - 64);
     ((meter *)user)->live -= *block;
     free(block);
 }
@@ -122,12 +118,10 @@ static ssdgs_context *new_context(int isa, int threads, meter *m, const ssdgs_gp
 /* A cloud of coloured Gaussians: what the photographs show. */
 static ssdgs_model *new_truth(ssdgs_context *context) {
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    int i, c;
     if (!CHECK(!ssdgs_model_create(context, NULL, TRUTH, &model))) exit(1);
-    v = ssdgs_model_arrays(model);
-    for (i = 0; i < TRUTH; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) {
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (int i = 0; i < TRUTH; i++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++) {
             const double u = 2 * ssdgs__uniform(11, (uint64_t)(64 * i + c)) - 1;
             const int scale = c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY;
             v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(c < 3                ? 0.35 * u
@@ -135,9 +129,9 @@ static ssdgs_model *new_truth(ssdgs_context *context) {
                                                                          : c == SSDGS_OPACITY ? 2 + u
                                                                                               : u);
         }
-    for (i = 0; i < (int)v.scattering_count; i++) /* networks that have something to say */
+    for (int i = 0; i < (int)v.scattering_count; i++) /* networks that have something to say */
         v.scattering[i] += (ssdgs_real)(0.2 * ssdgs__uniform(12, (uint64_t)i) - 0.1);
-    for (i = 0; i < (int)v.shadow_count; i++)
+    for (int i = 0; i < (int)v.shadow_count; i++)
         v.shadow[i] += (ssdgs_real)(0.2 * ssdgs__uniform(13, (uint64_t)i) - 0.1);
     return model;
 }
@@ -150,15 +144,14 @@ static void make_photos(int side) {
     ssdgs_context *context = new_context(SSDGS_ISA_SCALAR, 1, NULL, NULL);
     ssdgs_model *truth = new_truth(context);
     ssdgs_image image;
-    int i, j, c;
     memset(&image, 0, sizeof image);
     image.color = color;
     image.alpha = alpha;
     memset(photos, 0, sizeof photos);
-    for (i = 0; i < PHOTOS; i++) {
+    for (int i = 0; i < PHOTOS; i++) {
         const double angle = 6.283185307179586 * i / PHOTOS;
         ssdgs_real eye[3];
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             eye[c] = (ssdgs_real)(c == 0 ? 2 * cos(angle) : c == 1 ? 2 * sin(angle) : i % 2 - 0.3);
             photos[i].light.position[c] = (ssdgs_real)(c == 0   ? 2 * cos(angle + 0.8)
                                                        : c == 1 ? 2 * sin(angle + 0.8)
@@ -169,8 +162,8 @@ static void make_photos(int side) {
         photos[i].pixels = pixels[i];
         photos[i].format = SSDGS_PIXELS_RGBA16;
         CHECK(!ssdgs_render_ex(truth, &photos[i].camera, &photos[i].light, 1, &exact, &image, NULL));
-        for (j = 0; j < side * side; j++)
-            for (c = 0; c < 4; c++) {
+        for (int j = 0; j < side * side; j++)
+            for (int c = 0; c < 4; c++) {
                 const ssdgs_real a = alpha[j] > (ssdgs_real)1e-4 ? alpha[j] : (ssdgs_real)1e-4;
                 const ssdgs_real x = c == 3 ? alpha[j] : ssdgs_srgb_encode(color[3 * j + c] / a);
                 pixels[i][4 * j + c] = (uint16_t)(65535 * (x < 1 ? (double)x : 1) + 0.5);
@@ -223,9 +216,9 @@ static void finish(training *t) {
 /* Steps that must succeed with a finite loss; the last one's statistics. */
 static ssdgs_train_stats steps(training *t, int count) {
     ssdgs_train_stats stats;
-    int i, good = 0;
+    int good = 0;
     memset(&stats, 0, sizeof stats);
-    for (i = 0; i < count; i++)
+    for (int i = 0; i < count; i++)
         good += !ssdgs_trainer_step(t->trainer, &stats) && test_finite(stats.loss) && test_finite(stats.psnr);
     if (!CHECK(good == count))
         printf("    %d of %d steps: %s\n", good, count, ssdgs_error_message(t->context));
@@ -274,29 +267,27 @@ static uint64_t hash_trainer(const ssdgs_trainer *t) {
 static void row_54(void) {
     const double values[3] = {(double)NAN, HUGE_VAL, -HUGE_VAL};
     ssdgs_train_options o = short_run(12);
-    ssdgs_gpu_hook hook;
-    spoiler s;
     uint64_t after = 0, undisturbed = 0;
-    int group, i;
     make_photos(16);
     o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    ssdgs_gpu_hook hook;
     memset(&hook, 0, sizeof hook);
     hook.stage[SSDGS_STAGE_PROJECT_BACKWARD] = spoil_gradient;
+    spoiler s;
     hook.user = &s;
     memset(&s, 0, sizeof s);
-    for (group = -1; group < SPOILS; group++)
-        for (i = 0; i < (group < 0 || SLOW > 1 ? 1 : 3); i++) {
+    for (int group = -1; group < SPOILS; group++)
+        for (int i = 0; i < (group < 0 || SLOW > 1 ? 1 : 3); i++) {
             training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, &hook), NULL, NULL, &o, PHOTOS);
-            ssdgs_train_stats stats;
-            uint64_t before;
             s.group = group;
             s.value = (ssdgs_real)values[i];
             s.frame = 0;
             s.from = group < 0 ? 100 : 7; /* pose and light learn by then */
             s.until = s.from + 1;
             steps(&t, 7);
-            before = hash_trainer(t.trainer);
+            const uint64_t before = hash_trainer(t.trainer);
             if (group >= 0) {
+                ssdgs_train_stats stats;
                 const int refused = ssdgs_trainer_step(t.trainer, &stats) == SSDGS_ERR_NONFINITE;
                 if (!CHECK(refused && stats.skipped_steps == 1 && stats.iteration == 8 &&
                            hash_trainer(t.trainer) == before) ||
@@ -317,7 +308,7 @@ static void row_54(void) {
             finish(&t);
         }
     CHECK(after != undisturbed);
-    for (i = 9; i <= 10;
+    for (int i = 9; i <= 10;
          i++) { /* nine refusals in a row, a step and a tenth are got over, ten in a row end the run */
         training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, &hook), NULL, NULL, &o, PHOTOS);
         s.group = SSDGS__G_OPACITY;
@@ -336,14 +327,13 @@ static void row_54(void) {
 /* Mean SSIM of planes (3, h, w) in double: an 11x11 Gaussian window of sigma 1.5, black beyond the border. */
 static double ssim_oracle(const ssdgs_real *image, const ssdgs_real *reference, int w, int h) {
     double tap[11], norm = 0, total = 0;
-    int x, y, u, v, c;
-    for (u = 0; u < 11; u++) norm += tap[u] = exp(-(u - 5) * (u - 5) / 4.5);
-    for (c = 0; c < 3; c++)
-        for (y = 0; y < h; y++)
-            for (x = 0; x < w; x++) {
-                double e[5] = {0, 0, 0, 0, 0}, cov;
-                for (v = y - 5; v <= y + 5; v++)
-                    for (u = x - 5; u <= x + 5; u++) {
+    for (int u = 0; u < 11; u++) norm += tap[u] = exp(-(u - 5) * (u - 5) / 4.5);
+    for (int c = 0; c < 3; c++)
+        for (int y = 0; y < h; y++)
+            for (int x = 0; x < w; x++) {
+                double e[5] = {0, 0, 0, 0, 0};
+                for (int v = y - 5; v <= y + 5; v++)
+                    for (int u = x - 5; u <= x + 5; u++) {
                         const size_t at = (size_t)(c * w * h + v * w + u);
                         const double k = tap[u - x + 5] * tap[v - y + 5] / (norm * norm);
                         if (u < 0 || v < 0 || u >= w || v >= h) continue;
@@ -353,7 +343,7 @@ static double ssim_oracle(const ssdgs_real *image, const ssdgs_real *reference, 
                         e[3] += k * (double)reference[at] * (double)reference[at];
                         e[4] += k * (double)image[at] * (double)reference[at];
                     }
-                cov = e[4] - e[0] * e[1];
+                const double cov = e[4] - e[0] * e[1];
                 total +=
                     (2 * e[0] * e[1] + 1e-4) * (2 * cov + 9e-4) /
                     ((e[0] * e[0] + e[1] * e[1] + 1e-4) * (e[2] - e[0] * e[0] + e[3] - e[1] * e[1] + 9e-4));
@@ -371,35 +361,34 @@ static void row_55(void) {
     static unsigned char flat[16 * 16 * 4];
     static ssdgs_real image[3 * 16 * 16], reference[3 * 16 * 16], gradient[3 * 16 * 16];
     const ssdgs_train_options o = short_run(20);
-    int i, j, k;
-    for (i = 0; i < 8; i++) {
+    for (int i = 0; i < 8; i++) {
         const int w = cases[i].width, h = cases[i].height, n = 3 * w * h;
         ssdgs_context *context = new_context(SSDGS_ISA_AUTO, 2, NULL, NULL);
         ssdgs__buffer memory = {0, 0};
-        ssdgs__loss_values values;
-        ssdgs_train_stats first, last;
-        training t;
         make_photos(16);
-        for (j = 0; j < w * h * 4; j++) flat[j] = (unsigned char)(j % 4 == 3 ? cases[i].alpha : cases[i].rgb);
-        for (j = 0; j < PHOTOS; j++) {
+        for (int j = 0; j < w * h * 4; j++)
+            flat[j] = (unsigned char)(j % 4 == 3 ? cases[i].alpha : cases[i].rgb);
+        for (int j = 0; j < PHOTOS; j++) {
             ssdgs_camera *c = &photos[j].camera;
             c->cx = (ssdgs_real)0.5 * (ssdgs_real)(c->width = w);
             c->cy = (ssdgs_real)0.5 * (ssdgs_real)(c->height = h);
             photos[j].format = SSDGS_PIXELS_RGBA8;
             photos[j].pixels = flat;
         }
-        for (j = 0; j < n; j++) {
+        for (int j = 0; j < n; j++) {
             image[j] = (ssdgs_real)ssdgs__uniform(21, (uint64_t)(i * 1000 + j));
             reference[j] =
                 (ssdgs_real)(0.5 * (double)image[j] + 0.5 * ssdgs__uniform(22, (uint64_t)(i * 1000 + j)));
         }
+        ssdgs__loss_values values;
         CHECK(!ssdgs__loss(context, &memory, image, reference, w, h, (ssdgs_real)0.2, gradient, &values));
         ssdgs__release(context, memory.memory);
         CHECK(fabs(values.ssim - ssim_oracle(image, reference, w, h)) < 1e-6);
-        t = start(context, NULL, NULL, &o, PHOTOS);
-        first = steps(&t, 1);
-        last = steps(&t, 19);
+        training t = start(context, NULL, NULL, &o, PHOTOS);
+        const ssdgs_train_stats first = steps(&t, 1);
+        const ssdgs_train_stats last = steps(&t, 19);
         CHECK(ALL_FINITE(t.model) && last.skipped_steps == 0 && last.gaussians > 0);
+        int j, k;
         for (j = k = 0; j < PHOTOS; j++) { /* what shows nothing is darkened, what is white is not */
             ssdgs_metrics m;
             const ssdgs_real black[3] = {0, 0, 0};
@@ -419,20 +408,19 @@ static void row_56(void) {
     static ssdgs_real image[3 * LARGEST], gradient[3 * LARGEST];
     static const double constants[4] = {0, 0.6, 1, 100};
     double worst = 0, steepest = 0;
-    int isa, i, j;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (i = 0; i < 6; i++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
+        for (int i = 0; i < 6; i++) {
             ssdgs_context *context = new_context(isa, 1, NULL, NULL);
             ssdgs__buffer memory = {0, 0};
-            ssdgs__loss_values values;
             double here = 0;
             if (!context) continue;
-            for (j = 0; j < 3 * LARGEST; j++)
+            for (int j = 0; j < 3 * LARGEST; j++)
                 image[j] = (ssdgs_real)(i < 4    ? constants[i]
                                         : i == 4 ? ssdgs__uniform(31, (uint64_t)j)
                                                  : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
+            ssdgs__loss_values values;
             CHECK(!ssdgs__loss(context, &memory, image, image, SIDE, SIDE, 1, gradient, &values));
-            for (j = 0; j < 3 * LARGEST; j++)
+            for (int j = 0; j < 3 * LARGEST; j++)
                 here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
             here *= 3 * LARGEST;
             if (!CHECK(fabs(values.ssim - 1) < 1e-7) || !CHECK(here < (i == 3 ? 1e-2 : 6e-4)))
@@ -451,16 +439,14 @@ static void row_56(void) {
 /* One photograph; one camera under several lights; the scene's extent comes from its bounds then. */
 static void row_57(void) {
     ssdgs_train_options o = short_run(30);
-    int i, c;
     o.bounds_max[1] = (ssdgs_real)1.5;
-    for (i = 0; i < 3; i++) {
-        training t;
+    for (int i = 0; i < 3; i++) {
         make_photos(16);
-        for (c = 1; c < PHOTOS; c++) {
+        for (int c = 1; c < PHOTOS; c++) {
             if (i > 0) photos[c].camera = photos[0].camera, photos[c].pixels = photos[0].pixels;
             if (i == 2) photos[c].light = photos[0].light;
         }
-        t = start(new_context(SSDGS_ISA_AUTO, 2, NULL, NULL), NULL, NULL, &o, i ? PHOTOS : 1);
+        training t = start(new_context(SSDGS_ISA_AUTO, 2, NULL, NULL), NULL, NULL, &o, i ? PHOTOS : 1);
         CHECK(fabs(t.trainer->extent - 1.1 * 2) < 1e-6);
         steps(&t, 30);
         CHECK(ALL_FINITE(t.model) && t.trainer->skipped == 0);
@@ -471,11 +457,9 @@ static void row_57(void) {
 static void row_58(void) {
     static const int few[5] = {-1, 0, 1, 2, 3};
     ssdgs_train_options o = short_run(40);
-    training t;
-    ssdgs_model_view v;
-    int i, c;
     make_photos(16);
-    for (i = 0; i < 5; i++) {
+    training t;
+    for (int i = 0; i < 5; i++) {
         o.initial_points = few[i];
         if (few[i] > 0) {
             t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
@@ -496,9 +480,9 @@ static void row_58(void) {
     o.max_gaussians = 1100;
     t.context = new_context(SSDGS_ISA_AUTO, 2, NULL, NULL);
     CHECK(!ssdgs_model_create(t.context, NULL, 1000, &t.model));
-    v = ssdgs_model_arrays(t.model);
-    for (i = 0; i < 1000; i++)
-        for (c = 0; c < 3; c++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -2;
+    ssdgs_model_view v = ssdgs_model_arrays(t.model);
+    for (int i = 0; i < 1000; i++)
+        for (int c = 0; c < 3; c++) v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -2;
     t = start(t.context, t.model, NULL, &o, PHOTOS);
     steps(&t, 40);
     CHECK(t.model->count > 0 && t.model->count <= 1100 && ALL_FINITE(t.model));
@@ -508,24 +492,21 @@ static void row_58(void) {
 /* Everything densifies: the cap holds and so does the memory announced. All opacities gone: someone
    remains. */
 static void row_59(void) {
-    meter m;
     ssdgs_train_options o = short_run(full ? 400 : 120 / SLOW);
     ssdgs_settings settings = ssdgs_settings_default();
-    training t;
-    ssdgs_model_view v;
-    size_t announced;
     double worst = 0;
-    int i, side, most = 0;
-    for (side = 16; side <= SIDE; side += SIDE - 16) {
+    int most = 0;
+    for (int side = 16; side <= SIDE; side += SIDE - 16) {
+        meter m;
         memset(&m, 0, sizeof m);
         make_photos(side);
         o.densify_gradient = 0;
         o.densify_every = 3;
         o.initial_points = 20;
         o.max_gaussians = side > 16 ? 300 : full ? 3000 : 600;
-        announced = ssdgs_train_memory(&settings, &o, side, side);
-        t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
-        for (i = 0; i < o.iterations; i++) {
+        const size_t announced = ssdgs_train_memory(&settings, &o, side, side);
+        training t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
+        for (int i = 0; i < o.iterations; i++) {
             steps(&t, 1);
             most = t.model->count > most ? t.model->count : most;
             CHECK(t.model->count <= o.max_gaussians);
@@ -542,9 +523,9 @@ static void row_59(void) {
     }
     printf("figure train_memory_share %.2f\n", worst);
     o = short_run(40);
-    t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
-    v = ssdgs_model_arrays(t.model);
-    for (i = 0; i < v.count; i++) v.gaussians[(size_t)SSDGS_OPACITY * v.stride + (size_t)i] = -20;
+    training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
+    ssdgs_model_view v = ssdgs_model_arrays(t.model);
+    for (int i = 0; i < v.count; i++) v.gaussians[(size_t)SSDGS_OPACITY * v.stride + (size_t)i] = -20;
     steps(&t, 40);
     CHECK(t.model->count == 1 && ALL_FINITE(t.model));
     finish(&t);
@@ -556,15 +537,13 @@ static void row_60(void) {
     ssdgs_rate *const rates[12] = {&o.rates.position, &o.rates.opacity,    &o.rates.scale,  &o.rates.rotation,
                                    &o.rates.color,    &o.rates.asg,        &o.rates.frame,  &o.rates.material,
                                    &o.rates.shadow,   &o.rates.scattering, &o.rates.camera, &o.rates.light};
-    training t;
-    int i;
     make_photos(16);
     o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
-    for (i = 0; i < 12; i++) {
+    for (int i = 0; i < 12; i++) {
         rates[i]->start *= 100;
         rates[i]->end *= 100;
     }
-    t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
+    training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
     steps(&t, o.iterations);
     printf("    %d Gaussians, largest parameter %g\n", t.model->count, largest_parameter(t.model));
     CHECK(ALL_FINITE(t.model));
@@ -578,9 +557,6 @@ static void row_61(void) {
     ssdgs_train_options o = short_run(full ? 100000 : 2000 / SLOW);
     ssdgs_settings settings = ssdgs_settings_default();
     meter m;
-    training t;
-    size_t live, calls;
-    int i;
     memset(&m, 0, sizeof m);
     make_photos(16);
     settings.light_map_size = 64; /* else it grows as Gaussians shrink */
@@ -588,11 +564,11 @@ static void row_61(void) {
     o.densify_every = 100;
     o.opacity_reset_every = 700;
     o.densify_until = 60000;
-    t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
+    training t = start(new_context(SSDGS_ISA_AUTO, 1, &m, NULL), NULL, &settings, &o, PHOTOS);
     steps(&t, o.iterations / 4);
-    live = m.live;
-    for (i = 1; i < 4; i++) {
-        calls = m.calls;
+    const size_t live = m.live;
+    for (int i = 1; i < 4; i++) {
+        const size_t calls = m.calls;
         steps(&t, o.iterations / 4);
         CHECK(m.live <=
               live + live / 10); /* buffers still meet larger frames; 8 bytes a step would be more */
@@ -616,19 +592,15 @@ static void row_62(void) {
                    {SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | SSDGS_SCATTERING_TERM, 16e3}};
     ssdgs_train_options o = short_run(120);
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_real *globals, was[SSDGS_CHANNELS];
-    ssdgs_model_view v;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], last, i, c;
-    training t;
-    int phase, all, moved = 0;
+    int moved = 0;
     make_photos(16);
     o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
-    for (phase = 0; phase < 3; phase++) {
+    for (int phase = 0; phase < 3; phase++) {
         const int count = (int)(phases[phase].until / 60e3 * o.iterations);
         uint64_t hash[2];
-        for (all = 0; all < 2; all++) {
+        for (int all = 0; all < 2; all++) {
             settings.terms = all ? SSDGS_ALL_TERMS : phases[phase].terms;
-            t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
+            training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
             steps(&t, count);
             hash[all] = hash_model(t.model);
             steps(&t, 10); /* the next term joins, if there is one */
@@ -637,21 +609,24 @@ static void row_62(void) {
         }
         CHECK(hash[0] == hash[1]);
     }
-    for (i = 0; i < PHOTOS; i++) photos[i].light = photos[0].light; /* one light, neither gloss nor depth */
+    for (size_t i = 0; i < PHOTOS; i++)
+        photos[i].light = photos[0].light; /* one light, neither gloss nor depth */
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-    t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
-    globals = (ssdgs_real *)malloc(t.model->global_count * sizeof *globals);
+    training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, &settings, &o, PHOTOS);
+    ssdgs_real *globals = (ssdgs_real *)malloc(t.model->global_count * sizeof *globals);
     memcpy(globals, t.model->globals, t.model->global_count * sizeof *globals);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    ssdgs_real was[SSDGS_CHANNELS];
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
         was[c] = ssdgs_model_arrays(t.model).gaussians[c * t.model->capacity];
     steps(&t, o.iterations);
-    v = ssdgs_model_arrays(t.model);
-    for (c = SSDGS_SPECULAR; c < SSDGS_MATERIAL; c++) /* every Gaussian's start is the same */
-        for (i = 0; i < (size_t)v.count && (c < SSDGS_FRAME || c >= SSDGS_ASG_WEIGHT); i++)
+    ssdgs_model_view v = ssdgs_model_arrays(t.model);
+    for (size_t c = SSDGS_SPECULAR; c < SSDGS_MATERIAL; c++) /* every Gaussian's start is the same */
+        for (size_t i = 0; i < (size_t)v.count && (c < SSDGS_FRAME || c >= SSDGS_ASG_WEIGHT); i++)
             moved += c != SSDGS_ASG_WEIGHT + 3 && memcmp(v.gaussians + c * v.stride + i, &was[c],
                                                          sizeof was[c]) != 0; /* but shadows' softness */
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&t.model->settings, first);
-    last = first[SSDGS__SHADOW_NET];
+    const size_t last = first[SSDGS__SHADOW_NET];
     CHECK(moved == 0 && !memcmp(globals, t.model->globals, last * sizeof *globals));
     CHECK(memcmp(globals + last, t.model->globals + last, (t.model->global_count - last) * sizeof *globals));
     CHECK(ALL_FINITE(t.model));
@@ -664,15 +639,16 @@ static void row_62(void) {
 /* exp(K(w)) and its integral over the way there, sum of K^n / (n + 1)!: plain series. */
 static void exponential(const double w[3], double e[9], double integral[9]) {
     const double k[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
-    double term[9], next[9];
-    int i, j, l, n;
-    for (i = 0; i < 9; i++) e[i] = integral[i] = term[i] = i % 4 == 0;
-    for (n = 1; n < 60; n++) {
-        for (i = 0; i < 3; i++)
-            for (j = 0; j < 3; j++)
+    double term[9];
+    for (int i = 0; i < 9; i++) e[i] = integral[i] = term[i] = i % 4 == 0;
+    double next[9];
+    int l;
+    for (int n = 1; n < 60; n++) {
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
                 for (l = 0, next[3 * i + j] = 0; l < 3; l++)
                     next[3 * i + j] += term[3 * i + l] * k[3 * l + j] / n;
-        for (i = 0; i < 9; i++) {
+        for (int i = 0; i < 9; i++) {
             term[i] = next[i];
             e[i] += term[i];
             integral[i] += term[i] / (n + 1);
@@ -683,12 +659,11 @@ static void exponential(const double w[3], double e[9], double integral[9]) {
 /* sum of weight . corrected view, in double. */
 static double weighted_view(const ssdgs_photo *photo, const double value[9], const ssdgs_real weight[12]) {
     double e[9], integral[9], sum = 0;
-    int i, j, l;
     exponential(value + 3, e, integral);
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 4; j++) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++) {
             double x = j == 3 ? value[i] : 0;
-            for (l = 0; l < 3; l++) x += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
+            for (int l = 0; l < 3; l++) x += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
             sum += x * (double)weight[4 * i + j];
         }
     return sum;
@@ -702,32 +677,34 @@ static void row_63(void) {
         1, pi,     2 * pi - 1e-6, 2 * pi};
     ssdgs_train_options o = short_run(12);
     double worst = 0, slope = 0;
-    int a, axis, i;
     make_photos(16);
-    for (a = 0; a < 12; a++)
-        for (axis = 0; axis < 4; axis++) {
-            double value[9], e[9], jacobian[9], want[9], integral[9], d[6], scale = 0;
-            ssdgs_real weight[12];
-            for (i = 0; i < 9; i++)
+    for (int a = 0; a < 12; a++)
+        for (int axis = 0; axis < 4; axis++) {
+            double value[9], scale = 0;
+            for (int i = 0; i < 9; i++)
                 value[i] = i < 3 || i > 5 ? 0.1 * i
                            : axis == 3    ? ssdgs__uniform(41, (uint64_t)i) - 0.5
                                           : i - 3 == axis;
-            for (i = 3; i < 6; i++) scale += value[i] * value[i];
-            for (i = 3; i < 6; i++) value[i] *= angles[a] / sqrt(scale);
-            for (i = 0; i < 12; i++) weight[i] = (ssdgs_real)(ssdgs__uniform(42, (uint64_t)i) - 0.5);
+            for (int i = 3; i < 6; i++) scale += value[i] * value[i];
+            for (int i = 3; i < 6; i++) value[i] *= angles[a] / sqrt(scale);
+            ssdgs_real weight[12];
+            for (int i = 0; i < 12; i++) weight[i] = (ssdgs_real)(ssdgs__uniform(42, (uint64_t)i) - 0.5);
+            double e[9], jacobian[9];
             ssdgs__rotate_by(value + 3, e, jacobian);
+            double want[9], integral[9];
             exponential(value + 3, want, integral);
-            for (i = 0; i < 9; i++) {
+            for (int i = 0; i < 9; i++) {
                 worst = fabs(e[i] - want[i]) > worst ? fabs(e[i] - want[i]) : worst;
                 worst = fabs(jacobian[i] - integral[i]) > worst ? fabs(jacobian[i] - integral[i]) : worst;
                 if (!test_finite(e[i]) || !test_finite(jacobian[i])) worst = 1;
             }
+            double d[6];
             ssdgs__correct_backward(&photos[1], value, weight, d);
-            for (i = 0; i < 6; i++) { /* two central differences and Richardson */
-                double difference[2], moved[9];
-                int half;
-                for (half = 0; half < 2; half++) {
+            for (int i = 0; i < 6; i++) { /* two central differences and Richardson */
+                double difference[2];
+                for (int half = 0; half < 2; half++) {
                     const double h = half ? 1e-3 : 2e-3;
+                    double moved[9];
                     memcpy(moved, value, sizeof moved);
                     moved[i] += h;
                     difference[half] = weighted_view(&photos[1], moved, weight);
@@ -742,14 +719,13 @@ static void row_63(void) {
     printf("figure rotation_series_error %.2g\nfigure pose_gradient_error %.2g\n", worst, slope);
     CHECK(worst < 5e-14); /* rounding at two pi, and at the seam */
     CHECK(slope < 1e-10);
-    for (a = 9; a < 12; a++) { /* a pose turned that far: the trainer goes on, a whole turn is none */
-        ssdgs_camera camera;
-        ssdgs_light light;
-        training t;
+    for (int a = 9; a < 12; a++) { /* a pose turned that far: the trainer goes on, a whole turn is none */
         o.refine = SSDGS_REFINE_CAMERA;
         o.rates.position.start = o.rates.position.end = 0; /* or the scene would follow instead */
-        t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, 1);
+        training t = start(new_context(SSDGS_ISA_AUTO, 1, NULL, NULL), NULL, NULL, &o, 1);
         t.trainer->corrections[0].value[4] = angles[a];
+        ssdgs_camera camera;
+        ssdgs_light light;
         CHECK(!ssdgs_trainer_refined(t.trainer, 0, &camera, &light));
         if (a == 11) CHECK_NEAR(camera.view, photos[0].camera.view, 12, 1e-6, 0, "a whole turn is none");
         steps(&t, 12);
@@ -762,10 +738,9 @@ static void row_63(void) {
 static void pose_error(const ssdgs_camera *camera, const ssdgs_light *light, const ssdgs_photo *truth,
                        double error[3]) {
     double trace = 0, centre = 0, place = 0;
-    int i, j;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         double x = 0, d = (double)light->position[i] - (double)truth->light.position[i];
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             const double dr = (double)camera->view[4 * i + j] - (double)truth->camera.view[4 * i + j];
             x += (double)camera->view[4 * j + i] * (double)camera->view[4 * j + 3] -
                  (double)truth->camera.view[4 * j + i] * (double)truth->camera.view[4 * j + 3];
@@ -788,39 +763,37 @@ static void row_64(void) {
                                    &o.rates.color,    &o.rates.asg,       &o.rates.frame, &o.rates.material,
                                    &o.rates.shadow,   &o.rates.scattering};
     double before[3] = {0, 0, 0}, after[3] = {0, 0, 0};
-    training t;
-    uint64_t hash;
     const int count = full ? PHOTOS : 2;
-    int i, c;
     make_photos(SIDE);
     memcpy(truth, photos, sizeof truth);
-    for (i = 0; i < 10; i++)
+    for (int i = 0; i < 10; i++)
         rates[i]->start = rates[i]->end = 0; /* a moving model could take the disturbance over */
     without_density_control(&o);
     o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     o.rates.camera.start = o.rates.light.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         double value[9], length[3] = {0, 0, 0};
-        for (c = 0; c < 9; c++) {
+        for (int c = 0; c < 9; c++) {
             value[c] = ssdgs__uniform(51, (uint64_t)(9 * i + c)) - 0.5;
             length[c / 3] += value[c] * value[c];
         }
-        for (c = 0; c < 9; c++) value[c] *= 0.01 / sqrt(length[c / 3]);
+        for (int c = 0; c < 9; c++) value[c] *= 0.01 / sqrt(length[c / 3]);
         ssdgs__correct(&truth[i], value, &photos[i].camera, &photos[i].light);
         pose_error(&photos[i].camera, &photos[i].light, &truth[i], before);
     }
+    training t;
     t.context = new_context(SSDGS_ISA_AUTO, 2, NULL, NULL);
     t = start(t.context, new_truth(t.context), NULL, &o, count);
-    hash = hash_model(t.model);
+    const uint64_t hash = hash_model(t.model);
     steps(&t, o.iterations);
     CHECK(hash_model(t.model) == hash);
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         ssdgs_camera camera;
         ssdgs_light light;
         CHECK(!ssdgs_trainer_refined(t.trainer, i, &camera, &light));
         pose_error(&camera, &light, &truth[i], after);
     }
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         printf("figure %s %.3g\n", names[i], after[i] / before[i]);
         CHECK(i == 0 || fabs(before[i] / count - 0.01) < 1e-5);
         CHECK(after[i] < 0.003 * before[i]); /* measured: at most 0.0008 */
@@ -841,22 +814,20 @@ static hashes hash_all(ssdgs_context *context, const ssdgs_train_options *o, int
     const size_t side = (size_t)photos[0].camera.width, bytes = side * side * 3 * sizeof *color;
     ssdgs_model *truth = new_truth(context);
     ssdgs_image image;
-    ssdgs_frame frame;
-    ssdgs_train_stats stats;
-    training t;
-    hashes h;
     memset(&image, 0, sizeof image);
     image.color = color;
     CHECK(!ssdgs_render(truth, &photos[1].camera, &photos[2].light, 1, &image));
+    hashes h;
     h.render = fnv(FNV_START, color, bytes);
     truth->settings.transport = 1; /* the walk sums the flux too */
+    ssdgs_frame frame;
     CHECK(!ssdgs__frame_begin(&frame, truth, &photos[1].camera, &photos[3].light, 1, NULL, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     h.light = fnv(fnv(FNV_START, frame.visibility, TRUTH * sizeof(ssdgs_real)), frame.depth_cue,
                   TRUTH * sizeof(ssdgs_real));
     h.light = fnv(h.light, frame.flux, TRUTH * sizeof(ssdgs_real));
-    t = start(context, NULL, NULL, o, PHOTOS);
-    stats = steps(&t, count);
+    training t = start(context, NULL, NULL, o, PHOTOS);
+    const ssdgs_train_stats stats = steps(&t, count);
     h.training = hash_model(t.model);
     h.psnr = stats.psnr;
     ssdgs_trainer_destroy(t.trainer);
@@ -873,16 +844,16 @@ static int same_hashes(hashes a, hashes b) {
 static void row_66(void) {
     static const int threads[5] = {1, 2, 3, 7, 16};
     const ssdgs_train_options o = short_run(50);
-    hashes first[SSDGS_ISA_COUNT];
-    int known[SSDGS_ISA_COUNT], isa, other, i, groups = 0;
+    int groups = 0;
     make_photos(SIDE);
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    hashes first[SSDGS_ISA_COUNT];
+    int known[SSDGS_ISA_COUNT];
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         known[isa] = 0;
-        for (i = 0; i < 5; i++) {
+        for (int i = 0; i < 5; i++) {
             ssdgs_context *context = new_context(isa, threads[i], NULL, NULL);
-            hashes h;
             if (!context) break;
-            h = hash_all(context, &o, 50);
+            const hashes h = hash_all(context, &o, 50);
             if (i == 0) first[isa] = h;
             CHECK(same_hashes(h, first[isa]));
             ssdgs_context_destroy(context);
@@ -891,6 +862,7 @@ static void row_66(void) {
         if (!known[isa]) continue;
         printf("hash %s %016llx %016llx %016llx\n", NAME(isa), (unsigned long long)first[isa].render,
                (unsigned long long)first[isa].light, (unsigned long long)first[isa].training);
+        int other;
         for (other = SSDGS_ISA_SCALAR;
              other < isa && !(known[other] && same_hashes(first[isa], first[other])); other++) {}
         groups += other == isa;
@@ -933,19 +905,17 @@ static void row_67(void) {
     static ssdgs_real color[2][LARGEST * 3];
     ssdgs_image image;
     double worst[2] = {0, 0};
-    int isa, i, j;
     memset(&image, 0, sizeof image);
     make_photos(16);
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         ssdgs_context *context = new_context(isa, 3, NULL, NULL);
-        hashes h, plain;
         if (!context) continue;
-        plain = hash_all(context, &o, STEPS);
-        for (i = 0; CAN_FLUSH && i < 2; i++) {
+        hashes plain = hash_all(context, &o, STEPS);
+        for (int i = 0; CAN_FLUSH && i < 2; i++) {
             ssdgs_context *own = i ? context : NULL;
             set_flush(1);
             if (!own) own = new_context(isa, 3, NULL, NULL);
-            h = hash_all(own, &o, STEPS);
+            const hashes h = hash_all(own, &o, STEPS);
             set_flush(0);
             if (!CHECK(same_hashes(h, plain)))
                 printf("    %s, flushed: render %d, light %d, training %d\n", NAME(isa),
@@ -953,26 +923,25 @@ static void row_67(void) {
             if (!i) ssdgs_context_destroy(own);
         }
         ssdgs_context_destroy(context);
-        for (i = (int)(sizeof modes / sizeof *modes) - 1; i >= 0; i--) {
+        for (int i = (int)(sizeof modes / sizeof *modes) - 1; i >= 0; i--) {
             /* these two round as the mode says inside exp and sin, too: half a step outside of their
                polynomials' range; without transport, which takes the 16th power of that (5.2e-3 with it) */
             const int nearest = modes[i].mode == FE_TONEAREST,
                       follows = isa == SSDGS_ISA_SCALAR || isa == SSDGS_ISA_SSE2;
             double most = 0;
-            ssdgs_model *truth;
-            int sizes[SSDGS_MAX_LAYERS + 1];
             if (fesetround(modes[i].mode)) continue;
             context = new_context(isa, 2, NULL, NULL);
-            truth = new_truth(context);
+            ssdgs_model *truth = new_truth(context);
+            int sizes[SSDGS_MAX_LAYERS + 1];
             ssdgs__network_sizes(&truth->settings, 0, sizes);
-            for (j = 0; follows && j < sizes[1]; j++)
+            for (int j = 0; follows && j < sizes[1]; j++)
                 memset(ssdgs_model_arrays(truth).scattering + (j + 1) * sizes[0] - SSDGS__LENGTHS, 0,
                        SSDGS__LENGTHS * sizeof(ssdgs_real));
             image.color = color[!nearest];
             CHECK(!ssdgs_render(truth, &photos[1].camera, &photos[2].light, 1, &image));
-            h = hash_all(context, &o, STEPS);
+            hashes h = hash_all(context, &o, STEPS);
             fesetround(FE_TONEAREST);
-            for (j = 0; j < 16 * 16 * 3; j++) {
+            for (int j = 0; j < 16 * 16 * 3; j++) {
                 const double d = fabs((double)color[!nearest][j] - (double)color[0][j]);
                 most = test_finite(d) ? d > most ? d : most : HUGE_VAL;
             }
@@ -990,11 +959,11 @@ static void row_67(void) {
 
 /* Bytes of a file; 0 when it cannot be read. */
 static uint64_t hash_file(const char *path) {
-    unsigned char bytes[4096];
     uint64_t hash = FNV_START;
-    size_t n;
     FILE *f = fopen(path, "rb");
     if (!f) return 0;
+    unsigned char bytes[4096];
+    size_t n;
     while ((n = fread(bytes, 1, sizeof bytes, f)) > 0) hash = fnv(hash, bytes, n);
     fclose(f);
     return hash;
@@ -1014,16 +983,14 @@ static void row_68(void) {
         "0.25 -1.5e-1 2.125 0.5 -2.75 -3 -3.5 0.5 0.5 -0.5 0.5 0.5 0.25 0.75\n";
     static const char *const paths[2] = {"build/t_soak.ply", "build/t_soak.ckpt"};
     const ssdgs_train_options o = short_run(12);
-    uint64_t hash[2][3];
-    int round, comma = 0, i;
+    int comma = 0;
     make_photos(16);
-    for (round = 0; round < 2; round++) {
-        training t;
+    uint64_t hash[2][3];
+    for (int round = 0; round < 2; round++) {
         ssdgs_model *loaded = NULL;
-        ssdgs_model_view v;
-        for (i = 0; round && !comma && i < (int)(sizeof locales / sizeof *locales); i++)
+        for (int i = 0; round && !comma && i < (int)(sizeof locales / sizeof *locales); i++)
             comma = setlocale(LC_ALL, locales[i]) && *localeconv()->decimal_point == ',';
-        t = start(new_context(SSDGS_ISA_SCALAR, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
+        training t = start(new_context(SSDGS_ISA_SCALAR, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
         steps(&t, 5);
         CHECK(!ssdgs_model_save(t.model, paths[0]) && !ssdgs_trainer_save(t.trainer, paths[1]));
         steps(&t, 3);
@@ -1034,7 +1001,7 @@ static void row_68(void) {
         hash[round][1] = hash_file(paths[1]);
         ssdgs_model_destroy(loaded);
         CHECK(!ssdgs_model_load_memory(t.context, ascii, sizeof ascii - 1, &loaded, NULL));
-        v = ssdgs_model_arrays(loaded);
+        const ssdgs_model_view v = ssdgs_model_arrays(loaded);
         CHECK(fabs((double)v.gaussians[0] - 0.25) < 1e-7 &&
               fabs((double)v.gaussians[v.stride] + 0.15) < 1e-7);
         CHECK(fabs((double)v.gaussians[SSDGS_LOG_SCALE * v.stride] + 2.75) < 1e-7);
@@ -1069,22 +1036,21 @@ static void *run_job(void *data) {
 static void row_69(void) {
 #if POSIX_THREADS
     enum { SIDE_BY_SIDE = 3 };
+    make_photos(16);
     job jobs[SIDE_BY_SIDE];
     hashes alone[SIDE_BY_SIDE];
-    pthread_t threads[SIDE_BY_SIDE];
-    int i;
-    make_photos(16);
-    for (i = 0; i < SIDE_BY_SIDE; i++) {
+    for (int i = 0; i < SIDE_BY_SIDE; i++) {
         jobs[i].threads = i + 1;
         jobs[i].seed = i % 2 + 1;
         run_job(&jobs[i]);
         alone[i] = jobs[i].result;
         memset(&jobs[i].result, 0, sizeof jobs[i].result);
     }
-    for (i = 0; i < SIDE_BY_SIDE; i++)
+    pthread_t threads[SIDE_BY_SIDE];
+    for (int i = 0; i < SIDE_BY_SIDE; i++)
         if (!CHECK(!pthread_create(&threads[i], NULL, run_job, &jobs[i]))) exit(1);
-    for (i = 0; i < SIDE_BY_SIDE; i++) CHECK(!pthread_join(threads[i], NULL));
-    for (i = 0; i < SIDE_BY_SIDE; i++) CHECK(same_hashes(jobs[i].result, alone[i]));
+    for (int i = 0; i < SIDE_BY_SIDE; i++) CHECK(!pthread_join(threads[i], NULL));
+    for (int i = 0; i < SIDE_BY_SIDE; i++) CHECK(same_hashes(jobs[i].result, alone[i]));
     CHECK(alone[0].training != alone[1].training && alone[0].training == alone[2].training);
 #endif
 }
@@ -1109,9 +1075,8 @@ int main(int argc, char **argv) {
                 {"68", "decimal comma", row_68},
                 {"69", "contexts side by side", row_69}};
     const int count = (int)(sizeof rows / sizeof *rows);
-    int i;
     full = argc > 1 && !strcmp(argv[1], "full");
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         if (argc > 2 && strcmp(argv[2], rows[i].number)) continue;
         TEST_ROW(rows[i].number, rows[i].name, rows[i].run());
     }

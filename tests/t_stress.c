@@ -111,8 +111,8 @@ static void put(ssdgs_model *model, int gaussian, double x, double y, double z, 
 static ssdgs_model *cloud(ssdgs_settings settings, int count) {
     ssdgs_model *model = make(settings, count);
     const ssdgs_model_view v = ssdgs_model_arrays(model);
-    int i, k;
-    for (i = 0; i < count; i++) {
+    int k;
+    for (int i = 0; i < count; i++) {
         double x[3], r2 = 2;
         uint64_t n = (uint64_t)i * 4096;
         while (r2 > 1)
@@ -142,12 +142,11 @@ static ssdgs_camera ahead(void) {
 
 static ssdgs_light lamp(double x, double y, double z, double power) {
     ssdgs_light light;
-    int k;
     memset(&light, 0, sizeof light);
     light.position[0] = (ssdgs_real)x;
     light.position[1] = (ssdgs_real)y;
     light.position[2] = (ssdgs_real)z;
-    for (k = 0; k < 3; k++) light.intensity[k] = (ssdgs_real)(power * (k + 1));
+    for (int k = 0; k < 3; k++) light.intensity[k] = (ssdgs_real)(power * (k + 1));
     return light;
 }
 
@@ -160,28 +159,27 @@ static void turn(const double q[4], ssdgs_model *model, ssdgs_camera *camera, ss
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     const ssdgs_camera was = *camera;
     double p[4];
-    int i, j, k, f;
-    for (i = -1; i < v.count; i++) {
+    for (int i = -1; i < v.count; i++) {
         ssdgs_real *at = i < 0 ? light->position : v.gaussians + i;
         const size_t step = i < 0 ? 1 : v.stride;
-        for (k = 0; k < 3; k++) p[k] = (double)at[(size_t)k * step] - centre[k];
-        for (k = 0; k < 3; k++)
+        for (int k = 0; k < 3; k++) p[k] = (double)at[(size_t)k * step] - centre[k];
+        for (int k = 0; k < 3; k++)
             at[(size_t)k * step] =
                 (ssdgs_real)(centre[k] + m[3 * k] * p[0] + m[3 * k + 1] * p[1] + m[3 * k + 2] * p[2]);
-        for (f = 0; i >= 0 && f < 2; f++) {
+        for (int f = 0; i >= 0 && f < 2; f++) {
             at = v.gaussians + (size_t)(f ? SSDGS_FRAME : SSDGS_ROTATION) * step + i;
-            for (k = 0; k < 4; k++) p[k] = (double)at[(size_t)k * step];
+            for (int k = 0; k < 4; k++) p[k] = (double)at[(size_t)k * step];
             at[0] = (ssdgs_real)(w * p[0] - x * p[1] - y * p[2] - z * p[3]);
             at[step] = (ssdgs_real)(w * p[1] + x * p[0] + y * p[3] - z * p[2]);
             at[2 * step] = (ssdgs_real)(w * p[2] - x * p[3] + y * p[0] + z * p[1]);
             at[3 * step] = (ssdgs_real)(w * p[3] + x * p[2] - y * p[1] + z * p[0]);
         }
     }
-    for (i = 0; i < 3; i++) { /* R' = R M^T, t' = t + R c - R' c */
+    for (int i = 0; i < 3; i++) { /* R' = R M^T, t' = t + R c - R' c */
         double t = (double)was.view[4 * i + 3];
-        for (j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++) {
             double r = 0;
-            for (k = 0; k < 3; k++) r += (double)was.view[4 * i + k] * m[3 * j + k];
+            for (int k = 0; k < 3; k++) r += (double)was.view[4 * i + k] * m[3 * j + k];
             camera->view[4 * i + j] = (ssdgs_real)r;
             t += ((double)was.view[4 * i + j] - r) * centre[j];
         }
@@ -212,11 +210,11 @@ static ssdgs_result shoot(ssdgs_model *model, const ssdgs_camera *camera, const 
 static const picture *show(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
                            int count, const ssdgs_render_options *options, picture *out) {
     const ssdgs_result result = shoot(model, camera, lights, count, options, out);
-    uint32_t bits;
-    int i, finite = 1;
+    int finite = 1;
     if (!CHECK(!result)) printf("    %s\n", ssdgs_error_message(context));
-    for (i = 0; i < PLANES; i++) {
+    for (int i = 0; i < PLANES; i++) {
         const float value = (float)((const ssdgs_real *)(const void *)out)[i]; /* all planes in a row */
+        uint32_t bits;
         memcpy(&bits, &value, 4);
         digest = (digest ^ bits) * UINT64_C(0x9E3779B97F4A7C15);
         digest ^= digest >> 32;
@@ -238,16 +236,14 @@ static int same(const picture *p, const picture *q) { return !memcmp(p, q, offse
 
 static double distance(const ssdgs_real *p, const ssdgs_real *q, int count) { /* the largest difference */
     double worst = 0;
-    int i;
-    for (i = 0; i < count; i++)
+    for (int i = 0; i < count; i++)
         worst = fabs((double)p[i] - (double)q[i]) > worst ? fabs((double)p[i] - (double)q[i]) : worst;
     return worst;
 }
 
 static double total(const ssdgs_real *plane) {
     double sum = 0;
-    int i;
-    for (i = 0; i < PIXELS; i++) sum += (double)plane[i];
+    for (int i = 0; i < PIXELS; i++) sum += (double)plane[i];
     return sum;
 }
 
@@ -260,9 +256,9 @@ static double peak(const picture *p) {
    it had. */
 static void refused(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
                     const ssdgs_render_options *options, ssdgs_result code, const char *word) {
-    size_t before;
     look(model, &a);
-    before = held, most = held;
+    const size_t before = held;
+    most = held;
     if (!CHECK(shoot(model, camera, lights, count, options, &b) == code)) return;
     CHECK(held == before && most == before);
     if (!CHECK(strstr(ssdgs_error_message(context), word)))
@@ -275,7 +271,6 @@ static void trains(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
     static unsigned char pixels[PIXELS * 4];
     ssdgs_train_options options = ssdgs_train_options_default();
     ssdgs_trainer *trainer = NULL;
-    ssdgs_train_stats stats;
     ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
     memset(pixels, 128, sizeof pixels);
@@ -285,6 +280,7 @@ static void trains(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
     options.schedule = SSDGS_SCHEDULE_JOINT;
     options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     if (!CHECK(!ssdgs_trainer_create(model, &photo, 1, &options, &trainer))) return;
+    ssdgs_train_stats stats;
     if (!CHECK(!ssdgs_trainer_step(trainer, &stats))) printf("    %s\n", ssdgs_error_message(context));
     ssdgs_trainer_destroy(trainer);
 }
@@ -292,7 +288,6 @@ static void trains(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_l
 /* What loading counts in one Gaussian of a plain file. */
 static ssdgs_load_stats loaded(const char *scale, const char *opacity, const char *rotation) {
     char text[512];
-    ssdgs_load_stats stats;
     ssdgs_model *model = NULL;
     snprintf(text, sizeof text,
              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
@@ -301,6 +296,7 @@ static ssdgs_load_stats loaded(const char *scale, const char *opacity, const cha
              "property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n"
              "0 0 2 1 1 1 %s -4 -4 %s %s %s %s %s\n",
              opacity, scale, rotation, rotation, rotation, rotation);
+    ssdgs_load_stats stats;
     if (!CHECK(!ssdgs_model_load_memory(context, text, strlen(text), &model, &stats)))
         printf("    %s\n", ssdgs_error_message(context));
     else look(model, &c);
@@ -332,11 +328,11 @@ static void row_01(void) { /* nothing to draw: the background's very bits */
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, 0, 1);
     ssdgs_render_options options = ssdgs_render_options_default();
-    int i, k, lights, wrong = 0;
-    for (k = 0; k < 3; k++) options.background[k] = (ssdgs_real)(k == 2 ? 1e30 : 0.1 + 0.6 * k);
-    for (lights = 0; lights < 2; lights++) {
+    int wrong = 0;
+    for (int k = 0; k < 3; k++) options.background[k] = (ssdgs_real)(k == 2 ? 1e30 : 0.1 + 0.6 * k);
+    for (int lights = 0; lights < 2; lights++) {
         show(model, &camera, &light, lights, &options, &a);
-        for (i = 0; i < PIXELS; i++)
+        for (int i = 0; i < PIXELS; i++)
             wrong += memcmp(a.color + 3 * i, options.background, sizeof options.background) ||
                      a.alpha[i] > 0 || a.depth[i] > 0;
     }
@@ -390,8 +386,7 @@ static void row_04(
                                         "near_plane = -1",
                                         "near_plane = NaN"};
     ssdgs_model *model = cloud(full(), 50);
-    size_t i;
-    for (i = 0; i < sizeof bad / sizeof *bad; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         ssdgs_camera camera = ahead();
         char *field = (char *)&camera + bad[i].field;
         const int whole = (int)bad[i].value;
@@ -407,25 +402,23 @@ static void row_04(
 
 static void row_05(void) { /* drawn where z > near and z is finite, else as if it were not there */
     const float near_plane = 0.5f;
-    float close[2];
     uint32_t bits;
-    double depths[13];
     ssdgs_camera camera = ahead();
-    ssdgs_model *model;
-    int i;
     memcpy(&bits, &near_plane, 4);
-    for (i = 0; i < 2; i++) bits += i ? 2 : -1u, memcpy(close + i, &bits, 4);
+    float close[2];
+    for (int i = 0; i < 2; i++) bits += i ? 2 : -1u, memcpy(close + i, &bits, 4);
+    double depths[13];
     depths[0] = (double)close[0], depths[1] = 0.5, depths[2] = (double)close[1], depths[3] = 0,
     depths[4] = -0.0, depths[5] = -1;
     depths[6] = bits_number(1), depths[7] = -INFINITE, depths[8] = INFINITE, depths[9] = NOT_A_NUMBER,
     depths[10] = -1e38;
     depths[11] = 1e29, depths[12] = 1e38;
     camera.near_plane = (ssdgs_real)0.5;
-    model = cloud(plain(), GOOD);
+    ssdgs_model *model = cloud(plain(), GOOD);
     show(model, &camera, NULL, 0, NULL, &a);
     ssdgs_model_destroy(model);
     model = cloud(plain(), GOOD + 1);
-    for (i = 0; i < 13; i++) {
+    for (int i = 0; i < 13; i++) {
         const int drawn = depths[i] > 0.5 && depths[i] < 1e30; /* NaN fails both */
         put(model, GOOD, 0, 0, depths[i], -5, 2);
         show(model, &camera, NULL, 0, NULL, &b);
@@ -441,8 +434,7 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0.1, 0, 0, 1);
     ssdgs_model *model = cloud(full(), 50);
-    int i;
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         put(model, 7, 0, 0, depths[i], 0, 0);
         show(model, &camera, &light, 1, NULL, &a);
         CHECK(!i || (double)a.alpha[CENTRE] > 0.49); /* the first is culled */
@@ -450,7 +442,7 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
     trains(model, &camera, &light);
     ssdgs_model_destroy(model);
     model = cloud(plain(), BESIDE);
-    for (i = -12; i <= 12; i++) { /* 90 degrees to the side and about that, at a distance of 1, a ball of
+    for (int i = -12; i <= 12; i++) { /* 90 degrees to the side and about that, at a distance of 1, a ball of
                                      radius 1/2 is not seen */
         const double angle = (90 + i) * 3.14159265358979324 / 180;
         const ssdgs_real eye[3] = {(ssdgs_real)centre[0], (ssdgs_real)centre[1], (ssdgs_real)(centre[2] - 1)},
@@ -459,9 +451,8 @@ static void row_06(void) { /* the camera, then the light too, inside a large Gau
                                       eye[2] + (ssdgs_real)cos(angle)};
         const ssdgs_camera turned = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.9, W, H);
         double alpha = 0;
-        int k;
         show(model, &turned, NULL, 0, NULL, &a);
-        for (k = 0; k < PIXELS; k++) alpha += (double)a.alpha[k];
+        for (int k = 0; k < PIXELS; k++) alpha += (double)a.alpha[k];
         CHECK(alpha < 1e-3 * PIXELS);
     }
     ssdgs_model_destroy(model);
@@ -473,20 +464,19 @@ static void row_07(
                                      20,  44.4, 88.8, 1e38}; /* 44.4: its square overflows */
     ssdgs_camera camera = ahead();
     ssdgs_model *model = make(plain(), 1);
-    int i, sign;
     camera.near_plane = (ssdgs_real)1e-9;
-    for (i = 0; i < 8; i++) { /* so close, or so far, that e^-20 and e^20 are a few pixels */
+    for (int i = 0; i < 8; i++) { /* so close, or so far, that e^-20 and e^20 are a few pixels */
         put(model, 0, 0, 0, i < 4 ? 1e-8 : 1e10, scales[i], 1);
         show(model, &camera, NULL, 0, NULL, i % 4 ? &b : &a);
         CHECK(i % 4 ? same(&a, &b) : (double)a.alpha[CENTRE + 3] > 0.1);
     }
     ssdgs_model_destroy(model);
-    for (sign = -1; sign < 2; sign += 2) {
+    for (int sign = -1; sign < 2; sign += 2) {
         with(full(), SSDGS_LOG_SCALE, 1, sign < 0 ? -INFINITE : INFINITE,
              &a); /* a product with it -ffast-math may take for nothing */
         CHECK(same(&a, with(full(), SSDGS_LOG_SCALE, 1, sign * 20, &b)) && a.stats.rejected == 0);
     }
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         with(full(), SSDGS_LOG_SCALE + i, 1, NOT_A_NUMBER, &a);
         CHECK(same(&a, without(full(), &b)) && a.stats.rejected == 1);
     }
@@ -499,9 +489,8 @@ static void row_10(void) { /* a disc: one scale of 0 */
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, 0, 1);
     ssdgs_model *model = cloud(lambert(SSDGS_ASG_DEFERRED, 0, 64), 200);
-    int k, i;
-    for (k = 0; k < 2; k++) {
-        for (i = 0; i < 200; i++) set(model, i, SSDGS_LOG_SCALE + 2, 1, k ? -INFINITE : -20);
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < 200; i++) set(model, i, SSDGS_LOG_SCALE + 2, 1, k ? -INFINITE : -20);
         look(model, k ? &b : &a);
         CHECK((k ? &b : &a)->stats.rejected == 0);
     }
@@ -514,12 +503,10 @@ static void row_11(void) { /* only a quaternion's direction counts; 0 is the ide
     static const double factors[3] = {1, 7.888609052210118e-31, 1.2676506002282294e30};
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0, 0, 0, 1);
-    ssdgs_model *model;
-    int f, i, k;
-    for (f = 0; f < 3; f++) {
-        model = cloud(full(), GOOD);
-        for (i = 0; i < GOOD; i++)
-            for (k = 0; k < 4; k++) {
+    for (int f = 0; f < 3; f++) {
+        ssdgs_model *model = cloud(full(), GOOD);
+        for (int i = 0; i < GOOD; i++)
+            for (int k = 0; k < 4; k++) {
                 *raw(model, SSDGS_ROTATION + k, i) *= (ssdgs_real)factors[f];
                 *raw(model, SSDGS_FRAME + k, i) *= (ssdgs_real)factors[f];
             }
@@ -527,9 +514,9 @@ static void row_11(void) { /* only a quaternion's direction counts; 0 is the ide
         CHECK(!f || same(&a, &b));
         ssdgs_model_destroy(model);
     }
-    for (f = 0; f < 2; f++) {
-        model = cloud(full(), 200);
-        for (i = 0; i < 200; i++) {
+    for (int f = 0; f < 2; f++) {
+        ssdgs_model *model = cloud(full(), 200);
+        for (int i = 0; i < 200; i++) {
             set(model, i, SSDGS_ROTATION, 4, 0);
             set(model, i, SSDGS_FRAME, 4, 0);
             set(model, i, SSDGS_ROTATION, 1, f);
@@ -544,7 +531,7 @@ static void row_11(void) { /* only a quaternion's direction counts; 0 is the ide
     CHECK(same(&a, without(full(), &b)) && a.stats.rejected == 1);
     with(full(), SSDGS_ROTATION, 1, INFINITE, &a);
     CHECK(same(&a, &b) && a.stats.rejected == 1);
-    model = cloud(full(), GOOD + 1); /* the lights' maps need not reach it either */
+    ssdgs_model *model = cloud(full(), GOOD + 1); /* the lights' maps need not reach it either */
     put(model, GOOD, 9, 0, 2, -3, 3);
     set(model, GOOD, SSDGS_ROTATION + 3, 1, NOT_A_NUMBER);
     CHECK(same(look(model, &a), &b));
@@ -557,9 +544,8 @@ static void row_12(void) { /* opacity logits are clamped to +-20 at use; files c
     const ssdgs_camera camera = ahead();
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = make(plain(), 1);
-    int i;
     options.alpha_threshold = 0;
-    for (i = 0; i < 8; i++) { /* so bright that an opacity of 2e-9 shows */
+    for (int i = 0; i < 8; i++) { /* so bright that an opacity of 2e-9 shows */
         const double logit = i < 6 ? logits[i] : i == 6 ? -INFINITE : INFINITE;
         put(model, 0, 0, 0, 2, -3, logit);
         set(model, 0, SSDGS_DIFFUSE, 3, 1e9);
@@ -580,14 +566,14 @@ static void row_13(
     void) { /* around o = 1/255, in steps of the logit's ulp: nothing, then from one logit on one pixel */
     ssdgs_model *model = make(plain(), 1);
     double first = 0;
-    int i, k, wrong = 0;
+    int wrong = 0;
     put(model, 0, 0.5 / 64, 0.5 / 64, 1, -12, 0);
-    for (i = -24; i <= 24; i++) { /* an ulp there is 4.8e-7 */
+    for (int i = -24; i <= 24; i++) { /* an ulp there is 4.8e-7 */
         const double logit = -log(254) + i * 4.76837158203125e-7;
         int lit = 0;
         set(model, 0, SSDGS_OPACITY, 1, logit);
         look(model, &a);
-        for (k = 0; k < PIXELS; k++) lit += a.alpha[k] > 0;
+        for (int k = 0; k < PIXELS; k++) lit += a.alpha[k] > 0;
         if (lit && !(first < 0)) first = logit; /* the first one drawn; all after it are */
         wrong += lit != (first < 0) || a.stats.shaded != lit ||
                  (lit && !(fabs((double)a.alpha[CENTRE] * 255 - 1) < 2e-5));
@@ -601,8 +587,7 @@ static void row_14(void) { /* a thousand veils below the threshold: it hides the
     const ssdgs_camera camera = ahead();
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = make(plain(), 1000);
-    int i;
-    for (i = 0; i < 1000; i++) put(model, i, 0.5 / 64, 0.5 / 64, 1, -3, log(0.0039 / (1 - 0.0039)));
+    for (int i = 0; i < 1000; i++) put(model, i, 0.5 / 64, 0.5 / 64, 1, -3, log(0.0039 / (1 - 0.0039)));
     show(model, &camera, NULL, 0, &options, &a);
     CHECK(a.alpha[CENTRE] <= 0 && a.stats.shaded <= 1); /* one is shaded where none is seen */
     options.alpha_threshold = 0;
@@ -617,8 +602,7 @@ static void row_15(void) { /* ten thousand walls of alpha 0.999: no more than th
     const ssdgs_camera camera = ahead();
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = make(plain(), WALLS);
-    int i;
-    for (i = 0; i < WALLS; i++) {
+    for (int i = 0; i < WALLS; i++) {
         put(model, i, 0.5 / 64, 0.5 / 64, 1 + i * 1e-5, -4.5, 20);
         set(model, i, SSDGS_DIFFUSE + i % 3, 1, -20); /* so that the layers differ */
     }
@@ -634,9 +618,8 @@ static void row_15(void) { /* ten thousand walls of alpha 0.999: no more than th
 static void row_16(void) { /* equal depths are drawn in the order of the indices, however often */
     enum { N = 300 };
     ssdgs_model *model = cloud(plain(), N);
-    int order, i;
-    for (order = 0; order < 3; order++) { /* all equal, farther with the index, nearer with it */
-        for (i = 0; i < N; i++)
+    for (int order = 0; order < 3; order++) { /* all equal, farther with the index, nearer with it */
+        for (int i = 0; i < N; i++)
             set(model, i, SSDGS_POSITION + 2, 1, 2 + (order == 1 ? i : order == 2 ? -i : 0) * 2.4e-7);
         look(model, order == 0 ? &a : order == 1 ? &b : &c);
         CHECK(!order || same(look(model, &c), order == 1 ? &b : &c));
@@ -649,7 +632,7 @@ static void row_17(
     void) { /* the image does not know where tiles begin: centres on corners, ellipses that touch edges */
     ssdgs_model *model = make(plain(), 4);
     ssdgs_camera camera = ahead();
-    int shift, i, x, y, wrong = 0;
+    int wrong = 0;
     /* dyadic numbers, so that shifted centres are exact; the last has its edge, sqrt(2 ln(255 o) variance),
        near a tile's */
     put(model, 0, 0, 0, 1, -4, 1);
@@ -657,13 +640,13 @@ static void row_17(
     put(model, 2, -0.25, 0.25, 1, -12, 3);
     put(model, 3, -0.125, -0.25, 1, log(4.0 / (64 * sqrt(2 * log(127.5)))), 0);
     look(model, &a);
-    for (shift = 1; shift <= 16; shift++) {
+    for (int shift = 1; shift <= 16; shift++) {
         camera.cx = (ssdgs_real)(W / 2 + shift);
         camera.cy = (ssdgs_real)(H / 2 - shift);
         show(model, &camera, NULL, 0, NULL, &b);
-        for (y = 0; y < H - shift; y++)
-            for (x = shift; x < W; x++)
-                for (i = 0; i < 3; i++) {
+        for (int y = 0; y < H - shift; y++)
+            for (int x = shift; x < W; x++)
+                for (int i = 0; i < 3; i++) {
                     const ssdgs_real here = b.color[3 * (y * W + x) + i],
                                      there = a.color[3 * ((y + shift) * W + x - shift) + i];
                     wrong += memcmp(&here, &there, sizeof here) != 0;
@@ -677,9 +660,8 @@ static void row_17(
 static ssdgs_model *curtains(int count) {
     ssdgs_model *model = make(plain(), count);
     const ssdgs_model_view v = ssdgs_model_arrays(model);
-    int i;
-    for (i = 0; i < count; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = 1;
-    for (i = 0; i < 3 * count; i++)
+    for (int i = 0; i < count; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = 1;
+    for (int i = 0; i < 3 * count; i++)
         v.gaussians[(size_t)(SSDGS_LOG_SCALE + i % 3) * v.stride + (size_t)i / 3] = 5;
     return model;
 }
@@ -689,14 +671,13 @@ static void row_18(void) { /* more pairs of tile and splat than the allocator gr
     const size_t grants = (size_t)640 << 20;
     ssdgs_camera camera = ahead();
     ssdgs_image nothing;
-    ssdgs_model *model, *small = cloud(plain(), 100);
-    int i;
+    ssdgs_model *small = cloud(plain(), 100);
     memset(&nothing, 0, sizeof nothing);
     camera.width = 3840;
     camera.height = 2160;
     look(small, &a);
-    for (i = 0; i < 2; i++) {
-        model = curtains(i ? 70000 : 20000);
+    for (int i = 0; i < 2; i++) {
+        ssdgs_model *model = curtains(i ? 70000 : 20000);
         most = held;
         limit = grants;
         CHECK(ssdgs_render(model, &camera, NULL, 0, &nothing) == (i ? SSDGS_ERR_LIMIT : SSDGS_ERR_MEMORY));
@@ -714,24 +695,21 @@ static void row_19(void) { /* what lies behind the camera costs a record, whatev
     enum { BEHIND = 300000 };
     ssdgs_context *shared = context;
     ssdgs_context_desc desc;
-    ssdgs_model *model;
-    size_t before;
-    double bytes;
     memset(&desc, 0, sizeof desc);
     desc.allocator.allocate = metered;
     desc.allocator.release = released;
     desc.threads = 1;
     if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-    model = curtains(BEHIND);
+    ssdgs_model *model = curtains(BEHIND);
     {
         const ssdgs_model_view v = ssdgs_model_arrays(model);
-        int i;
-        for (i = 0; i < BEHIND; i++) v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = -1;
+        for (int i = 0; i < BEHIND; i++)
+            v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = -1;
     }
-    before = held;
+    const size_t before = held;
     most = held;
     look(model, &a);
-    bytes = (double)(most - before) / BEHIND;
+    const double bytes = (double)(most - before) / BEHIND;
     CHECK(a.stats.visible == 0 && a.stats.instances == 0 && peak(&a) <= 0);
     CHECK(bytes < 250); /* records, depths, keys, colours, components: 8 planes of 4 values in all */
     bytes_behind = bytes;
@@ -744,20 +722,19 @@ static void row_20(void) { /* a scene far away, in units that grow with the dist
                               keep every bit. Real numbers of 32 bits resolve 1e-3 of it; recentring is the
                               caller's, before they become 32 bits */
     static const double offsets[4] = {0, 8192, 1048576, 134217728};
-    int o, i, k;
-    for (o = 0; o < 4; o++) {
+    for (int o = 0; o < 4; o++) {
         const double unit = offsets[o] > 0 ? offsets[o] / 8192 : 1;
         ssdgs_model *model = cloud(plain(), 300);
         ssdgs_camera camera = ahead();
-        for (i = 0; i < 300; i++)
-            for (k = 0; k < 3; k++) {
+        for (int i = 0; i < 300; i++)
+            for (int k = 0; k < 3; k++) {
                 ssdgs_real *x = raw(model, SSDGS_POSITION + k, i);
                 *x = (ssdgs_real)(offsets[o] + unit * floor((double)*x * 1024) / 1024);
                 set(model, i, SSDGS_LOG_SCALE + k, 1, -20); /* points: the pixel's filter alone */
             }
-        for (k = 0; k < 3; k++) camera.view[4 * k + 3] = (ssdgs_real)-offsets[o];
+        for (int k = 0; k < 3; k++) camera.view[4 * k + 3] = (ssdgs_real)-offsets[o];
         show(model, &camera, NULL, 0, NULL, o ? &b : &a);
-        for (i = 0; i < PIXELS; i++) (o ? &b : &a)->depth[i] /= (ssdgs_real)unit;
+        for (int i = 0; i < PIXELS; i++) (o ? &b : &a)->depth[i] /= (ssdgs_real)unit;
         CHECK(!o || same(&a, &b));
         ssdgs_model_destroy(model);
     }
@@ -772,14 +749,10 @@ static void row_26(
                               {SSDGS_ASG_WEIGHT, 8},
                               {SSDGS_MATERIAL, 6},
                               {SSDGS_SPECULAR, 3}};
-    ssdgs_real ends[2];
-    unsigned char bytes[6];
-    int s, g, i;
-    for (s = 0; s < 2; s++)
-        for (g = 0; g < 5; g++) {
+    for (int s = 0; s < 2; s++)
+        for (int g = 0; g < 5; g++) {
             const ssdgs_settings settings = s ? plain() : full();
-            int v, changed;
-            for (v = -1; v < 5; v++) { /* first as it should be */
+            for (int v = -1; v < 5; v++) { /* first as it should be */
                 const double value = v == 0   ? NOT_A_NUMBER
                                      : v == 1 ? INFINITE
                                      : v == 2 ? -INFINITE
@@ -789,6 +762,7 @@ static void row_26(
                 put(model, 9, 0, 0, 1.4, -6, 3);
                 if (v >= 0) set(model, 9, groups[g][0], groups[g][1], value);
                 look(model, v < 0 ? &b : &a);
+                int i, changed;
                 for (i = changed = 0; i < PIXELS; i++) {
                     const int near_it = abs(i % W - W / 2) < 4 && abs(i / W - H / 2) < 4;
                     changed +=
@@ -801,11 +775,11 @@ static void row_26(
                 ssdgs_model_destroy(model);
             }
         }
-    for (s = 0; s < 4;
+    for (int s = 0; s < 4;
          s++) { /* what all deferred lobes share, and reflectances within what is not yet black */
         ssdgs_model *model = cloud(full(), 200);
         const ssdgs_model_view v = ssdgs_model_arrays(model);
-        for (i = 0; i < SSDGS_ASG_COUNT; i++) {
+        for (int i = 0; i < SSDGS_ASG_COUNT; i++) {
             v.asg_sigma[i] = (ssdgs_real)(s & 1 ? 1e30 : -1e30);
             v.asg_sharpness[2 * i] = v.asg_sharpness[2 * i + 1] = (ssdgs_real)(s & 2 ? 1e30 : -1e30);
         }
@@ -814,9 +788,11 @@ static void row_26(
         CHECK(a.stats.blackened == 0);
         ssdgs_model_destroy(model);
     }
+    ssdgs_real ends[2];
     ends[0] = (ssdgs_real)INFINITE;
     ends[1] = (ssdgs_real)NOT_A_NUMBER;
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
+        unsigned char bytes[6];
         ssdgs_to_bytes(huge, 4, i, bytes);
         ssdgs_to_bytes(ends, 2, i, bytes + 4);
         CHECK(bytes[0] == 255 && bytes[1] == 0 && bytes[2] == 255 && bytes[3] == (i ? 128 : 188));
@@ -827,8 +803,7 @@ static void row_26(
 static void row_27(void) { /* backgrounds that are not finite */
     const ssdgs_camera camera = ahead();
     ssdgs_model *model = cloud(full(), 50);
-    int i;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         ssdgs_render_options options = ssdgs_render_options_default();
         options.background[i] = (ssdgs_real)(i == 1 ? -INFINITE : i ? INFINITE : NOT_A_NUMBER);
         refused(model, &camera, NULL, 0, &options, SSDGS_ERR_NONFINITE, "background");
@@ -840,53 +815,58 @@ static void row_27(void) { /* backgrounds that are not finite */
 static void brute(ssdgs_model *model, const ssdgs_camera *camera, double variance, double *color) {
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     double through[PIXELS];
-    int i, j, k, n, p, *done = (int *)calloc((size_t)v.count, sizeof *done);
-    for (p = 0; p < PIXELS; p++) through[p] = 1;
-    for (p = 0; p < 3 * PIXELS; p++) color[p] = 0;
-    for (n = 0; n < v.count; n++) {
-        double x[3], q[4], s[3], l[2][3], m[2][3], cov[3] = {variance, 0, variance}, det, t[3], length = 0,
-                                                   best = 1e300;
+    int *done = (int *)calloc((size_t)v.count, sizeof *done);
+    for (int p = 0; p < PIXELS; p++) through[p] = 1;
+    for (int p = 0; p < 3 * PIXELS; p++) color[p] = 0;
+    int j;
+    for (int n = 0; n < v.count; n++) {
+        double cov[3] = {variance, 0, variance}, length = 0, best = 1e300;
         int g = 0;
-        for (i = 0; i < v.count; i++) { /* the nearest one left */
+        for (int i = 0; i < v.count; i++) { /* the nearest one left */
             double z = (double)camera->view[11];
-            for (k = 0; k < 3; k++)
+            for (int k = 0; k < 3; k++)
                 z += (double)camera->view[8 + k] * (double)v.gaussians[(size_t)k * v.stride + (size_t)i];
             if (!done[i] && z < best) best = z, g = i;
         }
         done[g] = 1;
 #define RAW(channel) ((double)v.gaussians[(size_t)(channel)*v.stride + (size_t)g])
         if (best <= 0.01) continue;
-        for (k = 0; k < 4; k++) q[k] = RAW(SSDGS_ROTATION + k), length += q[k] * q[k];
-        for (k = 0; k < 4; k++) q[k] /= sqrt(length);
-        for (k = 0; k < 3; k++) x[k] = RAW(k), s[k] = exp(RAW(SSDGS_LOG_SCALE + k));
-        for (k = 0; k < 3; k++)
+        double q[4];
+        for (int k = 0; k < 4; k++) q[k] = RAW(SSDGS_ROTATION + k), length += q[k] * q[k];
+        for (int k = 0; k < 4; k++) q[k] /= sqrt(length);
+        double x[3], s[3];
+        for (int k = 0; k < 3; k++) x[k] = RAW(k), s[k] = exp(RAW(SSDGS_LOG_SCALE + k));
+        double t[3];
+        for (int k = 0; k < 3; k++)
             for (j = 0, t[k] = (double)camera->view[4 * k + 3]; j < 3; j++)
                 t[k] += (double)camera->view[4 * k + j] * x[j];
+        double l[2][3];
         for (j = 0; j < 3; j++) { /* J W, then its product with the rotation's columns and the scales */
             l[0][j] = (double)camera->fx / t[2] *
                       ((double)camera->view[j] - t[0] / t[2] * (double)camera->view[8 + j]);
             l[1][j] = (double)camera->fy / t[2] *
                       ((double)camera->view[4 + j] - t[1] / t[2] * (double)camera->view[8 + j]);
         }
+        double m[2][3];
         for (j = 0; j < 3; j++) {
             const int a1 = (j + 1) % 3, a2 = (j + 2) % 3;
             double column[3];
             column[j] = 1 - 2 * (q[1 + a1] * q[1 + a1] + q[1 + a2] * q[1 + a2]);
             column[a1] = 2 * (q[1 + j] * q[1 + a1] + q[0] * q[1 + a2]);
             column[a2] = 2 * (q[1 + j] * q[1 + a2] - q[0] * q[1 + a1]);
-            for (i = 0; i < 2; i++)
+            for (int i = 0; i < 2; i++)
                 m[i][j] = s[j] * (l[i][0] * column[0] + l[i][1] * column[1] + l[i][2] * column[2]);
         }
         for (j = 0; j < 3; j++)
             cov[0] += m[0][j] * m[0][j], cov[1] += m[0][j] * m[1][j], cov[2] += m[1][j] * m[1][j];
-        det = cov[0] * cov[2] - cov[1] * cov[1];
-        for (p = 0; p < PIXELS; p++) {
+        const double det = cov[0] * cov[2] - cov[1] * cov[1];
+        for (int p = 0; p < PIXELS; p++) {
             const double dx = p % W + 0.5 - (double)camera->fx * t[0] / t[2] - (double)camera->cx;
             const double dy = p / W + 0.5 - (double)camera->fy * t[1] / t[2] - (double)camera->cy;
             double alpha = exp(-0.5 * (cov[2] * dx * dx - 2 * cov[1] * dx * dy + cov[0] * dy * dy) / det);
             alpha /= 1 + exp(-RAW(SSDGS_OPACITY));
             alpha = alpha < 0.999 ? alpha : 0.999;
-            for (k = 0; k < 3; k++)
+            for (int k = 0; k < 3; k++)
                 color[3 * p + k] += through[p] * alpha * log(1 + exp(RAW(SSDGS_DIFFUSE + k)));
             through[p] *= 1 - alpha;
         }
@@ -902,9 +882,8 @@ static void row_28(
     static double want[3 * PIXELS];
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = cloud(plain(), 60);
-    int i, k;
     options.alpha_threshold = options.stop = 0;
-    for (i = 0; i < 5; i++) {
+    for (int i = 0; i < 5; i++) {
         ssdgs_camera camera = ahead();
         camera.fx = (ssdgs_real)cases[i][0];
         camera.fy = (ssdgs_real)cases[i][1];
@@ -915,7 +894,7 @@ static void row_28(
         camera.view[7] = (ssdgs_real)(2 * (24 - cases[i][3]) / cases[i][1]);
         show(model, &camera, NULL, 0, &options, &a);
         brute(model, &camera, (double)ssdgs_model_settings(model)->pixel_variance, want);
-        for (k = 0; k < 3 * PIXELS; k++) b.color[k] = (ssdgs_real)want[k];
+        for (int k = 0; k < 3 * PIXELS; k++) b.color[k] = (ssdgs_real)want[k];
         /* centres are rounded to an ulp of cx, whatever it is */
         CHECK(distance(a.color, b.color, 3 * PIXELS) <
               2e-5 * (1 + (fabs(cases[i][2]) + fabs(cases[i][3])) / 64));
@@ -934,12 +913,11 @@ static void row_29(void) { /* views that are no rigid motion: an error; within 1
                {{-1, 0, 0, 0, -1, 0, 0, 0, -1}, "mirror"},   {{1e20, 0, 0, 0, 1, 0, 0, 0, 1}, "orthonormal"}};
     ssdgs_model *model = cloud(full(), 50);
     ssdgs_camera camera = ahead();
-    int i, k;
-    for (i = 0; i < (int)(sizeof bad / sizeof *bad); i++) {
-        for (k = 0; k < 9; k++) camera.view[k / 3 * 4 + k % 3] = (ssdgs_real)bad[i].v[k];
+    for (int i = 0; i < (int)(sizeof bad / sizeof *bad); i++) {
+        for (int k = 0; k < 9; k++) camera.view[k / 3 * 4 + k % 3] = (ssdgs_real)bad[i].v[k];
         refused(model, &camera, NULL, 0, NULL, SSDGS_ERR_ARGUMENT, bad[i].word);
     }
-    for (k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k++) {
         camera = ahead();
         camera.view[k] = (ssdgs_real)(k & 1 ? INFINITE : NOT_A_NUMBER);
         refused(model, &camera, NULL, 0, NULL, SSDGS_ERR_NONFINITE, "view[");
@@ -967,21 +945,21 @@ static double turned(ssdgs_asg asg, const ssdgs_light *light, const double q[4],
 
 static void random_turn(int i, double q[4]) {
     double norm = 0;
-    int k;
-    for (k = 0; k < 4; k++) q[k] = draw(31, (uint64_t)(4 * i + k)), norm += q[k] * q[k];
-    for (k = 0; k < 4; k++) q[k] /= sqrt(norm);
+    for (int k = 0; k < 4; k++) q[k] = draw(31, (uint64_t)(4 * i + k)), norm += q[k] * q[k];
+    for (int k = 0; k < 4; k++) q[k] /= sqrt(norm);
 }
 
 static void row_31(
     void) { /* a light straight above, below, beside: as the same scene turned, but for the map's pixels */
-    double q[4], d, worst = 0, mean = 0;
-    int i, k;
-    for (i = 0; i < 12; i++) {
+    double worst = 0, mean = 0;
+    int k;
+    for (int i = 0; i < 12; i++) {
         const double side = i & 1 ? -3 : 3;
         const ssdgs_light light =
             lamp(i / 2 % 3 == 0 ? side : 0, i / 2 % 3 == 1 ? side : 0, 2 + (i / 2 % 3 == 2 ? side : 0), 3);
+        double q[4];
         random_turn(i % 6, q);
-        d = turned(i < 6 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED, &light, q, 256);
+        double d = turned(i < 6 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED, &light, q, 256);
         if (i < 6) worst = d > worst ? d : worst;
         else
             for (k = 0, d = 0; k < PIXELS; k++)
@@ -996,13 +974,11 @@ static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1
     static const double places[5][3] = {
         {0, 0, 0}, {0, 0, 2}, {0.3, 0.1, 2}, {0.3 + 1e-8, 0.1, 2}, {0.3, 0.101, 2}};
     const ssdgs_camera camera = ahead();
-    ssdgs_light light;
     ssdgs_model *model = cloud(full(), 300);
     double last = 0, floor_color = 0;
-    int i;
     put(model, 5, 0.3, 0.1, 2, -3, 0);
-    for (i = 0; i < 5; i++) {
-        light = lamp(places[i][0], places[i][1], places[i][2], 1);
+    for (int i = 0; i < 5; i++) {
+        ssdgs_light light = lamp(places[i][0], places[i][1], places[i][2], 1);
         show(model, &camera, &light, 1, NULL, &a);
         CHECK(peak(&a) > 0);
         if (i == 2) trains(model, &camera, &light);
@@ -1010,9 +986,9 @@ static void row_32(void) { /* a light at the origin, the centre, a Gaussian or 1
     ssdgs_model_destroy(model);
     model = make(lambert(SSDGS_ASG_GEOMETRIC, 0, 64), 1);
     put(model, 0, 0, 0, 2, -3, 20);
-    for (i = 0; i < 24; i++) { /* its normal is +z: 4 -> 4.8e-7 */
+    for (int i = 0; i < 24; i++) { /* its normal is +z: 4 -> 4.8e-7 */
         const double d = 4 / pow(2, i);
-        light = lamp(0, 0, 2 + d, 1);
+        ssdgs_light light = lamp(0, 0, 2 + d, 1);
         show(model, &camera, &light, 1, NULL, &a);
         if (d > 6e-4) {
             CHECK((double)a.color[3 * CENTRE] > last);
@@ -1043,19 +1019,16 @@ static void row_34(
     void) { /* Gaussians all around the light, in each of 14 directions one, first free, then behind another
                of opacity 1/2. The middles, edges and corners of the cube's faces are no different */
     static const ssdgs_asg forms[2] = {SSDGS_ASG_GEOMETRIC, SSDGS_ASG_DEFERRED};
-    ssdgs_model *model;
-    ssdgs_camera camera;
     const ssdgs_light light = lamp(centre[0], centre[1], centre[2], 1);
     ssdgs_real eye[3], at[3], up[3];
     double worst[2] = {0, 0};
-    int i, k, shaded, form;
-    for (form = 0; form < 2; form++) {
-        model = make(lambert(forms[form], 0, 256), 28);
-        for (shaded = 0; shaded < 2; shaded++)
-            for (i = 0; i < 14; i++) {
-                double d[3], e[3], norm = 0, s;
-                int j;
-                for (j = 0; j < 14; j++) { /* all of them, then a look at number i */
+    for (int form = 0; form < 2; form++) {
+        ssdgs_model *model = make(lambert(forms[form], 0, 256), 28);
+        for (int shaded = 0; shaded < 2; shaded++)
+            for (int i = 0; i < 14; i++) {
+                double d[3], e[3], norm = 0;
+                for (int j = 0; j < 14; j++) { /* all of them, then a look at number i */
+                    int k;
                     for (k = 0, norm = 0; k < 3; k++)
                         d[k] = j < 6 ? (j / 2 == k) * (j & 1 ? -1 : 1) : (j >> k & 1 ? -1 : 1),
                         norm += d[k] * d[k];
@@ -1066,16 +1039,16 @@ static void row_34(
                         shaded ? 0 : -20);
                     if (j == i) memcpy(e, d, sizeof e);
                 }
-                for (k = 0; k < 3; k++) { /* from the side */
+                for (int k = 0; k < 3; k++) { /* from the side */
                     at[k] = (ssdgs_real)(centre[k] + 2 * e[k]);
                     eye[k] = (ssdgs_real)(centre[k] + 2 * e[k] + 0.3 * (e[(k + 1) % 3] - e[(k + 2) % 3]) +
                                           (i < 6 ? 0 : 0.2 * e[k]));
                     up[k] = (ssdgs_real)e[k];
                 }
-                camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, H);
+                ssdgs_camera camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, H);
                 show(model, &camera, &light, 1, NULL, &a);
                 CHECK(a.stats.light_views == 6);
-                s = (double)a.shadow[CENTRE] / (double)a.alpha[CENTRE];
+                double s = (double)a.shadow[CENTRE] / (double)a.alpha[CENTRE];
                 s = fabs(s - (shaded ? 0.5 : 1));
                 worst[form] = s > worst[form] ? s : worst[form];
                 if (!shaded) CHECK(s < 1e-6);
@@ -1092,7 +1065,6 @@ static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative 
     const ssdgs_camera camera = ahead();
     ssdgs_model *model = cloud(full(), 300);
     ssdgs_light light = lamp(1, -1, 0, 0);
-    int k;
     show(model, &camera, &light, 1, NULL, &a);
     CHECK(peak(&a) <= 0 && a.alpha[CENTRE] > 0);
     light = lamp(1, -1, 0, 1e30);
@@ -1100,7 +1072,7 @@ static void row_35(void) { /* intensities: 0 is black, 1e30 is finite, negative 
     CHECK(peak(&a) > 1e27);
     light = lamp((double)*raw(model, 0, 9), (double)*raw(model, 1, 9), (double)*raw(model, 2, 9), 1e30);
     show(model, &camera, &light, 1, NULL, &a);
-    for (k = 0; k < 9; k++) {
+    for (int k = 0; k < 9; k++) {
         ssdgs_light lights[2];
         const ssdgs_real value = (ssdgs_real)(k % 3 == 0 ? -1 : k % 3 == 1 ? INFINITE : NOT_A_NUMBER);
         lights[0] = lights[1] = lamp(1, -1, 0, 1);
@@ -1122,24 +1094,22 @@ static void row_36(
     enum { LIGHTS = 64 };
     const ssdgs_camera camera = ahead();
     const ssdgs_render_options options = ssdgs_render_options_exact();
-    ssdgs_light lights[LIGHTS];
     ssdgs_settings settings = full();
-    ssdgs_model *model;
-    double sum[3 * PIXELS];
-    int i, k;
     settings.light_map_size = 16;
-    model = cloud(settings, 100);
+    ssdgs_model *model = cloud(settings, 100);
     show(model, &camera, NULL, 0, &options, &a);
     CHECK(peak(&a) <= 0 && a.alpha[CENTRE] > 0);
-    for (k = 0; k < 3 * PIXELS; k++) sum[k] = 0;
-    for (i = 0; i < LIGHTS; i++) {
+    double sum[3 * PIXELS];
+    for (int k = 0; k < 3 * PIXELS; k++) sum[k] = 0;
+    ssdgs_light lights[LIGHTS];
+    for (int i = 0; i < LIGHTS; i++) {
         lights[i] = lamp(3 * draw(6, 3 * (uint64_t)i), 3 * draw(6, 3 * (uint64_t)i + 1),
                          2 + 3 * draw(6, 3 * (uint64_t)i + 2), 1);
         show(model, &camera, lights + i, 1, &options, &a);
-        for (k = 0; k < 3 * PIXELS; k++) sum[k] += (double)a.color[k];
+        for (int k = 0; k < 3 * PIXELS; k++) sum[k] += (double)a.color[k];
     }
     show(model, &camera, lights, LIGHTS, &options, &b);
-    for (k = 0; k < 3 * PIXELS; k++) a.color[k] = (ssdgs_real)sum[k];
+    for (int k = 0; k < 3 * PIXELS; k++) a.color[k] = (ssdgs_real)sum[k];
     CHECK(distance(a.color, b.color, 3 * PIXELS) < 2e-6 * peak(&b)); /* 64 roundings */
     ssdgs_model_destroy(model);
 }
@@ -1147,8 +1117,7 @@ static void row_36(
 static void row_37(void) { /* the light straight behind a Gaussian, seen against it: the half vector's length
                               goes through 0 */
     const ssdgs_camera camera = ahead();
-    int i;
-    for (i = -1; i < 9; i++) {
+    for (int i = -1; i < 9; i++) {
         const double angle = i < 0 ? 0 : pow(10, -i);
         const ssdgs_light light = lamp(2 * sin(angle), 0, 2 + 2 * cos(angle), 1);
         ssdgs_model *model = make(full(), 3);
@@ -1167,14 +1136,13 @@ static void row_41(void) { /* the camera at a Gaussian's centre: culled, so neve
     ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(1, -1, 0, 1);
     ssdgs_model *model = cloud(full(), 200);
-    int i;
     look(model, &a);
     put(model, 0, 0, 0, 0, -2, 3);
     look(model, &b);
     CHECK(b.stats.visible == a.stats.visible - 1);
     trains(model, &camera, &light);
     camera.near_plane = (ssdgs_real)1e-9;
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         put(model, 0, 0, 0, 1e-8, i ? -5 : -20, 3);
         show(model, &camera, &light, 1, NULL, &b);
         CHECK(b.stats.visible == a.stats.visible);
@@ -1188,28 +1156,27 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(1, -1, 0, 1);
     ssdgs_settings settings = full();
-    ssdgs_model *model, *back = NULL;
-    ssdgs_model_view v;
-    unsigned char *bytes;
-    size_t i, at, size;
-    int k;
-    for (k = 0; k < 2; k++) {
+    ssdgs_model *back = NULL;
+    for (int k = 0; k < 2; k++) {
         settings.length_unit = (ssdgs_real)(k ? 2e-4 : 0.5);
-        model = cloud(settings, 200);
-        v = ssdgs_model_arrays(model);
-        for (i = 0; !k && i < v.scattering_count; i++) v.scattering[i] *= 1000;
-        for (i = 0; !k && i < v.shadow_count; i++) v.shadow[i] = (ssdgs_real)(1000 * draw(8, i));
+        ssdgs_model *model = cloud(settings, 200);
+        ssdgs_model_view v = ssdgs_model_arrays(model);
+        for (size_t i = 0; !k && i < v.scattering_count; i++) v.scattering[i] *= 1000;
+        for (size_t i = 0; !k && i < v.shadow_count; i++) v.shadow[i] = (ssdgs_real)(1000 * draw(8, i));
         show(model, &camera, &light, 1, NULL, &a);
         CHECK(peak(&a) > 0);
-        for (i = 0; i < PIXELS; i++)
+        for (size_t i = 0; i < PIXELS; i++)
             if (!CHECK(a.shadow[i] >= 0 && a.shadow[i] <= a.alpha[i] * (ssdgs_real)1.00001)) break;
         ssdgs_model_destroy(model);
     }
-    for (k = 0; k < 2; k++) {
-        model = cloud(full(), 10);
-        v = ssdgs_model_arrays(model);
+    unsigned char *bytes;
+    size_t size;
+    for (int k = 0; k < 2; k++) {
+        ssdgs_model *model = cloud(full(), 10);
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
         (k ? v.shadow : v.scattering)[5] = 12345;
         CHECK(!ssdgs_model_save(model, path) && !ssdgs__read_file(context, path, &bytes, &size));
+        size_t i, at;
         for (i = 0, at = size; i + 4 <= size; i++)
             at = memcmp(bytes + i, "\0\344\100\106", 4) ? at : i;    /* 12345 */
         if (CHECK(at < size)) memcpy(bytes + at, "\0\0\300\177", 4); /* NaN */
@@ -1231,18 +1198,16 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
     const ssdgs_light light = lamp(2, -2, 0, 1);
     static picture finest;
     ssdgs_render_options coarse = ssdgs_render_options_default();
-    double error[2][FINEST];
-    int blur, step, sub, asg, i;
     coarse.light_detail = (ssdgs_real)0.01;
-    for (sub = 0; sub < 4; sub++) {
-        asg = sub < 2 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
-        for (blur = SSDGS_BLUR_FLOOR; blur >= SSDGS_BLUR_ADD; blur--)
-            for (step = FINEST; step >= -1; step--) { /* 512 .. 16, then 1, which is rounded up to 16 */
+    double error[2][FINEST];
+    for (int sub = 0; sub < 4; sub++) {
+        const int asg = sub < 2 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
+        for (int blur = SSDGS_BLUR_FLOOR; blur >= SSDGS_BLUR_ADD; blur--)
+            for (int step = FINEST; step >= -1; step--) { /* 512 .. 16, then 1, which is rounded up to 16 */
                 ssdgs_settings settings = lambert((ssdgs_asg)asg, 0, step < 0 ? 1 : 16 << step);
-                ssdgs_model *model;
                 settings.light_blur = blur;
-                model = cloud(settings, 300);
-                for (i = 0; sub % 2 && i < 300; i++)
+                ssdgs_model *model = cloud(settings, 300);
+                for (int i = 0; sub % 2 && i < 300; i++)
                     set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
                 show(model, &camera, &light, 1, NULL, step == FINEST && blur ? &finest : &a);
                 if (step < 0) { /* a hundredth of it too */
@@ -1253,18 +1218,18 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
                 if (step == FINEST) continue;
                 if (step < 0) CHECK(same(&a, &b));
                 else error[blur][step] = 0;
-                for (i = 0; step >= 0 && i < PIXELS; i++)
+                for (int i = 0; step >= 0 && i < PIXELS; i++)
                     error[blur][step] += fabs((double)(a.shadow[i] - finest.shadow[i])) / PIXELS;
                 b = a;
             }
-        for (blur = 0; blur < 2 - sub % 2; blur++)
+        for (int blur = 0; blur < 2 - sub % 2; blur++)
             CHECK(error[blur][4] < error[blur][2] && error[blur][2] < error[blur][0]);
         CHECK(error[SSDGS_BLUR_FLOOR][3] <
               tolerance[sub]); /* at 128^2, measured 1.8e-5, 1.8e-4; pixels' own 3.2e-3, 3.4e-4 */
-        for (step = 1; step < FINEST; step++)
+        for (int step = 1; step < FINEST; step++)
             CHECK(error[SSDGS_BLUR_FLOOR][step] < error[SSDGS_BLUR_ADD][step]);
     }
-    for (step = 0; step < 2; step++) { /* nor do those that alpha_threshold hides, even of few */
+    for (int step = 0; step < 2; step++) { /* nor do those that alpha_threshold hides, even of few */
         ssdgs_model *model = cloud(lambert(step ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, 0.02, 0), 100);
         put(model, 99, 1e3, 0, 2, -3, -20);
         show(model, &camera, &light, 1, NULL, &a);
@@ -1273,7 +1238,7 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
         CHECK(same(&a, &b));
         ssdgs_model_destroy(model);
     }
-    for (step = 0; step < 12;
+    for (int step = 0; step < 12;
          step++) { /* faint, or giant and faint, 10 to 1e7 extents away; the light far, near, directional */
         static const double away[4] = {10, 1e3, 1e5, 1e7};
         ssdgs_model *model =
@@ -1288,7 +1253,7 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
         show(model, &camera, &lit, 1, NULL, &a);
         set(model, 399, SSDGS_OPACITY, 1, -4);
         show(model, &camera, &lit, 1, NULL, &b);
-        for (i = 0; i < PIXELS; i++) off += fabs((double)(a.shadow[i] - b.shadow[i])) / PIXELS;
+        for (int i = 0; i < PIXELS; i++) off += fabs((double)(a.shadow[i] - b.shadow[i])) / PIXELS;
         CHECK(off < 0.01); /* measured 0.005 at most; 0.14 with maps that hold it */
         ssdgs_model_destroy(model);
     }
@@ -1298,12 +1263,14 @@ static double cube_spread;
 
 static void row_47(void) { /* the cube of maps about a light in the scene: ten random turns of the scene */
     const ssdgs_light light = lamp(0.1, -0.05, 2.02, 0.3);
-    double q[4], d, spread = 0;
-    int i, k;
-    for (i = 0; i < 10; i++) {
+    double spread = 0;
+    for (int i = 0; i < 10; i++) {
+        double q[4];
         random_turn(100 + i, q);
         turned(i % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, &light, q, 64);
         CHECK(a.stats.light_views == 6 && b.stats.light_views == 6);
+        double d;
+        int k;
         for (k = 0, d = 0; k < PIXELS; k++) d += fabs((double)(a.shadow[k] - b.shadow[k])) / PIXELS;
         spread = d > spread ? d : spread;
     }
@@ -1318,14 +1285,12 @@ static void row_48(
     static const double biases[4] = {0, 0.8, 1.2, 1e30}; /* in units of 1/2: the Gaussians are 1/2 apart */
     ssdgs_settings settings = lambert(SSDGS_ASG_GEOMETRIC, -0.001, 64);
     ssdgs_model *model = NULL;
-    int i;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
     CHECK(strstr(ssdgs_error_message(context), "light_bias = -0.001"));
     settings.light_bias = (ssdgs_real)NOT_A_NUMBER;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
     CHECK(strstr(ssdgs_error_message(context), "light_bias = NaN"));
-    for (i = 0; i < 8; i++) {
-        double want;
+    for (int i = 0; i < 8; i++) {
         model = make(lambert(i % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, biases[i / 2], 256), 2);
         put(model, 0, 0, 0, 2, -1, 0); /* alpha 1/2 wide, in front of a small one */
         put(model, 1, 0, 0, 2.5, -4, 5);
@@ -1333,7 +1298,7 @@ static void row_48(
         set(model, 1, SSDGS_ASG_WEIGHT + 3, 1, 40);
         show(model, &camera, &light, 1, NULL, &a);
         /* the front one's weight, and the other's 1/2 opacity(5) of light 1/2 or 1 */
-        want = (double)a.alpha[CENTRE] - (i < 4 ? 0.5 * ((double)a.alpha[CENTRE] - 0.5) : 0);
+        const double want = (double)a.alpha[CENTRE] - (i < 4 ? 0.5 * ((double)a.alpha[CENTRE] - 0.5) : 0);
         CHECK(fabs((double)a.shadow[CENTRE] - want) < 2e-3);
         ssdgs_model_destroy(model);
     }
@@ -1344,16 +1309,15 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(1, -1, 0, 1);
     ssdgs_render_options options = ssdgs_render_options_exact();
-    int t, i;
-    for (t = 0; t < 3; t++) {
+    for (int t = 0; t < 3; t++) {
         ssdgs_settings settings = full();
-        ssdgs_model *model;
         settings.shadow_layers = 0;
         settings.light_bias = (ssdgs_real)(t == 2 ? 1e30 : 0.06); /* S = 1 */
         settings.depth_cue = settings.transport =
             t != 2; /* which need the light pass, too, for the scattering */
-        model = cloud(settings, 300);
-        for (i = 0; t < 2 && i < 300; i++) set(model, i, t ? SSDGS_SCATTERING : SSDGS_SPECULAR, 3, -INFINITE);
+        ssdgs_model *model = cloud(settings, 300);
+        for (int i = 0; t < 2 && i < 300; i++)
+            set(model, i, t ? SSDGS_SCATTERING : SSDGS_SPECULAR, 3, -INFINITE);
         options.terms = SSDGS_ALL_TERMS;
         show(model, &camera, &light, 1, &options, &a);
         options.terms = SSDGS_ALL_TERMS & ~terms[t];
@@ -1373,9 +1337,8 @@ static void row_50(void) { /* lights at rest: no new maps for a new view, and th
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_model *model = cloud(full(), 300);
     ssdgs_camera camera = ahead();
-    int i;
     look(model, &a);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         camera.cx += 3;
         show(model, &camera, &light, 1, &options, &a);
         CHECK(a.stats.lights_cached == 1 && a.stats.camera_cached == 0);
@@ -1396,9 +1359,7 @@ static void row_51(void) { /* what the camera does not see is not shaded, and wo
     ssdgs_context *shared = context;
     ssdgs_context_desc desc;
     ssdgs_gpu_hook gpu;
-    int all;
-    for (all = 0; all < 2; all++) {
-        ssdgs_model *model;
+    for (int all = 0; all < 2; all++) {
         memset(&desc, 0, sizeof desc);
         memset(&gpu, 0, sizeof gpu);
         gpu.stage[SSDGS_STAGE_WALK] = shade_all;
@@ -1407,7 +1368,7 @@ static void row_51(void) { /* what the camera does not see is not shaded, and wo
         desc.threads = ssdgs_context_threads(shared);
         desc.isa = ssdgs_context_isa(shared);
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-        model = cloud(full(), GOOD);
+        ssdgs_model *model = cloud(full(), GOOD);
         put(model, 3, 0, 0, 0, -3, 1); /* at the eye, at the light, behind both, far away */
         put(model, 4, 1, -1.5, 0.5, -3, 1);
         put(model, 5, 0, 0, -9, 1, 1);
@@ -1425,17 +1386,17 @@ static void row_52(void) { /* twice the light is twice the image, to the bit; tw
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_light lights[2];
     ssdgs_model *model = cloud(full(), 500);
-    int i, wrong = 0;
+    int wrong = 0;
     lights[0] = lamp(1, -1, 0, 1);
     lights[1] = lamp(1, -1, 0, 2);
     show(model, &camera, lights, 1, &options, &a);
     show(model, &camera, lights + 1, 1, &options, &b);
-    for (i = 0; i < 3 * PIXELS; i++) wrong += fabs((double)(b.color[i] - 2 * a.color[i])) > 0;
+    for (int i = 0; i < 3 * PIXELS; i++) wrong += fabs((double)(b.color[i] - 2 * a.color[i])) > 0;
     CHECK(!wrong && peak(&a) > 0.01);
     lights[1] = lamp(-1, 1, 3, 1);
     show(model, &camera, lights + 1, 1, &options, &b);
     show(model, &camera, lights, 2, &options, &c);
-    for (i = 0; i < 3 * PIXELS; i++) a.color[i] += b.color[i];
+    for (int i = 0; i < 3 * PIXELS; i++) a.color[i] += b.color[i];
     CHECK(distance(a.color, c.color, 3 * PIXELS) < 4e-7 * peak(&c)); /* a rounding per light and blend */
     ssdgs_model_destroy(model);
 }
@@ -1497,16 +1458,16 @@ enum { ROWS = sizeof rows / sizeof *rows };
 int main(int count, char **argument) {
     const int only = count > 1 ? atoi(argument[1]) : 0; /* a row's number; none: all */
     ssdgs_context_desc desc;
-    int isa, eight, r, ran = 0;
+    int ran = 0;
     memset(&desc, 0, sizeof desc);
     desc.allocator.allocate = metered;
     desc.allocator.release = released;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (eight = 0; eight < 2 && ssdgs__table(isa); eight++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
+        for (int eight = 0; eight < 2 && ssdgs__table(isa); eight++) {
             desc.isa = (ssdgs_isa)isa;
             desc.threads = eight ? 8 : 1;
             if (!CHECK(!ssdgs_context_create(&desc, &context))) return 1;
-            for (r = 0; r < ROWS; r++) {
+            for (int r = 0; r < ROWS; r++) {
                 const int failed = test_failed;
                 const size_t before = held;
                 if ((ran && rows[r].once) || (only && rows[r].number != only)) continue;
@@ -1524,9 +1485,9 @@ int main(int count, char **argument) {
             ssdgs_context_destroy(context);
             CHECK(held == 0);
         }
-    for (r = 0; r < ROWS; r++) {
-        char number[16];
+    for (int r = 0; r < ROWS; r++) {
         if (only && rows[r].number != only) continue;
+        char number[16];
         snprintf(number, sizeof number, "%d", rows[r].number);
         test_row(test_failed - rows[r].bad, number, rows[r].name);
     }

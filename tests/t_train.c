@@ -16,28 +16,28 @@ static uint64_t hash_values(uint64_t hash, const ssdgs_real *values, size_t n) {
 
 /* A lit ball on a transparent ground, seen from all around. */
 static void make_photos(void) {
-    int i, x, y, c;
-    for (i = 0; i < PHOTOS; i++) {
+    for (int i = 0; i < PHOTOS; i++) {
         const double angle = 6.2831853 * i / PHOTOS;
-        ssdgs_real eye[3], light[3], target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+        ssdgs_real eye[3], target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         eye[0] = (ssdgs_real)(2 * cos(angle));
         eye[1] = (ssdgs_real)(2 * sin(angle));
         eye[2] = (ssdgs_real)0.5;
+        ssdgs_real light[3];
         light[0] = (ssdgs_real)(2 * cos(angle + 1));
         light[1] = (ssdgs_real)(2 * sin(angle + 1));
         light[2] = 1;
         memset(&photos[i], 0, sizeof photos[i]);
         photos[i].camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.63, SIDE, SIDE);
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             photos[i].light.position[c] = light[c];
             photos[i].light.intensity[c] = 100;
         }
-        for (y = 0; y < SIDE; y++)
-            for (x = 0; x < SIDE; x++) {
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) {
                 const double dx = (x + 0.5 - SIDE / 2) / (SIDE * 0.3),
                              dy = (y + 0.5 - SIDE / 2) / (SIDE * 0.3), r2 = dx * dx + dy * dy;
                 unsigned char *p = pixels[i] + 4 * (y * SIDE + x);
-                for (c = 0; c < 3; c++)
+                for (int c = 0; c < 3; c++)
                     p[c] = r2 < 1 ? (unsigned char)(60 + 150 * (1 - r2) * (c == 0 ? 1 : 0.7) + 30 * dx) : 0;
                 p[3] = r2 < 1 ? 255 : 0;
             }
@@ -71,21 +71,20 @@ static run_result train_and_render(ssdgs_context *context, const ssdgs_settings 
     static ssdgs_real color[SIDE * SIDE * 3], shadow[SIDE * SIDE], normal[SIDE * SIDE * 3];
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_train_stats stats;
-    ssdgs_image image;
     run_result r;
-    int i;
     memset(&r, 0, sizeof r);
     CHECK(!ssdgs_model_create(context, settings, 0, &model));
     if (!CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, options, &trainer))) exit(1);
-    for (i = 0; i < options->iterations; i++)
+    ssdgs_train_stats stats;
+    for (int i = 0; i < options->iterations; i++)
         if (!CHECK(!ssdgs_trainer_step(trainer, &stats))) exit(1);
     r.psnr = stats.psnr;
     r.count = model->count;
     r.model = UINT64_C(0xCBF29CE484222325);
-    for (i = 0; i < SSDGS_CHANNELS; i++)
+    for (int i = 0; i < SSDGS_CHANNELS; i++)
         r.model = hash_values(r.model, model->gaussians + (size_t)i * model->capacity, (size_t)model->count);
     r.model = hash_values(r.model, model->globals, model->global_count);
+    ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
     image.shadow = shadow;
@@ -126,21 +125,19 @@ static void backwards_run(void *user, int count, void (*task)(void *, int), void
 static void test_same_bits(void) {
     const ssdgs_train_options options = short_run(60);
     ssdgs_settings settings = ssdgs_settings_default();
-    int isa, variant, calls[SSDGS_STAGE_COUNT], i;
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    int calls[SSDGS_STAGE_COUNT];
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         run_result first;
         memset(&first, 0, sizeof first);
-        for (variant = 0; variant < 5; variant++) {
+        for (int variant = 0; variant < 5; variant++) {
             static const int threads[5] = {1, 2, 7, 1, 2};
-            ssdgs_gpu_hook gpu;
             ssdgs_context_desc desc;
-            ssdgs_context *context;
-            run_result r;
             memset(&desc, 0, sizeof desc);
             memset(calls, 0, sizeof calls);
             desc.isa = (ssdgs_isa)isa;
             desc.threads = threads[variant];
             if (variant == 3) desc.parallel.run = backwards_run;
+            ssdgs_gpu_hook gpu;
             if (variant == 4) {
                 desc.gpu = &gpu;
                 gpu.user = calls;
@@ -154,11 +151,12 @@ static void test_same_bits(void) {
                 gpu.stage[SSDGS_STAGE_SHADE_BACKWARD] = hook_shade_backward;
                 gpu.stage[SSDGS_STAGE_PROJECT_BACKWARD] = hook_project_backward;
             }
+            ssdgs_context *context;
             if (ssdgs_context_create(&desc, &context)) {
                 if (variant == 0) printf("skipped: %s\n", ssdgs_isa_string((ssdgs_isa)isa));
                 break;
             }
-            r = train_and_render(context, &settings, &options);
+            run_result r = train_and_render(context, &settings, &options);
             if (variant == 0) {
                 first = r;
                 printf("%s: %d Gaussians, model %016llx, image %016llx\n", ssdgs_isa_string((ssdgs_isa)isa),
@@ -166,7 +164,7 @@ static void test_same_bits(void) {
                 CHECK(r.count > 200 && r.count <= 500); /* about 100 of the 300 lie within the outlines */
             }
             CHECK(r.model == first.model && r.image == first.image);
-            for (i = 0; i < SSDGS_STAGE_COUNT; i++)
+            for (int i = 0; i < SSDGS_STAGE_COUNT; i++)
                 CHECK(calls[i] == (variant == 4 ? (i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61 : 60) : 0));
             ssdgs_context_destroy(context);
         }
@@ -179,15 +177,14 @@ static void test_resume(void) {
     static const int stops[4] = {1, 7, 29, 31};
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_context *context = NULL;
-    uint64_t whole = 0, hash;
-    int k, c, i;
+    uint64_t whole = 0;
     CHECK(!ssdgs_context_create(NULL, &context));
-    for (k = -1; k < 4; k++) {
+    for (int k = -1; k < 4; k++) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < 60; i++) {
+        for (int i = 0; i < 60; i++) {
             if (k >= 0 && i == stops[k]) {
                 CHECK(!ssdgs_trainer_save(trainer, "build/t_train.ckpt"));
                 ssdgs_trainer_destroy(trainer);
@@ -198,8 +195,8 @@ static void test_resume(void) {
             }
             if (!CHECK(!ssdgs_trainer_step(trainer, NULL))) exit(1);
         }
-        hash = hash_values(UINT64_C(0xCBF29CE484222325), model->globals, model->global_count);
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+        uint64_t hash = hash_values(UINT64_C(0xCBF29CE484222325), model->globals, model->global_count);
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             hash = hash_values(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
         hash = ssdgs__fold(hash, trainer->corrections, PHOTOS * sizeof *trainer->corrections);
         if (k < 0) whole = hash;
@@ -212,16 +209,15 @@ static void test_resume(void) {
         ssdgs_trainer *trainer = NULL;
         ssdgs_train_options other = options;
         unsigned char *bytes = NULL;
-        size_t size = 0, at;
-        FILE *f;
+        size_t size = 0;
         CHECK(!ssdgs__read_file(context, "build/t_train.ckpt", &bytes, &size));
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < 200; i++) {
+        for (int i = 0; i < 200; i++) {
             const int cut = i & 1;
-            at = (size_t)((double)size * ssdgs__uniform(5, (uint64_t)i));
+            const size_t at = (size_t)((double)size * ssdgs__uniform(5, (uint64_t)i));
             bytes[at] ^= 0x10;
-            f = fopen("build/t_train_bad.ckpt", "wb");
+            FILE *f = fopen("build/t_train_bad.ckpt", "wb");
             if (!CHECK(f != NULL)) exit(1);
             CHECK(fwrite(bytes, 1, cut ? at : size, f) == (cut ? at : size));
             fclose(f);
@@ -231,12 +227,11 @@ static void test_resume(void) {
         model->globals[model->global_count - 1] = (ssdgs_real)NAN; /* what would be refused is not written */
         CHECK(ssdgs_trainer_save(trainer, "build/t_train.ckpt") == SSDGS_ERR_NONFINITE);
         CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
-        for (i = 0; i < 5; i++) { /* wrong inside, with the right checksum */
-            ssdgs__checkpoint_head head;
+        for (int i = 0; i < 5; i++) { /* wrong inside, with the right checksum */
             unsigned char *copy = (unsigned char *)malloc(size);
             const uint32_t photo = PHOTOS;
-            uint64_t sum;
             memcpy(copy, bytes, size);
+            ssdgs__checkpoint_head head;
             memcpy(&head, copy, sizeof head);
             if (i == 0) head.settings.scattering_width = 1024;
             if (i == 1) head.steps[3] = -2;
@@ -246,9 +241,9 @@ static void test_resume(void) {
             if (i == 3)
                 memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo,
                        sizeof photo);
-            sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
+            uint64_t sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
             memcpy(copy + size - 8, &sum, 8);
-            f = fopen("build/t_train_bad.ckpt", "wb");
+            FILE *f = fopen("build/t_train_bad.ckpt", "wb");
             if (!CHECK(f != NULL)) exit(1);
             CHECK(fwrite(copy, 1, size, f) == size);
             fclose(f);
@@ -263,7 +258,7 @@ static void test_resume(void) {
         CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
               trainer->start_size > 0);
         ssdgs_trainer_destroy(trainer);
-        for (i = 0; i < 5; i++) { /* another bias, filter, eta, near plane, format */
+        for (int i = 0; i < 5; i++) { /* another bias, filter, eta, near plane, format */
             ssdgs_settings changed = settings;
             ssdgs_model *own = NULL;
             ssdgs_photo shots[PHOTOS];
@@ -300,14 +295,14 @@ static void test_refused_step(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_train_stats stats;
-    ssdgs_real nan_value = (ssdgs_real)NAN, *before;
+    ssdgs_real nan_value = (ssdgs_real)NAN;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 0, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    ssdgs_train_stats stats;
     CHECK(!ssdgs_trainer_step(trainer, &stats));
     model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + 5] = nan_value;
-    before = (ssdgs_real *)malloc(model->capacity * SSDGS_CHANNELS * sizeof *before);
+    ssdgs_real *before = (ssdgs_real *)malloc(model->capacity * SSDGS_CHANNELS * sizeof *before);
     memcpy(before, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof *before);
     CHECK(ssdgs_trainer_step(trainer, &stats) == SSDGS_ERR_NONFINITE);
     CHECK(stats.skipped_steps == 1);
@@ -325,29 +320,26 @@ static void test_components(void) {
         again[SIDE * SIDE * 3], lone[2][SIDE * SIDE * 3], depth[SIDE * SIDE];
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_render_options options = ssdgs_render_options_default();
-    ssdgs_render_stats stats;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    ssdgs_light lights[2];
-    ssdgs_image image;
-    double sum[SIDE * SIDE * 3];
-    int i, c, blank = 0;
+    int blank = 0;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 200, &model));
-    v = ssdgs_model_arrays(model);
-    for (i = 0; i < 200; i++) {
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (int i = 0; i < 200; i++) {
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             v.gaussians[(size_t)c * v.stride + (size_t)i] =
                 (ssdgs_real)(2 * ssdgs__uniform(3, (uint64_t)(i * 64 + c)) - 1);
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             v.gaussians[(size_t)(SSDGS_POSITION + c) * v.stride + (size_t)i] *= (ssdgs_real)0.5;
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] -= (ssdgs_real)2.5;
         }
     }
+    ssdgs_light lights[2];
     lights[0] = photos[1].light;
     lights[1] = photos[3].light;
-    for (c = 0; c < 3; c++) options.background[c] = (ssdgs_real)(0.2 + 0.1 * c);
+    for (int c = 0; c < 3; c++) options.background[c] = (ssdgs_real)(0.2 + 0.1 * c);
+    ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
     image.diffuse = part[0];
@@ -355,31 +347,34 @@ static void test_components(void) {
     image.scattering = part[2];
     image.alpha = alpha;
     image.depth = depth;
+    ssdgs_render_stats stats;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, &stats));
     CHECK(stats.gaussians == 200 && stats.shaded > 0 && stats.shaded <= stats.visible &&
           stats.light_views >= 2 && stats.rejected == 0);
-    for (i = 0; i < SIDE * SIDE * 3; i++)
+    double sum[SIDE * SIDE * 3];
+    for (int i = 0; i < SIDE * SIDE * 3; i++)
         sum[i] = (double)(part[0][i] + part[1][i] + part[2][i]) +
                  (1 - (double)alpha[i / 3]) * (double)options.background[i % 3];
     CHECK_NEAR(sum, color, SIDE * SIDE * 3, 1e-4, 1e-6, "the components and the background make the image");
-    for (i = 0; i < SIDE * SIDE; i++) blank += alpha[i] > (ssdgs_real)0.99 && !(depth[i] > 1 && depth[i] < 3);
+    for (int i = 0; i < SIDE * SIDE; i++)
+        blank += alpha[i] > (ssdgs_real)0.99 && !(depth[i] > 1 && depth[i] < 3);
     CHECK(blank == 0);
     memset(&image, 0, sizeof image);
     image.color = again;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
     CHECK(!memcmp(again, color, sizeof color));
-    for (c = 0; c < 3; c++) options.background[c] = 0;
+    for (int c = 0; c < 3; c++) options.background[c] = 0;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 2, &options, &image, NULL));
-    for (c = 0; c < 2; c++) {
+    for (int c = 0; c < 2; c++) {
         image.color = lone[c];
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights + c, 1, &options, &image, NULL));
     }
-    for (i = 0; i < SIDE * SIDE * 3; i++) sum[i] = (double)lone[0][i] + (double)lone[1][i];
+    for (int i = 0; i < SIDE * SIDE * 3; i++) sum[i] = (double)lone[0][i] + (double)lone[1][i];
     CHECK_NEAR(sum, again, SIDE * SIDE * 3, 1e-4, 1e-5, "two lights are the sum of each alone");
-    for (c = 0; c < 3; c++) lights[0].intensity[c] *= 2;
+    for (int c = 0; c < 3; c++) lights[0].intensity[c] *= 2;
     image.color = again;
     CHECK(!ssdgs_render_ex(model, &photos[0].camera, lights, 1, &options, &image, NULL));
-    for (i = 0; i < SIDE * SIDE * 3; i++) sum[i] = 2 * (double)lone[0][i];
+    for (int i = 0; i < SIDE * SIDE * 3; i++) sum[i] = 2 * (double)lone[0][i];
     CHECK_NEAR(sum, again, SIDE * SIDE * 3, 0, 1e-6, "twice the intensity is twice the image");
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
@@ -394,45 +389,43 @@ static void test_lights(void) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_model_view v;
-    ssdgs_light light;
-    ssdgs_image image;
-    ssdgs_frame frame;
-    int i, c, p;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, 300, &model));
-    v = ssdgs_model_arrays(model);
-    for (i = 0; i < 300; i++) {
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (int i = 0; i < 300; i++) {
         double r2 = 0;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             const double x = ssdgs__normal(9, (uint64_t)(3 * i + c));
             v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)x;
             r2 += x * x;
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = -4;
         }
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             v.gaussians[(size_t)c * v.stride + (size_t)i] *= (ssdgs_real)(0.4 / sqrt(r2)); /* a shell */
         v.gaussians[SSDGS_OPACITY * v.stride + (size_t)i] = 4;
     }
+    ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
-    for (p = 0; p < 12; p++) {
+    ssdgs_light light;
+    for (int p = 0; p < 12; p++) {
         double mean = 0, least = 1, most = 0;
         const double distance =
             sqrt(places[p][0] * places[p][0] + places[p][1] * places[p][1] + places[p][2] * places[p][2]);
         int finite = 1;
         memset(&light, 0, sizeof light);
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             light.position[c] = (ssdgs_real)places[p][c];
             light.intensity[c] = (ssdgs_real)(distance * distance + 0.01);
         }
         CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
-        for (i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
+        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
         CHECK(finite);
+        ssdgs_frame frame;
         CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
         CHECK(frame.view_count == (distance < 1 ? 7 : 2));
-        for (i = 0; i < 300; i++) {
+        for (int i = 0; i < 300; i++) {
             const double seen = (double)frame.visibility[i];
             least = seen < least ? seen : least;
             most = seen > most ? seen : most;
@@ -445,7 +438,7 @@ static void test_lights(void) {
         if (p == 11) memcpy(far_color, color, sizeof color);
     }
     light.kind = SSDGS_LIGHT_DIRECTIONAL;
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         light.position[c] = c == 2;
         light.intensity[c] = 1;
     }
@@ -461,15 +454,14 @@ static void test_refusals(void) {
     static ssdgs_real color[SIDE * SIDE * 3];
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_train_options options = ssdgs_train_options_default();
-    ssdgs_context_desc desc;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_camera camera;
     ssdgs_light light = photos[0].light;
     ssdgs_render_options render = ssdgs_render_options_default();
     ssdgs_image image;
     memset(&image, 0, sizeof image);
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     image.color = color;
     desc.threads = -1;
@@ -496,6 +488,7 @@ static void test_refusals(void) {
     REFUSED(SSDGS_ERR_ARGUMENT, ssdgs_model_create(context, &settings, -1, &model));
     REFUSED(SSDGS_ERR_LIMIT, ssdgs_model_create(context, &settings, 0x7FFFFFFF, &model));
     CHECK(!ssdgs_model_create(context, &settings, 3, &model));
+    ssdgs_camera camera;
 #define BAD_CAMERA(code, change) \
     do { \
         camera = photos[0].camera; \
@@ -569,10 +562,7 @@ static ssdgs_result whole_life(counter *c) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_metrics metrics;
     ssdgs_real background[3] = {0, 0, 0};
-    ssdgs_result result;
-    int i;
     memset(&desc, 0, sizeof desc);
     desc.threads = 2;
     desc.allocator.allocate = counting_allocate;
@@ -580,10 +570,11 @@ static ssdgs_result whole_life(counter *c) {
     desc.allocator.user = c;
     options.initial_points = 60;
     options.max_gaussians = 200;
-    result = ssdgs_context_create(&desc, &context);
+    ssdgs_result result = ssdgs_context_create(&desc, &context);
     if (!result) result = ssdgs_model_create(context, NULL, 0, &model);
     if (!result) result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
-    for (i = 0; i < 12 && !result; i++) result = ssdgs_trainer_step(trainer, NULL);
+    for (int i = 0; i < 12 && !result; i++) result = ssdgs_trainer_step(trainer, NULL);
+    ssdgs_metrics metrics;
     if (!result) result = ssdgs_evaluate(model, photos, background, color, &metrics);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -593,11 +584,11 @@ static ssdgs_result whole_life(counter *c) {
 
 static void test_allocation(void) {
     counter c;
-    long calls, n, failed = 0;
+    long failed = 0;
     memset(&c, 0, sizeof c);
     CHECK(whole_life(&c) == SSDGS_OK && c.live == 0);
-    calls = c.calls;
-    for (n = 1; n <= calls; n++) {
+    const long calls = c.calls;
+    for (long n = 1; n <= calls; n++) {
         memset(&c, 0, sizeof c);
         c.fail_at = n;
         failed += whole_life(&c) == SSDGS_ERR_MEMORY;
@@ -611,14 +602,12 @@ static void test_allocation(void) {
 static void test_steady(void) {
     static ssdgs_real color[SIDE * SIDE * 3];
     counter c;
-    ssdgs_context_desc desc;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_image image;
-    long calls;
-    int i;
     memset(&c, 0, sizeof c);
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
+    ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
     desc.allocator.allocate = counting_allocate;
@@ -627,8 +616,8 @@ static void test_steady(void) {
     CHECK(!ssdgs_context_create(&desc, &context));
     CHECK(!ssdgs_model_create(context, NULL, 100, &model));
     CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
-    calls = c.calls;
-    for (i = 0; i < 5; i++) CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
+    const long calls = c.calls;
+    for (int i = 0; i < 5; i++) CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
     CHECK(c.calls == calls);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
@@ -642,7 +631,6 @@ static void test_learning(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_metrics before, disturbed, refined;
     ssdgs_real background[3] = {0, 0, 0};
     ssdgs_photo photo = photos[2];
     CHECK(!ssdgs_context_create(NULL, &context));
@@ -651,12 +639,15 @@ static void test_learning(void) {
     options.refine = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
     CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+    ssdgs_metrics before;
     CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &before));
     CHECK(before.psnr > 22 && before.ssim > 0.7 && before.flip < 0.2);
     photo.camera.view[3] += (ssdgs_real)0.03;
     photo.camera.view[7] -= (ssdgs_real)0.02;
+    ssdgs_metrics disturbed;
     CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &disturbed));
     CHECK(!ssdgs_refine_photo(model, &photo, background, 150));
+    ssdgs_metrics refined;
     CHECK(!ssdgs_evaluate(model, &photo, background, NULL, &refined));
     CHECK(disturbed.psnr < before.psnr - 1 && refined.psnr > before.psnr - 0.5);
     printf("trained %.1f dB, disturbed %.1f dB, refined %.1f dB\n", before.psnr, disturbed.psnr,
@@ -697,11 +688,8 @@ static void test_adam(double share) {
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
     ssdgs_rate rates[10];
-    ssdgs_real *gradient[STEPS], *start;
     double worst = 0;
-    size_t first[SSDGS__GLOBAL_GROUPS + 1], stride, planes, values, i;
-    int step, g, learns[SSDGS__GROUPS], terms[STEPS];
-    for (g = 0; g < 10; g++) {
+    for (int g = 0; g < 10; g++) {
         rates[g].start = (ssdgs_real)(0.01 * (g + 1));
         rates[g].end = (ssdgs_real)(0.002 * (10 - g));
     }
@@ -712,21 +700,24 @@ static void test_adam(double share) {
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, &settings, MANY, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+    size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&settings, first);
-    stride = trainer->stride;
-    planes = SSDGS_CHANNELS * stride;
-    values = planes + model->global_count;
-    start = (ssdgs_real *)malloc(values * sizeof *start);
+    const size_t stride = trainer->stride;
+    const size_t planes = SSDGS_CHANNELS * stride;
+    const size_t values = planes + model->global_count;
+    ssdgs_real *start = (ssdgs_real *)malloc(values * sizeof *start);
     memcpy(start, model->gaussians, planes * sizeof *start);
     memcpy(start + planes, model->globals, model->global_count * sizeof *start);
-    for (step = 0; step < STEPS; step++) {
+    ssdgs_real *gradient[STEPS];
+    int learns[SSDGS__GROUPS], terms[STEPS];
+    for (int step = 0; step < STEPS; step++) {
         ssdgs_frame frame;
         memset(&frame, 0, sizeof frame);
         frame.camera.width = 20;
         frame.camera.height = 15;
         frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
         frame.global_gradient = frame.gradient + planes;
-        for (i = 0; i < values;
+        for (size_t i = 0; i < values;
              i++) { /* of all sizes: those below 1e-18 count as 0, those beyond 1e18 as that */
             const double u = ssdgs__uniform((uint64_t)step, i);
             gradient[step][i] =
@@ -734,18 +725,19 @@ static void test_adam(double share) {
                                                               : i % 16 < 15 ? 1e30
                                                                             : 8e-19));
         }
-        for (g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
+        for (int g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
         terms[step] = step & 1 ? ALL : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
         CHECK(!ssdgs__adam_step(trainer, &frame, times[step], terms[step], learns));
     }
-    for (i = 0; i < values; i++) {
+    for (size_t i = 0; i < values; i++) {
         double mean = 0, square = 0, value = (double)start[i], epsilon = share / (255 * 3 * 20 * 15);
         int clock = 0;
         if (i < planes && i % stride >= MANY) continue;
+        int g;
         for (g = 0; g < SSDGS__PLANE_GROUPS && i / stride >= (size_t)ssdgs__group_plane[g + 1];) g++;
         while (i >= planes && i - planes >= first[g - SSDGS__PLANE_GROUPS + 1]) g++;
         epsilon = fmax(g ? epsilon : epsilon / 2.5, 1e-15);
-        for (step = 0; step < STEPS; step++) {
+        for (int step = 0; step < STEPS; step++) {
             const double raw = (double)gradient[step][i],
                          slope = fabs(raw) < 1e-18 ? 0 : fmin(fmax(raw, -1e18), 1e18);
             const double past = (times[step] - learning[g].from) / learning[g].over, x = past < 0   ? 0
@@ -764,7 +756,7 @@ static void test_adam(double share) {
     }
     if (!CHECK(worst < 4e-6))
         printf("    Adam, epsilon %g: off by %.3g\n", share, worst); /* six roundings of values up to 4 */
-    for (step = 0; step < STEPS; step++) free(gradient[step]);
+    for (int step = 0; step < STEPS; step++) free(gradient[step]);
     free(start);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -783,15 +775,12 @@ static void test_refinement(void) {
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
     ssdgs_real background[3] = {0, 0, 0};
-    ssdgs_photo disturbed[PHOTOS];
-    ssdgs_metrics metrics;
-    double off[2][2] = {{0, 0}, {0, 0}}, first, turn; /* before, after: cameras, lights */
-    int i, c, p;
+    double off[2][2] = {{0, 0}, {0, 0}}; /* before, after: cameras, lights */
     settings.terms = SSDGS_DIFFUSE_TERM;
     settings.light_scale = (ssdgs_real)0.05;
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
-    for (i = 0; i < MANY; i++)
-        for (c = 0; c < 3; c++) {
+    for (int i = 0; i < MANY; i++)
+        for (int c = 0; c < 3; c++) {
             model->gaussians[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
                 (ssdgs_real)(ssdgs__uniform(6, (uint64_t)(3 * i + c)) - 0.5);
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
@@ -800,11 +789,13 @@ static void test_refinement(void) {
             model->gaussians[(size_t)(SSDGS_FRAME + c) * model->capacity + (size_t)i] =
                 (ssdgs_real)(2 * ssdgs__uniform(8, (uint64_t)(3 * i + c)) - 1);
         }
-    for (p = 0; p < PHOTOS; p++) {
+    ssdgs_photo disturbed[PHOTOS];
+    for (int p = 0; p < PHOTOS; p++) {
         const double way = p & 1 ? -1 : 1;
+        ssdgs_metrics metrics;
         CHECK(!ssdgs_evaluate(model, photos + p, background, image, &metrics));
         ssdgs_to_bytes(image, SIDE * SIDE * 3, SSDGS_TRANSFER_NONE, pictures[p]);
-        for (i = SIDE * SIDE; i-- > 0;) {
+        for (int i = SIDE * SIDE; i-- > 0;) {
             memmove(pictures[p] + 4 * i, pictures[p] + 3 * i, 3);
             pictures[p][4 * i + 3] = 255;
         }
@@ -820,11 +811,14 @@ static void test_refinement(void) {
     options.densify_until = 0;
     options.random_background = 0; /* the model is not as opaque as its photographs */
     CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
-    for (i = 0; i < 31; i++)
+    for (int i = 0; i < 31; i++)
         CHECK(!ssdgs_trainer_step(trainer, NULL)); /* the last moves a camera, at 5,000 of 60,000 */
+    double first;
+    int p;
     for (p = 0, first = 0; p < PHOTOS; p++) first += fabs(trainer->corrections[p].value[0]);
     CHECK(fabs(first / (2e-3 * 0.25 * sqrt(300.0 * PHOTOS / 360)) - 1) <
           1e-3); /* Adam's first step is the rate, whatever it is of */
+    double turn;
     for (p = 0, turn = 0; p < PHOTOS; p++)
         turn += fabs(trainer->corrections[p].value[3]); /* its turns, of the picture's width */
     CHECK(fabs(turn / first / (2 * atan(0.5 * SIDE / (double)photos[0].camera.fx)) - 1) < 1e-3);
@@ -832,7 +826,7 @@ static void test_refinement(void) {
     for (p = 0; p < PHOTOS; p++) {
         ssdgs_photo now;
         CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
-        for (i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++) {
             off[0][0] +=
                 fabs((double)(disturbed[p].camera.view[4 * i + 3] - photos[p].camera.view[4 * i + 3]));
             off[0][1] += fabs((double)(disturbed[p].light.position[i] - photos[p].light.position[i]));
@@ -856,44 +850,47 @@ static void test_anchor(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs__correction kept[PHOTOS];
     double worst = 0, largest = 0;
-    int i, j, l, p, both;
     options.refine = SSDGS_REFINE_CAMERA;
+    int j;
     for (j = 0; j < 3; j++) {
         options.bounds_min[j] = (ssdgs_real)(centre[j] - 0.5);
         options.bounds_max[j] = (ssdgs_real)(centre[j] + 0.5);
     }
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (both = 0; both < 2; both++) {
-        for (p = 0; p < PHOTOS; p++) { /* view x motion = correction x view */
+    ssdgs__correction kept[PHOTOS];
+    int l;
+    for (int both = 0; both < 2; both++) {
+        for (int p = 0; p < PHOTOS; p++) { /* view x motion = correction x view */
             const ssdgs_real *view = photos[p].camera.view;
             const double way = p == 0 ? 1 : p == 1 ? -1 : 0;
-            double *value = trainer->corrections[p].value, seen[3], e[9], jacobian[9];
-            for (i = 0; i < 3; i++)
+            double *value = trainer->corrections[p].value, seen[3];
+            for (int i = 0; i < 3; i++)
                 for (seen[i] = (double)view[4 * i + 3], value[i] = value[3 + i] = 0, j = 0; j < 3; j++) {
                     seen[i] += (double)view[4 * i + j] * centre[j];
                     value[i] += (double)view[4 * i + j] * (both + way) * motion[j];
                     value[3 + i] += (double)view[4 * i + j] * (both + way) * motion[3 + j];
                 }
+            double e[9], jacobian[9];
             ssdgs__rotate_by(value + 3, e, jacobian);
-            for (i = 0; i < 3; i++)
+            for (int i = 0; i < 3; i++)
                 for (value[i] += seen[i], l = 0; l < 3; l++) value[i] -= e[3 * i + l] * seen[l];
         }
         if (!both) memcpy(kept, trainer->corrections, sizeof kept);
         ssdgs__anchor_cameras(trainer);
-        for (p = 0; p < PHOTOS; p++)
-            for (i = 0; i < 6; i++)
+        for (int p = 0; p < PHOTOS; p++)
+            for (int i = 0; i < 6; i++)
                 worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
     }
     if (!CHECK(worst < 2e-6)) printf("    off by %g\n", worst);
     memset(trainer->corrections, 0, PHOTOS * sizeof *trainer->corrections);
-    for (i = 0; i < 34; i++) CHECK(!ssdgs_trainer_step(trainer, NULL)); /* cameras move from 30 on */
+    for (int i = 0; i < 34; i++) CHECK(!ssdgs_trainer_step(trainer, NULL)); /* cameras move from 30 on */
     memcpy(kept, trainer->corrections, sizeof kept);
     ssdgs__anchor_cameras(trainer);
+    int p;
     for (p = 0, worst = 0; p < PHOTOS; p++)
-        for (i = 0; i < 6; i++) {
+        for (int i = 0; i < 6; i++) {
             worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
             largest = fmax(largest, fabs(kept[p].value[i]));
         }
@@ -908,8 +905,8 @@ static void test_anchor(void) {
 /* The schedules switch terms and freezes at the paper's iterations, scaled to the run. */
 static void test_schedule(void) {
     ssdgs_train_options o = ssdgs_train_options_published();
-    int learns[SSDGS__GROUPS];
     o.iterations = 6000;
+    int learns[SSDGS__GROUPS];
     CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 499), learns) == SSDGS_DIFFUSE_TERM);
     CHECK(ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, ssdgs__schedule_time(&o, 500), learns) ==
           (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
@@ -945,9 +942,8 @@ static void test_isolation(void) {
     const ssdgs_train_options options = short_run(8);
     ssdgs_render_options render = ssdgs_render_options_default();
     ssdgs_image image;
-    int isa, i, k;
     memset(&image, 0, sizeof image);
-    for (isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         ssdgs_context_desc desc;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
@@ -959,15 +955,15 @@ static void test_isolation(void) {
         if (ssdgs_context_create(&desc, &context)) continue;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < 4; i++)
+        for (int i = 0; i < 4; i++)
             model->gaussians[(size_t)broken[i] * model->capacity + (size_t)(40 + 5 * i)] = (ssdgs_real)NAN;
-        for (i = 0; i < 5; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+        for (int i = 0; i < 5; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
         image.color = color;
         render.stop = (ssdgs_real)0.3; /* so that some entries of a tile are not seen */
-        for (i = 0; i < model->count; i++)
+        for (int i = 0; i < model->count; i++)
             model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] += 6;
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
-        for (k = 0; k < 3;
+        for (int k = 0; k < 3;
              k++) { /* close to the far side, and too bright for the colours there to be finite */
             bright.intensity[k] = sizeof(ssdgs_real) == 4 ? (ssdgs_real)3e38 : (ssdgs_real)1e308;
             bright.position[k] = k == 0 ? (ssdgs_real)-0.6 : (ssdgs_real)0;
@@ -978,7 +974,7 @@ static void test_isolation(void) {
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
         image.color = color;
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
-        for (i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(again[i]);
+        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(again[i]);
         CHECK(finite && !memcmp(again, color, sizeof color));
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -986,9 +982,8 @@ static void test_isolation(void) {
     }
     { /* a camera that looks at infinity is made, and refused or not, but returns */
         ssdgs_real eye[3] = {0, 0, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-        ssdgs_camera camera;
         target[0] = (ssdgs_real)INFINITY;
-        camera = ssdgs_camera_look_at(eye, target, up, 1, 8, 8);
+        ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 1, 8, 8);
         CHECK(ssdgs__finite(camera.view[0]));
     }
 }
@@ -1000,13 +995,10 @@ static void test_density(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs__correction correction;
-    double gradient[9], before;
-    int i, c;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, NULL, 400, &model));
-    for (i = 0; i < 400; i++)
-        for (c = 0; c < 3; c++) {
+    for (int i = 0; i < 400; i++)
+        for (int c = 0; c < 3; c++) {
             model->gaussians[(size_t)c * model->capacity + (size_t)i] =
                 (ssdgs_real)(0.6 * ssdgs__uniform(4, (uint64_t)(3 * i + c)) - 0.3);
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = (ssdgs_real)-2.8;
@@ -1014,7 +1006,7 @@ static void test_density(void) {
     options.max_gaussians = 150;
     options.opacity_reset_every = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+    for (int i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
     CHECK(model->count <= 150 && model->count > 50);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -1022,15 +1014,17 @@ static void test_density(void) {
     options.prune_outside = 0;
     CHECK(!ssdgs_model_create(context, NULL, 0, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+    for (int i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
     CHECK(model->count > 10);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
+    ssdgs__correction correction;
     memset(&correction, 0, sizeof correction);
-    for (i = 0; i < 9; i++) gradient[i] = 0.5 * (i + 1);
-    for (i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3, 3, 0.1);
-    before = correction.value[6];
+    double gradient[9];
+    for (int i = 0; i < 9; i++) gradient[i] = 0.5 * (i + 1);
+    for (int i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3, 3, 0.1);
+    const double before = correction.value[6];
     ssdgs__correction_step(&correction, gradient, 1, 1e-3, 3, 0.1);
     CHECK(before == 0 && fabs(correction.value[6] + 3e-3) < 1e-6);
     CHECK(fabs(correction.value[0] + 0.15) < 3e-4 &&
@@ -1045,16 +1039,16 @@ static void test_cap(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    int pass, i, found;
     options.prune_weight = options.prune_outside = 0;
     options.densify_gradient = 1;
-    for (pass = 0; pass < 3; pass++) {
+    for (int pass = 0; pass < 3; pass++) {
         options.max_gaussians = pass ? MANY : MANY / 2;
         CHECK(!ssdgs_context_create(NULL, &context));
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
-        for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
+        for (int i = 0; i < MANY; i++)
+            model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-        for (i = 0; i < MANY; i++) {
+        for (int i = 0; i < MANY; i++) {
             model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
             trainer->screen_count[i] =
                 i >= MANY - UNSEEN ? 0
@@ -1065,6 +1059,7 @@ static void test_cap(void) {
         trainer->iteration = pass == 2 ? 40 : 50; /* opacities are reset at 30 */
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == options.max_gaussians);
+        int i, found;
         for (i = found = 0; i < model->count; i++) {
             const int name = (int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i];
             found += pass ? name == MANY - UNSEEN - 1 : name < MANY / 2 - UNSEEN || name >= MANY - UNSEEN;
@@ -1085,46 +1080,43 @@ static void test_units(void) {
     const ssdgs_real black[3] = {0, 0, 0};
     ssdgs_train_options options = short_run(10);
     ssdgs_context *context = NULL;
-    ssdgs_photo lit[PHOTOS];
-    int i, c, kind;
     CHECK(!ssdgs_context_create(NULL, &context));
-    for (c = 0; c < 3; c++) options.bounds_min[c] = c ? -1 : -2, options.bounds_max[c] = c ? 1 : 2;
-    for (kind = 0; kind < 3; kind++) {
+    for (int c = 0; c < 3; c++) options.bounds_min[c] = c ? -1 : -2, options.bounds_max[c] = c ? 1 : 2;
+    ssdgs_photo lit[PHOTOS];
+    for (int kind = 0; kind < 3; kind++) {
         ssdgs_settings settings = kind == 1 ? ssdgs_settings_published() : ssdgs_settings_default();
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        ssdgs_frame frame;
-        double want;
         if (kind == 2)
             settings.depth_cue = settings.residual_shadow = settings.transport =
                 0; /* the light bias has a length */
-        for (i = 0; i < PHOTOS; i++) {
+        for (int i = 0; i < PHOTOS; i++) {
             lit[i] = photos[i];
-            for (c = 0; c < 3; c++)
+            for (int c = 0; c < 3; c++)
                 lit[i].light.position[c] = (ssdgs_real)(c == 1 && i ? 4 : 0),
                 lit[i].light.intensity[c] = (ssdgs_real)(kind ? 1e-32 : 100);
         }
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, lit, PHOTOS, &options, &trainer));
-        want = kind ? 1e30
-                    : 1 / (100 * pow(0.25, 1.0 / PHOTOS) *
-                           pow(1 / 16.0, 1 - 1.0 / PHOTOS)); /* at the centre: as from 2 away */
+        const double want = kind ? 1e30
+                                 : 1 / (100 * pow(0.25, 1.0 / PHOTOS) *
+                                        pow(1 / 16.0, 1 - 1.0 / PHOTOS)); /* at the centre: as from 2 away */
         CHECK(fabs((double)model->settings.light_scale / want - 1) < 1e-6);
         CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 &&
               fabs(trainer->unit - 4) < 1e-12);
+        ssdgs_frame frame;
         CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
         CHECK(fabs((double)frame.views[0].near_plane - (kind == 1 ? 0.01 : 0.04)) < 1e-7);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
-    for (kind = 0; kind < 3; kind++) {
+    for (int kind = 0; kind < 3; kind++) {
         ssdgs_settings settings = kind == 2 ? ssdgs_settings_published() : ssdgs_settings_default();
         ssdgs_model *model = NULL;
         ssdgs_photo photo = photos[0];
-        double turned;
         if (kind < 2) settings.length_unit = (ssdgs_real)(kind ? 0.25 : 0.5);
         CHECK(!ssdgs_model_create(context, &settings, 2, &model));
-        for (c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++)
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity] =
                 (ssdgs_real)log(0.2 + 0.1 * c);
         model->gaussians[(size_t)(SSDGS_POSITION + 1) * model->capacity + 1] =
@@ -1132,8 +1124,10 @@ static void test_units(void) {
         CHECK(!ssdgs_refine_photo(model, &photo, black, 1));
         CHECK(fabs(fabs((double)(photo.light.position[0] - photos[0].light.position[0])) -
                    (kind ? 5e-4 : 1e-3)) < 1e-6);
+        int c;
+        double turned;
         for (c = 0, turned = 0; c < 3; c++) /* its trace: 1 + 2 cos(root of 3 x the step) */
-            for (i = 0; i < 3; i++)
+            for (int i = 0; i < 3; i++)
                 turned += (double)photo.camera.view[4 * c + i] * (double)photos[0].camera.view[4 * c + i];
         CHECK(fabs(sqrt((3 - turned) / 3) / (1e-3 * SIDE / (double)photo.camera.fx) - 1) < 0.1);
         ssdgs_model_destroy(model);
@@ -1146,18 +1140,17 @@ static void test_units(void) {
 
 /* A Gaussian of no size is as wide as each pass's blur makes it. */
 static void test_blur(void) {
-    int i, pass;
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         ssdgs_settings settings = ssdgs_settings_default();
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
-        ssdgs_frame frame;
         settings.pixel_variance = (ssdgs_real)(i ? 0.7 : 0.1);
         settings.light_blur = i ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 1, &model));
-        for (pass = 0; pass < 3; pass++)
+        for (int pass = 0; pass < 3; pass++)
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);
         model->gaussians[(size_t)SSDGS_OPACITY * model->capacity] = 4;
+        ssdgs_frame frame;
         CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) &&
               frame.view_count > 1);
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_PROJECT));
@@ -1173,10 +1166,9 @@ static void test_blur(void) {
    ends, at 5/6 of a run. */
 static void test_resets(void) {
     ssdgs_train_options options = short_run(90);
-    int i;
-    for (i = 0; i < 90; i++) CHECK(ssdgs__resets(&options, i) == (i == 30 || i == 60));
+    for (int i = 0; i < 90; i++) CHECK(ssdgs__resets(&options, i) == (i == 30 || i == 60));
     options.iterations = 89;
-    for (i = 0; i < 89; i++) CHECK(ssdgs__resets(&options, i) == (i == 30));
+    for (int i = 0; i < 89; i++) CHECK(ssdgs__resets(&options, i) == (i == 30));
     options.opacity_reset_every = 0;
     CHECK(!ssdgs__resets(&options, 30));
 }
@@ -1188,16 +1180,15 @@ static void test_prune_weight(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    int i, pass;
     options.densify_gradient = 1;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
-    for (i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
+    for (int i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (pass = 0; pass < 3; pass++) { /* opacities are reset at 30, and no more at 90, so near the end */
+    for (int pass = 0; pass < 3; pass++) { /* opacities are reset at 30, and no more at 90, so near the end */
         ssdgs_real *const names = model->gaussians + (size_t)SSDGS_DIFFUSE * model->capacity;
         model->count = MANY;
-        for (i = 0; i < MANY; i++) {
+        for (int i = 0; i < MANY; i++) {
             names[i] = (ssdgs_real)i;
             trainer->screen_count[i] = i == LIGHT ? 0 : 4;
             trainer->screen_gradient[i] = 3; /* in four photographs: too little to make more of it */
@@ -1207,7 +1198,7 @@ static void test_prune_weight(void) {
         trainer->iteration = pass == 2 ? 100 : pass ? 50 : 40;
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == (pass ? MANY - LIGHT : MANY));
-        for (i = 0; i < model->count && pass; i++) CHECK(names[i] >= LIGHT);
+        for (int i = 0; i < model->count && pass; i++) CHECK(names[i] >= LIGHT);
     }
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
@@ -1268,10 +1259,9 @@ static double cube[6];         /* that is said to hold the object */
 static char reading[300];      /* that is said to suit the lights */
 
 static void hear(void *user, ssdgs_result code, const char *message) {
-    int i;
     (void)user;
     if (message[0] >= '0' && message[0] <= '9') told = atoi(message);
-    for (i = 0; i < NOTES; i++) heard[i] += code == SSDGS_OK && strstr(message, note_words[i]) != NULL;
+    for (int i = 0; i < NOTES; i++) heard[i] += code == SSDGS_OK && strstr(message, note_words[i]) != NULL;
     if (strstr(message, note_words[READ_AS])) snprintf(reading, sizeof reading, "%s", message);
     if (strstr(message, note_words[CUBE]))
         CHECK(sscanf(strstr(message, "bounds_min"), "bounds_min=%lf,%lf,%lf bounds_max=%lf,%lf,%lf", cube,
@@ -1290,34 +1280,34 @@ static void test_doubts(void) {
                                     {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
     static unsigned char clear[SIDE * SIDE * 4], cut[SIDE * SIDE * 4];
     ssdgs_context *context = NULL;
-    ssdgs_context_desc desc;
-    int kind, i, c;
     memcpy(cut, pixels[1], sizeof cut);
-    for (i = 0; i < SIDE / 2; i++) cut[4 * (SIDE / 2 * SIDE + i) + 3] = 255; /* up to the picture's border */
+    for (int i = 0; i < SIDE / 2; i++)
+        cut[4 * (SIDE / 2 * SIDE + i) + 3] = 255; /* up to the picture's border */
+    ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (kind = 0; kind < 11; kind++) {
+    for (int kind = 0; kind < 11; kind++) {
         ssdgs_train_options options = short_run(60);
         ssdgs_photo shots[PHOTOS];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         memcpy(shots, photos, sizeof shots);
         options.prune_outside = 0;
-        for (c = 0; c < 3 && (kind == 1 || kind == 2 || kind == 9); c++)
+        for (int c = 0; c < 3 && (kind == 1 || kind == 2 || kind == 9); c++)
             options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)(kind == 2 ? 3 : 0.1));
         if (kind == 9) shots[1].pixels = cut;
         if (kind == 10)
             options.bounds_min[0] =
                 -(options.bounds_max[0] = (ssdgs_real)1.2); /* as wide as cameras stand, not as deep */
-        for (i = 0; i < PHOTOS; i++) {
+        for (int i = 0; i < PHOTOS; i++) {
             if (kind == 3) shots[i].camera = photos[0].camera;
-            for (c = 0; c < (kind == 10 ? 1 : 3) && (kind == 10 || (kind == 4 && i < 2)); c++)
+            for (int c = 0; c < (kind == 10 ? 1 : 3) && (kind == 10 || (kind == 4 && i < 2)); c++)
                 shots[i].light.intensity[c] = 0;
-            for (c = 4; c < 12 && kind == 5; c++) shots[i].camera.view[c] = -shots[i].camera.view[c];
+            for (int c = 4; c < 12 && kind == 5; c++) shots[i].camera.view[c] = -shots[i].camera.view[c];
             if (kind == 6) shots[i].camera.cx += 20;
             if (kind == 7) shots[i].pixels = clear;
-            for (c = 0; c < 3 && kind == 8; c++)
+            for (int c = 0; c < 3 && kind == 8; c++)
                 shots[i].camera.view[4 * c + 3] -=
                     5 * shots[i].camera.view[4 * c + 1]; /* the world moves by 5 */
         }
@@ -1329,9 +1319,10 @@ static void test_doubts(void) {
         wanted[kind][kind == 3 || kind == 8 ? CONTRADICTED : LIGHT_MOVES] = 1;
         wanted[kind][LIT_WITHIN] = kind == 2;
         if (!CHECK(!memcmp(heard, wanted[kind], sizeof heard)))
-            for (i = 0; i < NOTES; i++) printf("    %d: \"%s\" %d times\n", kind, note_words[i], heard[i]);
+            for (int i = 0; i < NOTES; i++)
+                printf("    %d: \"%s\" %d times\n", kind, note_words[i], heard[i]);
         CHECK(kind == 4 ? told == 2 : kind != 7 || told == 6);
-        for (c = 0; c < 6 && heard[CUBE]; c++) /* its radius is 0.4 */
+        for (int c = 0; c < 6 && heard[CUBE]; c++) /* its radius is 0.4 */
             CHECK(fabs(fabs(cube[c] - (kind == 8 && c % 3 == 1 ? 5 : 0)) - 0.42) < 0.06 &&
                   (cube[c] > (kind == 8 && c % 3 == 1 ? 5 : 0)) == (c > 2));
         ssdgs_trainer_destroy(trainer);
@@ -1344,8 +1335,7 @@ static void test_doubts(void) {
 /* How soft shadows are is learnt with the shadow term, whether there are highlights or not; other forms'
    weights rest without them. */
 static void test_softness(void) {
-    int kind, i, k;
-    for (kind = 0; kind < 3; kind++) {
+    for (int kind = 0; kind < 3; kind++) {
         ssdgs_train_options options = short_run(6);
         ssdgs_settings settings = ssdgs_settings_default();
         ssdgs_context *context = NULL;
@@ -1358,8 +1348,8 @@ static void test_softness(void) {
         CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer) &&
               !ssdgs_trainer_run(trainer, NULL, NULL));
-        for (k = 0; k < SSDGS_ASG_COUNT; k++)
-            for (i = 0; i < model->count; i++)
+        for (int k = 0; k < SSDGS_ASG_COUNT; k++)
+            for (int i = 0; i < model->count; i++)
                 moved += fabs(
                     (double)model->gaussians[(size_t)(SSDGS_ASG_WEIGHT + k) * model->capacity + (size_t)i]);
         CHECK(kind ? moved <= 0 : moved > 0);
@@ -1376,13 +1366,12 @@ static void test_rearranged(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *a = NULL, *b = NULL;
-    int i;
     rests.densify_until = 0;
     grows.densify_from = grows.densify_every = 2;
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &rests, &a) &&
           !ssdgs_trainer_create(model, photos, PHOTOS, &grows, &b));
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         CHECK(!ssdgs_trainer_step(b, NULL));
         CHECK(ssdgs_trainer_step(a, NULL) ==
               (i ? SSDGS_ERR_ARGUMENT : SSDGS_OK)); /* the control is after the second */
@@ -1409,19 +1398,18 @@ static void test_nothing_in_view(void) {
     const ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
-    int blind, i;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (blind = 0; blind < 2; blind++) {
+    for (int blind = 0; blind < 2; blind++) {
         ssdgs_photo shots[PHOTOS];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         memcpy(shots, photos, sizeof shots);
-        for (i = 0; i < PHOTOS && blind; i++) shots[i].camera.near_plane = 10;
+        for (int i = 0; i < PHOTOS && blind; i++) shots[i].camera.near_plane = 10;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
-        for (i = 0; i < 2; i++) CHECK(!ssdgs_trainer_step(trainer, NULL) && heard[NO_VIEW] == blind);
+        for (int i = 0; i < 2; i++) CHECK(!ssdgs_trainer_step(trainer, NULL) && heard[NO_VIEW] == blind);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -1437,23 +1425,23 @@ static int unseen; /* places that no photograph of outlined() has */
 /* Whether a place is transparent in more than a share of the photographs that have it, and more than one of
    eight, or none has it, counted in double; the first camera stands aside. */
 static int outlined(const ssdgs_photo *shots, int count, double aside, const double x[3], double share) {
-    int photo, c, seen = 0, outside = 0;
-    for (photo = 0; photo < count; photo++) {
+    int seen = 0, outside = 0;
+    for (int photo = 0; photo < count; photo++) {
         const ssdgs_camera *k = &shots[photo].camera;
-        double t[3], u, v;
-        int dx, dy, any = 0;
-        for (c = 0; c < 3; c++) {
+        double t[3];
+        int any = 0;
+        for (int c = 0; c < 3; c++) {
             t[c] = (double)k->view[4 * c + 3];
             t[c] += (double)k->view[4 * c] * x[0] + (double)k->view[4 * c + 1] * x[1] +
                     (double)k->view[4 * c + 2] * x[2];
         }
         if (photo == 0) t[0] += aside;
-        u = floor((double)k->fx * t[0] / t[2] + (double)k->cx);
-        v = floor((double)k->fy * t[1] / t[2] + (double)k->cy);
+        const double u = floor((double)k->fx * t[0] / t[2] + (double)k->cx);
+        const double v = floor((double)k->fy * t[1] / t[2] + (double)k->cy);
         if (t[2] <= 0 || u < 0 || v < 0 || u >= SIDE || v >= SIDE) continue;
         seen++;
-        for (dy = -1; dy <= 1; dy++)
-            for (dx = -1; dx <= 1; dx++) {
+        for (int dy = -1; dy <= 1; dy++)
+            for (int dx = -1; dx <= 1; dx++) {
                 const double px = u + dx, py = v + dy, rx = (px + 0.5 - SIDE / 2) / (SIDE * 0.3),
                              ry = (py + 0.5 - SIDE / 2) / (SIDE * 0.3);
                 if ((dx && dy) || px < 0 || py < 0 || px >= SIDE || py >= SIDE) continue;
@@ -1474,40 +1462,38 @@ static void test_prune_outside(void) {
     static const double shares[5] = {0, 0.3, 0.6, 0.01, 0.01};
     static const double centre[5] = {0, 0, 0, 0.35, 0}, half[5] = {0.8, 0.8, 0.8, 0.15, 0.8};
     static unsigned char veiled[SIDE * SIDE * 4], opaque[SIDE * SIDE * 4];
-    ssdgs_photo shots[MORE];
     ssdgs_train_options options = short_run(100);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
-    int pass, i, c, photo;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
-    for (photo = 0; photo < MORE; photo++) shots[photo] = photos[photo % PHOTOS];
+    ssdgs_photo shots[MORE];
+    for (int photo = 0; photo < MORE; photo++) shots[photo] = photos[photo % PHOTOS];
     memcpy(veiled, pixels[1], sizeof veiled);
     memcpy(opaque, pixels[2], sizeof opaque);
-    for (i = 0; i < SIDE; i++) veiled[4 * (i * SIDE + COLUMN) + 3] = 1;
-    for (i = 0; i < SIDE * SIDE; i++) opaque[4 * i + 3] = 255;
+    for (int i = 0; i < SIDE; i++) veiled[4 * (i * SIDE + COLUMN) + 3] = 1;
+    for (int i = 0; i < SIDE * SIDE; i++) opaque[4 * i + 3] = 255;
     shots[1].pixels = veiled;
-    for (photo = PHOTOS; photo < MORE; photo++) shots[photo].pixels = opaque;
+    for (int photo = PHOTOS; photo < MORE; photo++) shots[photo].pixels = opaque;
     shots[3].camera.view[11] = -1; /* all but what is far off is behind it */
     options.densify_gradient = 1;
     options.initial_points = MANY;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (pass = 0; pass < 5; pass++) {
+    for (int pass = 0; pass < 5; pass++) {
         const int count = pass == 4 ? MORE : PHOTOS;
-        unsigned char stays[MANY];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        double starts[MANY][3];
-        int left = 0, unlike = 0, rounds;
+        int left = 0, unlike = 0;
         unseen = 0;
         options.prune_outside = (ssdgs_real)shares[pass];
         shots[2].pixels = pass == 1 ? blank : opaque; /* one that shows nothing has no outlines either */
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, count, &options, &trainer))) exit(1);
         trainer->corrections[0].value[0] = 0.2; /* as refined */
-        for (i = 0; i < MANY; i++) {
+        unsigned char stays[MANY];
+        for (int i = 0; i < MANY; i++) {
             double x[3];
-            for (c = 0; c < 3; c++) {
+            for (int c = 0; c < 3; c++) {
                 ssdgs_real *at = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity + i;
                 *at = (ssdgs_real)(1.6 * ssdgs__uniform(9, (uint64_t)(3 * i + c)) - 0.8);
                 x[c] = (double)*at;
@@ -1520,14 +1506,16 @@ static void test_prune_outside(void) {
         trainer->iteration = 40; /* opacities were reset at 30 */
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == left);
-        for (i = 0; i < model->count; i++)
+        for (int i = 0; i < model->count; i++)
             unlike += !stays[(int)model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i]];
         CHECK(unlike == 0);
         ssdgs_trainer_destroy(trainer);
+        double starts[MANY][3];
+        int rounds;
         for (left = rounds = 0; left <= MANY / 4 && rounds < 16;
              rounds++) /* the places that such a start draws */
-            for (i = left; i < MANY; i++) {
-                for (c = 0; c < 3; c++)
+            for (int i = left; i < MANY; i++) {
+                for (int c = 0; c < 3; c++)
                     starts[left][c] =
                         centre[pass] +
                         half[pass] *
@@ -1536,18 +1524,19 @@ static void test_prune_outside(void) {
             }
         CHECK(pass == 0 || pass == 2 ? rounds == 1 : rounds > 1);
         model->count = 0;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             options.bounds_min[c] = (ssdgs_real)(centre[pass] - half[pass]);
             options.bounds_max[c] = (ssdgs_real)(centre[pass] + half[pass]);
         }
         CHECK(!ssdgs_trainer_create(model, shots, count, &options, &trainer) && model->count == left);
+        int i;
         for (i = unlike = 0; i < left; i++) {
             const ssdgs_real *const p = model->gaussians,
                                     expected = (ssdgs_real)(2 * half[pass] * pow(MANY * rounds, -1.0 / 3));
-            int j, found = 0;
-            for (j = 0; j < model->count; j++) {
+            int found = 0;
+            for (int j = 0; j < model->count; j++) {
                 double d2 = 0;
-                for (c = 0; c < 3; c++) {
+                for (int c = 0; c < 3; c++) {
                     const double d =
                         (double)p[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)j] - starts[i][c];
                     d2 += d * d;
@@ -1569,8 +1558,8 @@ static void test_prune_outside(void) {
         ssdgs_trainer *trainer = NULL;
         CHECK(!heard[NO_POINT] && !heard[NO_OUTLINES]);
         clear[3] = 255; /* a corner */
-        for (photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
-        for (c = 0; c < 3; c++)
+        for (int photo = 0; photo < PHOTOS; photo++) shots[photo].pixels = clear;
+        for (int c = 0; c < 3; c++)
             options.bounds_min[c] = -(options.bounds_max[c] = (ssdgs_real)0.2); /* where all of it is seen */
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) && model->count == MANY);
@@ -1598,24 +1587,25 @@ static void test_wrong_outlines(void) {
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
-    size_t i;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     memset(opaque, 255, sizeof opaque);
-    for (i = 0; i < SIDE * SIDE; i++) speck[4 * i + 3] = i % SIDE < SIDE / 6 && i / SIDE < SIDE / 6 ? 255 : 0;
+    for (size_t i = 0; i < SIDE * SIDE; i++)
+        speck[4 * i + 3] = i % SIDE < SIDE / 6 && i / SIDE < SIDE / 6 ? 255 : 0;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const int wrong = cases[i].wrong, first = 3; /* of all the first that is wrong */
         ssdgs_photo shots[24];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        int k, c, left_out = 0;
-        for (k = 0; k < cases[i].photographs; k++) {
+        int left_out = 0;
+        for (int k = 0; k < cases[i].photographs; k++) {
             shots[k] = photos[k % PHOTOS];
             if (k >= cases[i].photographs - cases[i].opaque) shots[k].pixels = opaque;
             if (k < first || k >= first + wrong) continue;
             if (!cases[i].turned) shots[k].pixels = speck;
-            for (c = 0; c < 4 && cases[i].turned; c++) { /* by 0.3 radians about y, half the angle of view */
+            for (int c = 0; c < 4 && cases[i].turned;
+                 c++) { /* by 0.3 radians about y, half the angle of view */
                 const ssdgs_real x = shots[k].camera.view[c], z = shots[k].camera.view[8 + c];
                 shots[k].camera.view[c] = (ssdgs_real)(cos(0.3) * (double)x + sin(0.3) * (double)z);
                 shots[k].camera.view[8 + c] = (ssdgs_real)(cos(0.3) * (double)z - sin(0.3) * (double)x);
@@ -1625,7 +1615,7 @@ static void test_wrong_outlines(void) {
         told = 0;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
-        for (k = 0; k < cases[i].photographs; k++) {
+        for (int k = 0; k < cases[i].photographs; k++) {
             left_out += trainer->transparent[k] == 1;
             CHECK(trainer->transparent[k] == (k >= cases[i].photographs - cases[i].opaque ? 0 : 2) ||
                   (k >= first && k < first + wrong));
@@ -1647,26 +1637,26 @@ enum { SHOTS = 16, WIDE = 48 };
    times alpha. */
 static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, int multiplied,
                          unsigned char *out) {
-    int x, y, sx, sy, c, l;
-    for (y = 0; y < WIDE; y++)
-        for (x = 0; x < WIDE; x++) {
-            double sum = 0, hits = 0, alpha;
-            for (sy = 0; sy < 4; sy++)
-                for (sx = 0; sx < 4; sx++) {
-                    double ray[3], eye[3] = {0, 0, 0}, d[3] = {0, 0, 0}, n[3], to_light[3], b = 0, e2 = 0,
-                                   d2 = 0, t, cosine = 0, l2 = 0;
+    for (int y = 0; y < WIDE; y++)
+        for (int x = 0; x < WIDE; x++) {
+            double sum = 0, hits = 0;
+            for (int sy = 0; sy < 4; sy++)
+                for (int sx = 0; sx < 4; sx++) {
+                    double ray[3], eye[3] = {0, 0, 0}, d[3] = {0, 0, 0}, b = 0, e2 = 0, d2 = 0, cosine = 0,
+                                   l2 = 0;
                     ray[0] = (x + (sx + 0.5) / 4 - (double)camera->cx) / (double)camera->fx;
                     ray[1] = (y + (sy + 0.5) / 4 - (double)camera->cy) / (double)camera->fy;
                     ray[2] = 1;
-                    for (c = 0; c < 3; c++)
-                        for (l = 0; l < 3; l++) {
+                    for (int c = 0; c < 3; c++)
+                        for (int l = 0; l < 3; l++) {
                             d[c] += (double)camera->view[4 * l + c] * ray[l];
                             eye[c] -= (double)camera->view[4 * l + c] * (double)camera->view[4 * l + 3];
                         }
-                    for (c = 0; c < 3; c++) b += d[c] * eye[c], e2 += eye[c] * eye[c], d2 += d[c] * d[c];
+                    for (int c = 0; c < 3; c++) b += d[c] * eye[c], e2 += eye[c] * eye[c], d2 += d[c] * d[c];
                     if (b * b - d2 * (e2 - 0.16) <= 0) continue;
-                    t = (-b - sqrt(b * b - d2 * (e2 - 0.16))) / d2;
-                    for (c = 0; c < 3; c++) {
+                    const double t = (-b - sqrt(b * b - d2 * (e2 - 0.16))) / d2;
+                    double n[3], to_light[3];
+                    for (int c = 0; c < 3; c++) {
                         n[c] = (eye[c] + t * d[c]) / 0.4;
                         to_light[c] = (double)light->position[c] -
                                       (light->kind == SSDGS_LIGHT_POINT ? eye[c] + t * d[c] : 0);
@@ -1677,8 +1667,8 @@ static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, i
                     hits++;
                     sum += cosine > 0 ? cosine * (double)light->intensity[0] : 0;
                 }
-            alpha = hits / 16;
-            for (c = 0; c < 3; c++) {
+            const double alpha = hits / 16;
+            for (int c = 0; c < 3; c++) {
                 const ssdgs_real linear = (ssdgs_real)(hits > 0 ? 0.8 * sum / hits : 0);
                 const double stored = (double)ssdgs_srgb_encode(linear < 1 ? linear : 1);
                 out[4 * (y * WIDE + x) + c] = (unsigned char)(255 * stored * (multiplied ? alpha : 1) + 0.5);
@@ -1737,17 +1727,16 @@ static void test_light_notes(void) {
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
-    size_t i;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const char *name = cases[i].name;
         ssdgs_photo shots[SHOTS];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        int k, c, l, total = 0;
-        for (k = 0; k < SHOTS; k++) {
+        int l, total = 0;
+        for (int k = 0; k < SHOTS; k++) {
             const double turn = 2.4 * k, rise = cases[i].above ? 0.95 : 1 - (2 * k + 1.0) / SHOTS,
                          out = sqrt(1 - rise * rise);
             const double light_turn = 1.7 * k + 1, light_rise = cases[i].above ? 0.5 : 0.9 * sin(2.9 * k),
@@ -1756,14 +1745,13 @@ static void test_light_notes(void) {
             const ssdgs_real eye[3] = {(ssdgs_real)(2 * out * cos(turn)), (ssdgs_real)(2 * out * sin(turn)),
                                        (ssdgs_real)(2 * rise)};
             ssdgs_light *light = &shots[k].light;
-            ssdgs_real p[3], *to;
             shots[k].camera = ssdgs_camera_look_at(eye, centre, up, (ssdgs_real)0.6, WIDE, WIDE);
             light->kind = cases[i].directional ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
             light->position[0] = (ssdgs_real)(away * light_out * cos(light_turn));
             light->position[1] = (ssdgs_real)(away * light_out * sin(light_turn));
             light->position[2] = (ssdgs_real)(away * light_rise);
-            for (c = 0; c < 3; c++) light->intensity[c] = cases[i].directional ? 1 : 4;
-            for (c = 0; c < 3; c++) { /* held by hand */
+            for (int c = 0; c < 3; c++) light->intensity[c] = cases[i].directional ? 1 : 4;
+            for (int c = 0; c < 3; c++) { /* held by hand */
                 const double shake = (cases[i].directional ? 0.01 : 0.03) * sin(7.0 * k + 2 * c);
                 if (!strcmp(name, "flash")) light->position[c] = eye[c] + (ssdgs_real)shake;
                 if (!strcmp(name, "one"))
@@ -1773,9 +1761,10 @@ static void test_light_notes(void) {
             ball_picture(&shots[k].camera, light, cases[i].multiplied, pictures[k]);
             shots[k].pixels = pictures[k];
             shots[k].format = SSDGS_PIXELS_RGBA8;
+            ssdgs_real p[3];
             memcpy(p, light->position, sizeof p);
-            to = light->position; /* what the capture says of it */
-            for (c = 0; c < 3; c++) {
+            ssdgs_real *to = light->position; /* what the capture says of it */
+            for (int c = 0; c < 3; c++) {
                 if (!strcmp(name, "negative") || (name[0] == '-' && c == name[1] - 'x')) to[c] = -p[c];
                 if (name[1] == 'z' || name[1] == 'y') to[c] = name[0] == '-' ? to[c] : p[name[c] - 'x'];
                 if (!strcmp(name, "inside")) to[c] = (ssdgs_real)0.1 * p[c];
@@ -1790,15 +1779,15 @@ static void test_light_notes(void) {
         reading[0] = 0;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, SHOTS, &options, &trainer))) exit(1);
-        for (c = 0; c < NOTES; c++) total += heard[c];
+        for (int c = 0; c < NOTES; c++) total += heard[c];
         total -= cases[i].notes[1] == NOTES ? heard[READ_AS] : 0; /* what follows from those wanted */
         total -= cases[i].notes[0] == LIT_WITHIN ? heard[CONTRADICTED] : 0;
         if (!CHECK(total == (cases[i].notes[0] < NOTES) + (cases[i].notes[1] < NOTES))) {
             printf("    %s, directional %d, above %d:\n", name, cases[i].directional, cases[i].above);
-            for (c = 0; c < NOTES; c++)
+            for (int c = 0; c < NOTES; c++)
                 if (heard[c]) printf("    \"%s\"\n", note_words[c]);
         }
-        for (c = 0; c < 2; c++)
+        for (int c = 0; c < 2; c++)
             if (!CHECK(cases[i].notes[c] == NOTES || heard[cases[i].notes[c]] == 1))
                 printf("    %s: not \"%s\"\n", name, note_words[cases[i].notes[c]]);
         if (!CHECK(!cases[i].reading || strstr(reading, cases[i].reading)))
@@ -1824,16 +1813,13 @@ static void test_borders(void) {
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
-    size_t i;
     memset(&desc, 0, sizeof desc);
     desc.logger.write = hear;
     CHECK(!ssdgs_context_create(&desc, &context));
-    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
-        ssdgs_photo shots[PHOTOS];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        size_t k;
-        for (k = 0; k < sizeof opaque; k++) { /* what is within does not count */
+        for (size_t k = 0; k < sizeof opaque; k++) { /* what is within does not count */
             const size_t x = k / 4 % SIDE, y = k / 4 / SIDE;
             const int border = !x || !y || x == SIDE - 1 || y == SIDE - 1;
             const double value = cases[i].border + cases[i].noise * (2 * ssdgs__uniform(5, k) - 1);
@@ -1843,11 +1829,12 @@ static void test_borders(void) {
                                         : k / 4 % 2                        ? 255
                                                                            : 0);
         }
-        for (k = 0; k < PHOTOS; k++) {
+        ssdgs_photo shots[PHOTOS];
+        for (size_t k = 0; k < PHOTOS; k++) {
             shots[k] = photos[k];
             shots[k].pixels = opaque;
         }
-        for (k = 0; k < 3; k++) options.background[k] = (ssdgs_real)cases[i].background;
+        for (size_t k = 0; k < 3; k++) options.background[k] = (ssdgs_real)cases[i].background;
         memset(heard, 0, sizeof heard);
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
@@ -1869,37 +1856,35 @@ static void test_clipped(void) {
     static unsigned char bytes[SIDE * SIDE * 4];
     static const int frozen[2] = {1, 1};
     const ssdgs_real black[3] = {0, 0, 0};
-    int transfer, dim, i, c, full;
-    for (transfer = 0; transfer < 2; transfer++) {
+    for (int transfer = 0; transfer < 2; transfer++) {
         ssdgs_settings settings = ssdgs_settings_default();
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
         ssdgs_photo photo = photos[0];
-        ssdgs__loss_values values;
-        ssdgs_frame frame;
-        ssdgs_real alpha[SIDE * SIDE], *g;
-        ssdgs_image out;
         ssdgs_render_options exact = ssdgs_render_options_exact();
         settings.transfer = transfer;
         settings.terms = SSDGS_DIFFUSE_TERM;
         CHECK(!ssdgs_context_create(NULL, &context));
         if (!CHECK(!ssdgs_model_create(context, &settings, 40, &model))) exit(1);
-        g = ssdgs_model_arrays(model).gaussians;
-        for (i = 0; i < 40; i++) {
-            for (c = 0; c < 3; c++) {
+        ssdgs_real *g = ssdgs_model_arrays(model).gaussians;
+        for (int i = 0; i < 40; i++) {
+            for (int c = 0; c < 3; c++) {
                 g[(size_t)(SSDGS_POSITION + c) * model->capacity + (size_t)i] =
                     (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(3 * i + c)) - 0.4);
                 g[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] = -2;
             }
             g[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 3;
         }
+        ssdgs_image out;
         memset(&out, 0, sizeof out);
         out.color = image;
+        ssdgs_real alpha[SIDE * SIDE];
         out.alpha = alpha;
         CHECK(!ssdgs_render_ex(model, &photo.camera, &photo.light, 1, &exact, &out, NULL));
-        for (dim = 0; dim < 2; dim++) {
+        for (int dim = 0; dim < 2; dim++) {
+            int i, full;
             for (i = full = 0; i < SIDE * SIDE; i++) {
-                for (c = 0; c < 3; c++) {
+                for (int c = 0; c < 3; c++) {
                     const double straight = (double)image[3 * i + c] / fmax((double)alpha[i], 1e-4);
                     const double stored = transfer == SSDGS_TRANSFER_SRGB
                                               ? (double)ssdgs_srgb_encode((ssdgs_real)straight)
@@ -1910,6 +1895,8 @@ static void test_clipped(void) {
                 bytes[4 * i + 3] = (unsigned char)(255 * (double)alpha[i] + 0.5);
             }
             photo.pixels = bytes;
+            ssdgs__loss_values values;
+            ssdgs_frame frame;
             CHECK(!ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, black,
                                          SSDGS_DIFFUSE_TERM, frozen, (ssdgs_real)0.2, 0, &values));
             CHECK(full > SIDE);
@@ -1940,17 +1927,15 @@ static void test_outlines_known(void) {
     static unsigned char opaque[SIDE * SIDE * 4], part[SIDE * SIDE * 4];
     const ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
-    size_t i;
     memset(opaque, 255, sizeof opaque);
     CHECK(!ssdgs_context_create(NULL, &context));
-    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
-        ssdgs_photo shots[100];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
-        int k;
-        for (k = 0; k < SIDE * SIDE; k++)
+        for (int k = 0; k < SIDE * SIDE; k++)
             part[4 * k + 3] = k < cases[i].clear ? 0 : 254; /* a veil alone is no outline */
-        for (k = 0; k < cases[i].photographs; k++) {
+        ssdgs_photo shots[100];
+        for (int k = 0; k < cases[i].photographs; k++) {
             shots[k] = photos[k % PHOTOS];
             if (k >= cases[i].outlined) shots[k].pixels = opaque;
             else if (cases[i].clear) shots[k].pixels = part;
@@ -1958,7 +1943,7 @@ static void test_outlines_known(void) {
         CHECK(!ssdgs_model_create(context, NULL, 1, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         CHECK(trainer->outlines == cases[i].known);
-        for (k = 0; k < cases[i].photographs; k++)
+        for (int k = 0; k < cases[i].photographs; k++)
             CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
         { /* where an object fills less than 0.15 of the picture, screen gradients count for more */
             const double shown = cases[i].clear < SIDE * SIDE ? SIDE * SIDE - cases[i].clear : SIDE * SIDE;
@@ -1969,15 +1954,14 @@ static void test_outlines_known(void) {
     }
     {
         double sum[2] = {0, 0};
-        int pass, k;
-        for (pass = 0; pass < 2; pass++) {
+        for (int pass = 0; pass < 2; pass++) {
             ssdgs_model *model = NULL;
             ssdgs_trainer *trainer = NULL;
             CHECK(!ssdgs_model_create(context, NULL, 0, &model));
             if (!CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer))) exit(1);
-            for (k = 0; k < PHOTOS && pass; k++) trainer->magnify[k] = 3;
+            for (int k = 0; k < PHOTOS && pass; k++) trainer->magnify[k] = 3;
             CHECK(!ssdgs_trainer_step(trainer, NULL));
-            for (k = 0; k < model->count; k++) sum[pass] += (double)trainer->screen_gradient[k];
+            for (int k = 0; k < model->count; k++) sum[pass] += (double)trainer->screen_gradient[k];
             ssdgs_trainer_destroy(trainer);
             ssdgs_model_destroy(model);
         }
@@ -1995,34 +1979,32 @@ static void test_fade(void) {
     static unsigned char opaque[SIDE * SIDE * 4];
     ssdgs_train_options options = short_run(60);
     ssdgs_context *context = NULL;
-    int known, i;
     CHECK(!ssdgs_context_create(NULL, &context));
-    for (known = 0; known < 3; known++) { /* nothing; outlines; that pictures are filled */
+    for (int known = 0; known < 3; known++) { /* nothing; outlines; that pictures are filled */
         memset(opaque, known == 2 ? 200 : 0, sizeof opaque);
-        for (i = 3; i < SIDE * SIDE * 4; i += 4) opaque[i] = 255;
+        for (int i = 3; i < SIDE * SIDE * 4; i += 4) opaque[i] = 255;
         ssdgs_photo shots[PHOTOS];
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         memcpy(shots, photos, sizeof shots);
-        for (i = known == 1; i < PHOTOS; i++) shots[i].pixels = opaque;
+        for (int i = known == 1; i < PHOTOS; i++) shots[i].pixels = opaque;
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
-        for (i = 0; i < MANY; i++) {
+        for (int i = 0; i < MANY; i++) {
             ssdgs_real gradient[MANY] = {1, 1, 1, 1, 1},
                        *opacity = model->gaussians + SSDGS_OPACITY * model->capacity;
-            double sum[2] = {0, 0}, want;
-            int j, side;
-            for (j = 0; j < MANY; j++) opacity[j] = (ssdgs_real)(j - 1.7);
-            for (side = 0; side < 2; side++)
-                for (j = 0; j < MANY; j++)
+            double sum[2] = {0, 0};
+            for (int j = 0; j < MANY; j++) opacity[j] = (ssdgs_real)(j - 1.7);
+            for (int side = 0; side < 2; side++)
+                for (int j = 0; j < MANY; j++)
                     sum[side] += 1 / (1 + exp(-(double)opacity[j] + (j == i ? (side ? -step : step) : 0)));
-            want = known ? 0 : 0.5 * fade / area * (sum[1] - sum[0]) / (2 * step);
+            const double want = known ? 0 : 0.5 * fade / area * (sum[1] - sum[0]) / (2 * step);
             ssdgs__fade(trainer, 15e3, area, gradient);
             CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5 && (known || want > 1e-3));
             ssdgs__fade(trainer, 30e3, area, gradient);
             CHECK(fabs((double)gradient[i] - 1 - want) < 1e-5);
         }
-        for (i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++)
             model->gaussians[(size_t)(SSDGS_POSITION + i) * model->capacity] =
                 1000; /* no photograph has it */
         model->gaussians[SSDGS_OPACITY * model->capacity] = 2;
@@ -2044,45 +2026,45 @@ static void test_half_shadow(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_real *p, q[4], raw[4], r[9];
-    double middle[3], apart[3], length = 0;
-    size_t stride;
-    int i, c, half;
+    double length = 0;
     options.opacity_reset_every = 0;
     options.densify_gradient = 1;
     options.densify_shadow = 2;
     CHECK(!ssdgs_context_create(NULL, &context));
     CHECK(!ssdgs_model_create(context, NULL, 2, &model));
-    p = model->gaussians;
-    for (c = 0; c < 4; c++)
+    ssdgs_real *p = model->gaussians;
+    ssdgs_real raw[4];
+    for (int c = 0; c < 4; c++)
         raw[c] = p[(size_t)(SSDGS_ROTATION + c) * model->capacity + 1] = (ssdgs_real)turn[c];
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         p[(size_t)c * model->capacity + 1] = (ssdgs_real)0.2;
         p[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + 1] = (ssdgs_real)log(scale[c]);
     }
     p[SSDGS_OPACITY * model->capacity + 1] = (ssdgs_real)1.2;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (i = 0; i < 2; i++) { /* the first has too little of it */
+    for (int i = 0; i < 2; i++) { /* the first has too little of it */
         trainer->screen_count[i] = 3;
         trainer->contribution[i] = 100;
         trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             trainer->mean[(size_t)c * trainer->stride + (size_t)i] =
                 trainer->square[(size_t)c * trainer->stride + (size_t)i] = 1;
     }
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 3);
     p = model->gaussians;
-    stride = model->capacity;
+    const size_t stride = model->capacity;
+    ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw, q, r);
-    for (half = 0, i = 0; i < 3; i++) { /* the first is still the first; halves start without momentum */
-        for (c = 0; c < SSDGS_CHANNELS; c++)
+    double middle[3], apart[3];
+    for (int half = 0, i = 0; i < 3; i++) { /* the first is still the first; halves start without momentum */
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
             CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i &&
                   trainer->square[(size_t)c * stride + (size_t)i] == !i);
         CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 &&
               trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
         if (i == 0) continue;
-        for (c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++) {
             const double x = (double)p[(size_t)c * stride + (size_t)i];
             middle[c] = (half ? middle[c] : 0) + x / 2;
             apart[c] = half ? apart[c] - x : x;
@@ -2096,7 +2078,7 @@ static void test_half_shadow(void) {
         }
         half++;
     }
-    for (c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         CHECK(fabs(middle[c] - 0.2) < 1e-6);
         length += apart[c] * apart[c];
         CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) <
@@ -2111,7 +2093,7 @@ static void test_half_shadow(void) {
     ssdgs_model_destroy(model);
     CHECK(!ssdgs_model_create(context, NULL, 200, &model)); /* of many, the few with the most */
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (i = 0; i < 200; i++) {
+    for (int i = 0; i < 200; i++) {
         model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
         trainer->screen_count[i] = 1;
         trainer->contribution[i] = 100;
@@ -2119,6 +2101,7 @@ static void test_half_shadow(void) {
     }
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 204);
+    int i, c;
     for (i = 0, c = 0; i < 204; i++)
         c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
     CHECK(c == 8);

@@ -27,24 +27,23 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lig
 static ssdgs_model *make_model(int count, double size) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    int i, c;
     settings.transport = 1;
     settings.scattering_width = 16;
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
-    for (i = 0; i < count; i++)
-        for (c = 0; c < 3; c++)
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + (size_t)i] =
                 (ssdgs_real)log(size);
     return model;
 }
 
 static void on_sphere(ssdgs_model *model, int count) {
-    int i, c;
-    for (i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++) {
         const double u = 2 * draw((uint64_t)i) - 1, w = sqrt(1 - u * u),
                      a = 6.2831853 * draw(9000 + (uint64_t)i);
         const double p[3] = {0.4 * w * cos(a), 0.4 * w * sin(a), 0.4 * u};
-        for (c = 0; c < 3; c++) model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
+        for (int c = 0; c < 3; c++)
+            model->gaussians[(size_t)c * model->capacity + (size_t)i] = (ssdgs_real)p[c];
     }
 }
 
@@ -66,41 +65,40 @@ static void test_pairs(int sorted) {
     static ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
     ssdgs_model *model = make_model(COUNT, 0.01);
     ssdgs_light lights[2];
-    ssdgs_frame frame;
     double worst[SSDGS__LENGTHS] = {0}, most[SSDGS__LENGTHS] = {0}, all = 0;
-    int i, c, s, k, light;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
     on_sphere(model, COUNT);
     if (sorted) CHECK(!ssdgs_model_sort(model));
+    ssdgs_frame frame;
     begin(&frame, model, lights, 2);
-    for (i = 0; i < 2 * COUNT; i++)
+    for (int i = 0; i < 2 * COUNT; i++)
         frame.flux[i] = (ssdgs_real)(i % 7 < 4 ? 0 : 1e-4 * draw(20000 + (uint64_t)i));
-    for (s = 0; s < SSDGS__BLOCK; s++) {
-        for (c = 0; c < 3; c++)
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
+        for (int c = 0; c < 3; c++)
             x[c * SSDGS__BLOCK + s] = model->gaussians[(size_t)c * model->capacity + 1000 + (size_t)s];
     }
-    for (light = 0; light < 2; light++) {
+    for (int light = 0; light < 2; light++) {
         sums_at(&frame, light, x, sums);
-        for (s = 0; s < SSDGS__BLOCK; s++)
-            for (k = 0; k < SSDGS__LENGTHS; k++) {
+        for (int s = 0; s < SSDGS__BLOCK; s++)
+            for (int k = 0; k < SSDGS__LENGTHS; k++) {
                 const double l = 0.5 * 0.04 * (1 << k);
-                double sum = 0, error;
-                for (i = 0; i < COUNT; i++) {
+                double sum = 0;
+                for (int i = 0; i < COUNT; i++) {
                     double r = 0.01 * 0.01;
-                    for (c = 0; c < 3; c++)
+                    for (int c = 0; c < 3; c++)
                         r += pow((double)(x[c * SSDGS__BLOCK + s] -
                                           model->gaussians[(size_t)c * model->capacity + (size_t)i]),
                                  2);
                     r = sqrt(r);
                     sum += (double)frame.flux[light * COUNT + i] * exp(-r / l) / (6.283185307179586 * l * r);
                 }
-                error = fabs((double)sums[k * SSDGS__BLOCK + s] - sum);
+                const double error = fabs((double)sums[k * SSDGS__BLOCK + s] - sum);
                 worst[k] = error > worst[k] ? error : worst[k];
                 most[k] = sum > most[k] ? sum : most[k];
             }
     }
-    for (k = 0; k < SSDGS__LENGTHS; k++) all = worst[k] / most[k] > all ? worst[k] / most[k] : all;
+    for (int k = 0; k < SSDGS__LENGTHS; k++) all = worst[k] / most[k] > all ? worst[k] / most[k] : all;
     printf("against all pairs, %s: off by %.2g of the largest sum\n", sorted ? "sorted" : "unsorted", all);
     CHECK(sorted ? all > 1e-3 && all < 0.03 : all < 1e-3);
     ssdgs_model_destroy(model);
@@ -112,26 +110,25 @@ static void test_plane(void) {
     static ssdgs_real x[3 * SSDGS__BLOCK], sums[SSDGS__LENGTHS * SSDGS__BLOCK];
     ssdgs_model *model = make_model(COUNT, 0.01);
     ssdgs_light light;
-    ssdgs_frame frame;
-    int i, s, k;
     memset(&light, 0, sizeof light);
     light.position[2] = 2;
-    for (i = 0; i < COUNT; i++) { /* 0.005 apart */
+    for (int i = 0; i < COUNT; i++) { /* 0.005 apart */
         const int row = i / ROW, column = i % ROW;
         model->gaussians[i] = (ssdgs_real)(0.005 * (column - ROW / 2));
         model->gaussians[model->capacity + (size_t)i] = (ssdgs_real)(0.005 * (row - ROW / 2));
     }
     CHECK(!ssdgs_model_sort(model));
+    ssdgs_frame frame;
     begin(&frame, model, &light, 1);
-    for (i = 0; i < COUNT; i++) frame.flux[i] = (ssdgs_real)(0.005 * 0.005);
-    for (s = 0; s < SSDGS__BLOCK; s++) {
+    for (int i = 0; i < COUNT; i++) frame.flux[i] = (ssdgs_real)(0.005 * 0.005);
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
         x[s] = (ssdgs_real)(0.05 * (draw((uint64_t)s) - 0.5));
         x[SSDGS__BLOCK + s] = (ssdgs_real)(0.05 * (draw(100 + (uint64_t)s) - 0.5));
         x[2 * SSDGS__BLOCK + s] = (ssdgs_real)(0.002 * s);
     }
     sums_at(&frame, 0, x, sums);
-    for (k = 0; k < 3; k++) /* longer lengths leave the plane */
-        for (s = 0; s < SSDGS__BLOCK; s++) {
+    for (int k = 0; k < 3; k++) /* longer lengths leave the plane */
+        for (int s = 0; s < SSDGS__BLOCK; s++) {
             const double l = 0.5 * 0.04 * (1 << k), h = 0.002 * s,
                          expected = exp(-sqrt(h * h + 0.01 * 0.01) / l);
             CHECK(fabs((double)sums[k * SSDGS__BLOCK + s] - expected) < 0.02 * expected + 0.004);
@@ -144,35 +141,32 @@ static void test_plane(void) {
 static void test_inputs(void) {
     enum { COUNT = 2000 };
     ssdgs_model *model = make_model(COUNT, 0.02);
-    const ssdgs_real *activations;
-    ssdgs__block_layout l;
     ssdgs_light lights[2];
-    ssdgs_frame frame;
     double worst = 0, most = 0, dark = 1e30;
-    int i, c, j, k, light;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
     on_sphere(model, COUNT);
-    for (i = 0; i < COUNT; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
+    for (int i = 0; i < COUNT; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
     CHECK(!ssdgs_model_sort(model));
+    ssdgs_frame frame;
     begin_as(&frame, model, lights, 2, 1);
     if (!CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_SHADE))) exit(1);
-    l = ssdgs__layout(&frame);
-    activations = (const ssdgs_real *)frame.memory->activations.memory;
+    ssdgs__block_layout l = ssdgs__layout(&frame);
+    const ssdgs_real *activations = (const ssdgs_real *)frame.memory->activations.memory;
     CHECK(frame.shaded_count > COUNT / 4 && frame.shaded_count < COUNT);
-    for (j = 0; j < frame.shaded_count; j += 7)
-        for (light = 0; light < 2; light++)
-            for (k = 0; k < SSDGS__LENGTHS; k++) {
+    for (int j = 0; j < frame.shaded_count; j += 7)
+        for (int light = 0; light < 2; light++)
+            for (int k = 0; k < SSDGS__LENGTHS; k++) {
                 const size_t at = frame.shaded[j];
                 const double length = 0.5 * 0.04 * (1 << k);
-                double sum = 0, away = 0, error;
-                for (c = 0; c < 3; c++)
+                double sum = 0, away = 0;
+                for (int c = 0; c < 3; c++)
                     away += pow((double)(lights[light].position[c] -
                                          model->gaussians[(size_t)c * model->capacity + at]),
                                 2);
-                for (i = 0; i < COUNT; i++) {
+                for (int i = 0; i < COUNT; i++) {
                     double r = 0.01 * 0.01;
-                    for (c = 0; c < 3; c++)
+                    for (int c = 0; c < 3; c++)
                         r += pow((double)(model->gaussians[(size_t)c * model->capacity + at] -
                                           model->gaussians[(size_t)c * model->capacity + (size_t)i]),
                                  2);
@@ -181,10 +175,10 @@ static void test_inputs(void) {
                            (6.283185307179586 * length * r);
                 }
                 sum *= away;
-                error = fabs((double)activations[l.size * (size_t)(j / SSDGS__BLOCK) + l.lights +
-                                                 l.light_size * (size_t)light + l.transport +
-                                                 (size_t)(k * SSDGS__BLOCK + j % SSDGS__BLOCK)] -
-                             sum);
+                const double error = fabs((double)activations[l.size * (size_t)(j / SSDGS__BLOCK) + l.lights +
+                                                              l.light_size * (size_t)light + l.transport +
+                                                              (size_t)(k * SSDGS__BLOCK + j % SSDGS__BLOCK)] -
+                                          sum);
                 worst = error > worst ? error : worst;
                 most = sum > most ? sum : most;
                 dark = sum < dark ? sum : dark;
@@ -199,24 +193,21 @@ static void test_inputs(void) {
 static void test_flux(void) {
     enum { ROW = 60, COUNT = ROW * ROW };
     ssdgs_model *model = make_model(COUNT, 0.012);
-    const ssdgs__node *nodes;
-    size_t node_count;
-    ssdgs_frame frame;
-    ssdgs_light light;
-    int i, part;
-    for (i = 0; i < COUNT; i++) {
+    for (int i = 0; i < COUNT; i++) {
         model->gaussians[i] = (ssdgs_real)(0.01 * (i % ROW - ROW / 2 + 0.5));
         model->gaussians[model->capacity + (size_t)i] = (ssdgs_real)(0.01 * (i / ROW - ROW / 2 + 0.5));
         model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
     }
-    for (part = 0; part < 3; part++) {
+    for (int part = 0; part < 3; part++) {
         const double height = part == 1 ? 5000 : 3, half = 0.3 + 0.012;
         double sum = 0, expected = 4 * half * half;
+        ssdgs_light light;
         memset(&light, 0, sizeof light);
         light.kind = part == 2 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
         light.position[2] = (ssdgs_real)(part == 2 ? 1 : height);
+        ssdgs_frame frame;
         begin(&frame, model, &light, 1);
-        for (i = 0; i < COUNT; i++) sum += (double)frame.flux[i];
+        for (int i = 0; i < COUNT; i++) sum += (double)frame.flux[i];
         if (part == 0)
             expected =
                 4 * atan(half * half /
@@ -224,9 +215,11 @@ static void test_flux(void) {
         if (part == 1) expected /= height * height;
         printf("flux %g of %g\n", sum, expected);
         CHECK(fabs(sum / expected - 1) < 0.06);
+        const ssdgs__node *nodes;
+        size_t node_count;
         CHECK(!ssdgs__nodes(&frame, &nodes, &node_count));
         CHECK(fabs((double)nodes[node_count - 1].flux / sum - 1) < 1e-4);
-        for (i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
+        for (int i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
             const ssdgs__node *root = nodes + node_count - 1;
             const double dx = (double)(model->gaussians[i] - root->x[0]),
                          dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
@@ -243,25 +236,22 @@ static void test_bits(void) {
                             up[3] = {0, 0, 1};
     static ssdgs_real color[6][SIDE * SIDE * 3];
     ssdgs_light light;
-    ssdgs_image image;
-    int part, i, c, view;
     memset(&light, 0, sizeof light);
     light.position[0] = light.position[2] = 2;
-    for (c = 0; c < 3; c++) light.intensity[c] = 9;
+    for (int c = 0; c < 3; c++) light.intensity[c] = 9;
     /* one thread; three; its camera moved there; without transport's light; its light moved there; a Gaussian
        did */
-    for (part = 0; part < 6; part++) {
+    for (int part = 0; part < 6; part++) {
         ssdgs_context_desc desc;
         ssdgs_context *own = NULL, *shared = context;
-        ssdgs_model *model;
         memset(&desc, 0, sizeof desc);
         desc.threads = part == 1 ? 3 : 1;
         if (!CHECK(!ssdgs_context_create(&desc, &own))) exit(1);
         context = own;
-        model = make_model(COUNT, 0.05);
+        ssdgs_model *model = make_model(COUNT, 0.05);
         context = shared;
-        for (i = 0; i < COUNT; i++)
-            for (c = 0; c < 3; c++) {
+        for (int i = 0; i < COUNT; i++)
+            for (int c = 0; c < 3; c++) {
                 model->gaussians[(size_t)c * model->capacity + (size_t)i] =
                     (ssdgs_real)(0.6 * draw(50000 + 3 * (uint64_t)i + (uint64_t)c) - 0.3);
                 model->gaussians[(size_t)(SSDGS_SCATTERING + c) * model->capacity + (size_t)i] = 3;
@@ -270,12 +260,13 @@ static void test_bits(void) {
             int sizes[SSDGS_MAX_LAYERS + 1];
             ssdgs_real *weights = ssdgs_model_arrays(model).scattering;
             ssdgs__network_sizes(&model->settings, 0, sizes);
-            for (i = 0; i < sizes[1]; i++)
-                for (c = 0; c < SSDGS__LENGTHS; c++) weights[(i + 1) * sizes[0] - 1 - c] = 0;
+            for (int i = 0; i < sizes[1]; i++)
+                for (int c = 0; c < SSDGS__LENGTHS; c++) weights[(i + 1) * sizes[0] - 1 - c] = 0;
         }
+        ssdgs_image image;
         memset(&image, 0, sizeof image);
         image.color = color[part];
-        for (view = part == 2 || part > 3 ? 0 : 1; view < 2; view++) {
+        for (int view = part == 2 || part > 3 ? 0 : 1; view < 2; view++) {
             const ssdgs_real x = (ssdgs_real)(0.6 * draw(50000) - 0.3);
             light.position[0] = part == 4 && !view ? -2 : 2;
             if (part == 5) *ssdgs_model_arrays(model).gaussians = view ? x : x + 1;

@@ -42,10 +42,11 @@ static inline int test_l2(double error, double norm, double relative) {
 /* got, want: arrays of any number type. */
 #define CHECK_NEAR(got, want, count, absolute, relative, name) \
     do { \
-        size_t test_i, test_worst = 0, test_count = (size_t)(count); \
-        double test_e, test_max = 0; \
-        for (test_i = 0; test_i < test_count; test_i++) { \
-            test_e = test_error((double)(got)[test_i], (double)(want)[test_i], absolute, relative); \
+        size_t test_worst = 0, test_count = (size_t)(count); \
+        double test_max = 0; \
+        for (size_t test_i = 0; test_i < test_count; test_i++) { \
+            const double test_e = \
+                test_error((double)(got)[test_i], (double)(want)[test_i], absolute, relative); \
             if (test_e > test_max) test_max = test_e, test_worst = test_i; \
         } \
         if (!test_check(test_count > 0 && test_max <= 1, __FILE__, __LINE__, name) && test_count > 0) \
@@ -57,10 +58,10 @@ static inline int test_l2(double error, double norm, double relative) {
 /* |got - want| <= relative |want| in the 2-norm. */
 #define CHECK_L2(got, want, count, relative, name) \
     do { \
-        size_t test_i, test_count = (size_t)(count); \
-        double test_d, test_sum = 0, test_norm = 0; \
-        for (test_i = 0; test_i < test_count; test_i++) { \
-            test_d = (double)(got)[test_i] - (double)(want)[test_i]; \
+        size_t test_count = (size_t)(count); \
+        double test_sum = 0, test_norm = 0; \
+        for (size_t test_i = 0; test_i < test_count; test_i++) { \
+            const double test_d = (double)(got)[test_i] - (double)(want)[test_i]; \
             test_sum += test_finite(test_d) ? test_d * test_d : 1e300; \
             test_norm += (double)(want)[test_i] * (double)(want)[test_i]; \
         } \
@@ -105,8 +106,7 @@ typedef struct gold_file {
 
 /* The array called name; none ends the program, which counts as failed for want of its closing line. */
 static inline gold_array *gold_find(gold_file *file, const char *name) {
-    int i;
-    for (i = 0; i < file->count; i++)
+    for (int i = 0; i < file->count; i++)
         if (!strcmp(file->array[i].name, name)) return &file->array[i];
     printf("%s: holds no array %s\n", file->path, name);
     exit(1);
@@ -133,27 +133,24 @@ static inline uint32_t gold_u32(FILE *stream) {
    read. */
 static inline int gold_open(gold_file *file, const char *name) {
     const char *folder = getenv("SSDGS_GOLDEN");
-    char magic[8];
-    uint32_t i, k, count;
-    size_t at;
-    int ok;
-    FILE *stream;
     file->count = 0;
     snprintf(file->path, sizeof file->path, "%s/%s.gold", folder && *folder ? folder : "tests/golden", name);
-    stream = fopen(file->path, "rb");
-    ok = stream && fread(magic, 1, 8, stream) == 8 && !memcmp(magic, "SSDGOLD1", 8);
-    count = ok ? gold_u32(stream) : 0;
+    FILE *stream = fopen(file->path, "rb");
+    char magic[8];
+    int ok = stream && fread(magic, 1, 8, stream) == 8 && !memcmp(magic, "SSDGOLD1", 8);
+    const uint32_t count = ok ? gold_u32(stream) : 0;
     ok = ok && count <= GOLD_ARRAYS;
-    for (i = 0; ok && i < count; i++) {
+    for (uint32_t i = 0; ok && i < count; i++) {
         gold_array *array = &file->array[i];
         ok = fread(array->name, 1, 32, stream) == 32;
         array->name[32] = 0;
         gold_u32(stream);
+        uint32_t k;
         for (k = 0, array->count = 1; k < 4; k++) array->count *= array->dims[k] = gold_u32(stream);
         array->data = (double *)malloc(array->count * sizeof(double) + 1);
         file->count++;
         ok = ok && array->data && fread(array->data, sizeof(double), array->count, stream) == array->count;
-        for (at = 0; ok && at < array->count;
+        for (size_t at = 0; ok && at < array->count;
              at++) { /* lowest byte first in the file, whatever the machine */
             const unsigned char *bytes = (const unsigned char *)(array->data + at);
             uint64_t word = 0;

@@ -17,9 +17,8 @@ static char folder[1000]; /* the program's: files are written there */
 
 static const char *put_file(const char *name, const void *bytes, size_t size) {
     static char path[1100];
-    FILE *file;
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    file = fopen(path, "wb");
+    FILE *file = fopen(path, "wb");
     HOLDS(file && fwrite(bytes, 1, size, file) == size && !fclose(file));
     return path;
 }
@@ -61,12 +60,10 @@ static ssdgs_real draw_real(input *in, double otherwise, double range) {
         1e19,     -1e19, 1e20,  1e25,         1e30,         -1e30, 3.4e38, -3.4e38};
     const int byte = draw(in);
     uint32_t bits = 0;
-    float value;
-    int i;
     if (byte == 0) return (ssdgs_real)otherwise;
     if (byte < 192) return (ssdgs_real)((byte - 96) / 95.0 * range);
-    value = (float)edges[byte < 255 ? byte - 192 : 0];
-    for (i = 0; byte == 255 && i < 4; i++) bits |= (uint32_t)draw(in) << 8 * i;
+    float value = (float)edges[byte < 255 ? byte - 192 : 0];
+    for (int i = 0; byte == 255 && i < 4; i++) bits |= (uint32_t)draw(in) << 8 * i;
     if (byte == 255) memcpy(&value, &bits, sizeof value);
     in->tame = in->tame && ssdgs__finite((ssdgs_real)value) && fabs((double)value) <= 1000;
     return (ssdgs_real)value;
@@ -85,7 +82,7 @@ static ssdgs_context *draw_context(input *in) {
 
 static ssdgs_settings draw_settings(input *in) {
     ssdgs_settings s = draw(in) & 1 ? ssdgs_settings_published() : ssdgs_settings_default();
-    int i, flags = draw(in);
+    int flags = draw(in);
     s.terms ^= draw_below(in, 16);
     s.baked = flags >> 7;
     s.transfer ^= flags & 1;
@@ -108,7 +105,7 @@ static ssdgs_settings draw_settings(input *in) {
     s.eta = draw_real(in, (double)s.eta, 3);
     s.length_unit = draw_real(in, (double)s.length_unit, 2);
     s.light_scale = draw_real(in, (double)s.light_scale, 2);
-    for (i = 0; i < 3; i++) s.centre[i] = draw_real(in, (double)s.centre[i], 2);
+    for (int i = 0; i < 3; i++) s.centre[i] = draw_real(in, (double)s.centre[i], 2);
     return s;
 }
 
@@ -116,17 +113,14 @@ static ssdgs_settings draw_settings(input *in) {
 static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most) {
     const ssdgs_settings settings = draw_settings(in);
     ssdgs_model *model = NULL;
-    ssdgs_real *value;
-    size_t at;
-    int i, c;
     if (ssdgs_model_create(context, &settings, draw_below(in, most + 1), &model)) return NULL;
-    for (i = 0; i < model->count; i++)
-        for (c = 0; c < SSDGS_CHANNELS; c++) {
-            value = model->gaussians + (size_t)c * model->capacity + i;
+    for (int i = 0; i < model->count; i++)
+        for (int c = 0; c < SSDGS_CHANNELS; c++) {
+            ssdgs_real *value = model->gaussians + (size_t)c * model->capacity + i;
             *value = draw_real(in, (double)*value, c < SSDGS_ROTATION ? 1 : 6);
         }
-    for (i = draw_below(in, 9); i > 0; i--) { /* shared values anywhere */
-        at = (size_t)draw(in) << 8;
+    for (int i = draw_below(in, 9); i > 0; i--) { /* shared values anywhere */
+        size_t at = (size_t)draw(in) << 8;
         at |= (size_t)draw(in);
         model->globals[at % model->global_count] = draw_real(in, 0, 6);
     }
@@ -135,33 +129,32 @@ static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most) {
 
 static ssdgs_camera draw_camera(input *in, int side) {
     ssdgs_real eye[3], target[3], up[3];
-    ssdgs_camera camera;
-    int i, width = 1 + draw_below(in, side), height = 1 + draw_below(in, side), flags = draw(in);
-    for (i = 0; i < 3; i++) {
+    int width = 1 + draw_below(in, side), height = 1 + draw_below(in, side), flags = draw(in);
+    for (int i = 0; i < 3; i++) {
         eye[i] = draw_real(in, i == 1 ? -3 : i, 3);
         target[i] = draw_real(in, 0, 1);
         up[i] = draw_real(in, i == 2, 1);
     }
-    camera = ssdgs_camera_look_at(eye, target, up, draw_real(in, 0.6, 3), width, height);
+    ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, draw_real(in, 0.6, 3), width, height);
     if (flags & 1) camera.near_plane = draw_real(in, 0, 4);
     if (flags & 2) camera.cx = draw_real(in, 0, 20), camera.cy = draw_real(in, 0, 20);
     if (flags & 4) camera.fx = draw_real(in, 10, 100), camera.fy = draw_real(in, 10, 100);
-    for (i = 0; flags & 8 && i < 12; i++) camera.view[i] = draw_real(in, (double)camera.view[i], 1);
+    for (int i = 0; flags & 8 && i < 12; i++) camera.view[i] = draw_real(in, (double)camera.view[i], 1);
     return camera;
 }
 
 static ssdgs_light draw_light(input *in) {
     ssdgs_light light;
     double length = 0;
-    int i, kind = draw(in) & 3; /* 1: directional; 3: so, and of whatever length it was given */
+    int kind = draw(in) & 3; /* 1: directional; 3: so, and of whatever length it was given */
     memset(&light, 0, sizeof light);
     light.kind = kind & 1 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         light.position[i] = draw_real(in, i - 1, 3);
         light.intensity[i] = draw_real(in, 9, 10);
         length += (double)light.position[i] * (double)light.position[i];
     }
-    for (i = 0; kind == 1 && length > 0 && i < 3; i++)
+    for (int i = 0; kind == 1 && length > 0 && i < 3; i++)
         light.position[i] = (ssdgs_real)((double)light.position[i] / sqrt(length));
     return light;
 }
@@ -173,16 +166,15 @@ static int all_finite(const ssdgs_real *values, size_t count) {
 }
 
 static int model_finite(const ssdgs_model *model) {
-    int c, finite = all_finite(model->globals, model->global_count);
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    int finite = all_finite(model->globals, model->global_count);
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         finite &= all_finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
     return finite;
 }
 
 static uint64_t model_hash(const ssdgs_model *model) {
     uint64_t hash = ssdgs__fold(1, model->globals, model->global_count * sizeof(ssdgs_real));
-    int c;
-    for (c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < SSDGS_CHANNELS; c++)
         hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity,
                            (size_t)model->count * sizeof(ssdgs_real));
     return hash;
@@ -208,13 +200,12 @@ static size_t plane_values(const picture *p, int plane) {
 
 static void draw_picture(input *in, picture *p) {
     ssdgs_render_options *o = &p->options;
-    int i;
     memset(p, 0, sizeof *p);
     p->camera = draw_camera(in, 40);
     p->stride = p->camera.width + draw_below(in, 4);
     p->wanted = ~draw(in);
     p->light_count = (1 + draw(in)) % 3;
-    for (i = 0; i < p->light_count; i++) p->lights[i] = draw_light(in);
+    for (int i = 0; i < p->light_count; i++) p->lights[i] = draw_light(in);
     *o = draw(in) & 1 ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     o->terms ^= draw_below(in, 16);
     o->antialias = draw(in) & 1;
@@ -223,16 +214,14 @@ static void draw_picture(input *in, picture *p) {
     o->max_error = draw_real(in, (double)o->max_error, 1);
     o->light_detail = draw_real(in, 1, 1);
     if (o->light_detail > 1) o->light_detail = 1; /* larger maps cost time alone */
-    for (i = 0; i < 3; i++) o->background[i] = draw_real(in, 0.5, 1);
+    for (int i = 0; i < 3; i++) o->background[i] = draw_real(in, 0.5, 1);
 }
 
 static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
-    ssdgs_render_stats stats;
-    ssdgs_image image;
-    int i;
-    for (i = 0; i < PLANES; i++)
+    for (int i = 0; i < PLANES; i++)
         p->planes[i] =
             p->wanted >> i & 1 ? (ssdgs_real *)calloc(plane_values(p, i), sizeof(ssdgs_real)) : NULL;
+    ssdgs_image image;
     image.stride = p->stride;
     image.color = p->planes[0];
     image.alpha = p->planes[1];
@@ -242,21 +231,19 @@ static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
     image.specular = p->planes[5];
     image.scattering = p->planes[6];
     image.shadow = p->planes[7];
+    ssdgs_render_stats stats;
     return ssdgs_render_ex(model, &p->camera, p->lights, p->light_count, &p->options, &image, &stats);
 }
 
 static void drop_picture(picture *p) {
-    int i;
-    for (i = 0; i < PLANES; i++) free(p->planes[i]);
+    for (int i = 0; i < PLANES; i++) free(p->planes[i]);
 }
 
 static int is_nan(ssdgs_real value) { return !ssdgs__finite(value) && !(value > 1) && !(value < -1); }
 
 static void check_picture(const picture *p, int tame) {
-    size_t i;
-    int plane;
-    for (plane = 0; plane < PLANES; plane++)
-        for (i = 0; p->planes[plane] && i < plane_values(p, plane); i++) {
+    for (int plane = 0; plane < PLANES; plane++)
+        for (size_t i = 0; p->planes[plane] && i < plane_values(p, plane); i++) {
             if (tame) HOLDS(!is_nan(p->planes[plane][i]));
             if (plane == 1) HOLDS(p->planes[plane][i] >= 0 && p->planes[plane][i] <= 1);
         }
@@ -266,16 +253,15 @@ static void fuzz_render(const unsigned char *data, size_t size) {
     input in = {data, data + size, 1};
     ssdgs_context *context = draw_context(&in), *other = NULL;
     ssdgs_model *model = draw_model(&in, context, 12), *twin = NULL;
-    ssdgs_context_desc desc;
-    ssdgs_result result;
-    picture p, again;
-    int i, frames = model ? 1 + draw_below(&in, 3) : 0;
-    for (i = 0; i < frames; i++) {
+    int frames = model ? 1 + draw_below(&in, 3) : 0;
+    for (int i = 0; i < frames; i++) {
+        picture p;
         draw_picture(&in, &p);
-        again = p;
-        result = take_picture(model, &p);
+        picture again = p;
+        const ssdgs_result result = take_picture(model, &p);
         if (!result) check_picture(&p, in.tame);
         if (!result && i == frames - 1 && i > 0) {
+            ssdgs_context_desc desc;
             memset(&desc, 0, sizeof desc);
             desc.threads = 1;
             desc.isa = (ssdgs_isa)context->isa;
@@ -304,8 +290,7 @@ static void fuzz_render(const unsigned char *data, size_t size) {
 
 static ssdgs_train_options draw_options(input *in) {
     ssdgs_train_options o = ssdgs_train_options_default();
-    ssdgs_rate *rates[12];
-    int i, flags = draw(in), rate = draw(in), rate_count = rate ? 12 : 0;
+    int flags = draw(in), rate = draw(in), rate_count = rate ? 12 : 0;
     o.seed = (uint64_t)draw(in);
     o.iterations = 1 + draw(in);
     if (flags & 128) o.iterations *= 1000;
@@ -323,17 +308,18 @@ static ssdgs_train_options draw_options(input *in) {
     o.densify_gradient = draw_real(in, 0, 1);
     o.densify_shadow = draw_real(in, 0, 1);
     o.prune_weight = draw_real(in, 0, 1);
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         o.background[i] = draw_real(in, 0.5, 1);
         o.bounds_min[i] = draw_real(in, -0.5, 1);
         o.bounds_max[i] = draw_real(in, 0.5, 1);
     }
+    ssdgs_rate *rates[12];
     rates[0] = &o.rates.position, rates[1] = &o.rates.opacity, rates[2] = &o.rates.scale,
     rates[3] = &o.rates.rotation, rates[4] = &o.rates.color;
     rates[5] = &o.rates.asg, rates[6] = &o.rates.frame, rates[7] = &o.rates.material,
     rates[8] = &o.rates.shadow, rates[9] = &o.rates.scattering;
     rates[10] = &o.rates.camera, rates[11] = &o.rates.light;
-    for (i = 0; i < rate_count; i++) {
+    for (int i = 0; i < rate_count; i++) {
         rates[i]->start = draw_real(in, (double)rates[i]->start, 1);
         rates[i]->end = draw_real(in, (double)rates[i]->end, 1);
     }
@@ -342,17 +328,16 @@ static ssdgs_train_options draw_options(input *in) {
 
 static void draw_photo(input *in, ssdgs_photo *photo, uint16_t pixels[SIDE * SIDE * 4]) {
     unsigned char *bytes = (unsigned char *)pixels;
-    size_t i, size;
-    unsigned pattern[4];
     memset(photo, 0, sizeof *photo);
     photo->camera = draw_camera(in, SIDE);
     photo->light = draw_light(in);
     photo->format = draw(in) & 1 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
     photo->pixels = pixels;
-    for (i = 0; i < 4; i++) pattern[i] = (unsigned)draw(in);
-    size =
+    unsigned pattern[4];
+    for (size_t i = 0; i < 4; i++) pattern[i] = (unsigned)draw(in);
+    const size_t size =
         (size_t)(photo->camera.width * photo->camera.height) * (photo->format == SSDGS_PIXELS_RGBA16 ? 8 : 4);
-    for (i = 0; i < size; i++) bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
+    for (size_t i = 0; i < size; i++) bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
 }
 
 static void step_holds(ssdgs_trainer *trainer) {
@@ -372,10 +357,9 @@ static void fuzz_train(const unsigned char *data, size_t size) {
     const int photo_count = 1 + draw_below(&in, 2);
     ssdgs_trainer *trainer = NULL;
     ssdgs_photo photos[2];
-    ssdgs_model *model;
-    int i, steps = 1 + draw_below(&in, 3);
-    for (i = 0; i < photo_count; i++) draw_photo(&in, photos + i, pixels[i]);
-    model = draw_model(&in, context, 8);
+    int steps = 1 + draw_below(&in, 3);
+    for (int i = 0; i < photo_count; i++) draw_photo(&in, photos + i, pixels[i]);
+    ssdgs_model *model = draw_model(&in, context, 8);
     if (model && !ssdgs_trainer_create(model, photos, photo_count, &options, &trainer)) {
         trainer->iteration = draw_below(&in, options.iterations); /* each term joins at its time */
         while (steps-- > 0) step_holds(trainer);
@@ -399,23 +383,19 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     ssdgs_train_options options = draw_options(&defaults);
     ssdgs_trainer *trainer = NULL;
     ssdgs_model *model = NULL;
-    ssdgs_photo photo;
-    uint64_t before;
-    size_t length;
     const int flags = draw(&in), cut = draw(&in);
-    const char *path;
-    int i, same, sound;
     options.iterations = 2;
     options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     options.initial_points = 3;
     options.densify_until = 0;
+    ssdgs_photo photo;
     draw_photo(&defaults, &photo, pixels);
     HOLDS(!ssdgs_model_create(context, &settings, 0, &model) &&
           !ssdgs_trainer_create(model, &photo, 1, &options, &trainer));
     if (!saved) {
         unsigned char *read = NULL;
         HOLDS(!ssdgs_trainer_step(trainer, NULL));
-        path = put_file("fuzz.checkpoint", "", 0);
+        const char *path = put_file("fuzz.checkpoint", "", 0);
         HOLDS(!ssdgs_trainer_save(trainer, path) && !ssdgs__read_file(context, path, &read, &saved_size));
         saved = copy_of(read, saved_size);
         ssdgs__release(context, read);
@@ -423,8 +403,8 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
     bytes = (unsigned char *)calloc(saved_size + 128, 1);
     HOLDS(bytes);
     memcpy(bytes, saved, saved_size);
-    length = cut < 128 ? saved_size - (flags & 2 ? (size_t)cut * saved_size / 128 : (size_t)cut)
-                       : saved_size + (size_t)cut - 128;
+    const size_t length = cut < 128 ? saved_size - (flags & 2 ? (size_t)cut * saved_size / 128 : (size_t)cut)
+                                    : saved_size + (size_t)cut - 128;
     while (in.end - in.at >= 4) {
         size_t at = (size_t)draw(&in) << 16;
         at |= (size_t)draw(&in) << 8;
@@ -435,14 +415,14 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
         const uint64_t hash = ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, length - 8);
         memcpy(bytes + length - 8, &hash, sizeof hash);
     }
-    same = length == saved_size && !memcmp(bytes, saved, length);
-    path = put_file("fuzz.checkpoint", bytes, length);
+    const int same = length == saved_size && !memcmp(bytes, saved, length);
+    const char *path = put_file("fuzz.checkpoint", bytes, length);
     free(bytes);
-    before = model_hash(model);
-    sound = !ssdgs_trainer_load(trainer, path);
+    const uint64_t before = model_hash(model);
+    const int sound = !ssdgs_trainer_load(trainer, path);
     HOLDS(sound ? same || !(flags & 1)
-                : !same && model_hash(model) == before);                /* refused: as if nothing had been */
-    for (i = 0; sound && i < 2; i++) ssdgs_trainer_step(trainer, NULL); /* whatever it then computes */
+                : !same && model_hash(model) == before); /* refused: as if nothing had been */
+    for (int i = 0; sound && i < 2; i++) ssdgs_trainer_step(trainer, NULL); /* whatever it then computes */
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
@@ -456,9 +436,9 @@ static void fuzz_ply(const unsigned char *data, size_t size) {
     ssdgs_context *context = draw_context(&defaults);
     ssdgs_load_stats stats;
     ssdgs_model *model;
-    picture p;
     if (!ssdgs_model_load_memory(context, copy, size, &model, &stats)) {
         HOLDS(model_finite(model));
+        picture p;
         draw_picture(&defaults, &p);
         p.options.light_detail = (ssdgs_real)0.1;
         if (model->global_count < 20000 && !take_picture(model, &p)) check_picture(&p, 1);
@@ -483,11 +463,12 @@ static void read_png(const unsigned char *bytes, size_t size) {
 
 static void fuzz_png(const unsigned char *data, size_t size) {
     unsigned char *copy = copy_of(data, size);
-    size_t at = 8, length;
+    size_t at = 8;
     if (size > 24 && olat__be32(data + 16) > 2048)
         copy[16] = copy[17] = 0, copy[18] &= 7; /* a large image is slow to clear */
     if (size > 24 && olat__be32(data + 20) > 2048) copy[20] = copy[21] = 0, copy[22] &= 7;
     read_png(copy, size);
+    size_t length;
     for (; size >= 12 && at <= size - 12 && (length = olat__be32(copy + at)) <= size - at - 12;
          at += 12 + length)
         olat__put_be32(copy + at + 8 + length, olat__crc32(copy + at + 4, length + 4));
@@ -500,8 +481,7 @@ static void fuzz_png(const unsigned char *data, size_t size) {
 static void fuzz_unfilter(const unsigned char *data, size_t size) {
     olat__png png;
     unsigned char header[13] = {0}, palette[768] = {0};
-    size_t used, raw = 0;
-    int pass, width, height, colors;
+    size_t raw = 0;
     memset(&png, 0, sizeof png);
     if (size < 14) return;
     memcpy(header, data, 13);
@@ -509,13 +489,14 @@ static void fuzz_unfilter(const unsigned char *data, size_t size) {
     header[2] &= 1;
     header[6] &= 1;
     if (olat__png_header(&png, header, 13)) return;
-    colors = 1 + data[13];
-    used = size - 14 < 3 * (size_t)colors ? size - 14 : 3 * (size_t)colors;
+    const int colors = 1 + data[13];
+    const size_t used = size - 14 < 3 * (size_t)colors ? size - 14 : 3 * (size_t)colors;
     memcpy(palette, data + 14, used);
     if (png.color == 3 && olat__png_palette(&png, palette, 3 * (size_t)colors)) return;
     if (!(png.color & 4))
         olat__png_transparency(&png, palette, png.color == 3 ? 1 : 2 * (size_t)png.channels);
-    for (pass = png.first_pass; pass < png.end_pass; pass++) {
+    for (int pass = png.first_pass; pass < png.end_pass; pass++) {
+        int width, height;
         const size_t row = olat__png_pass(&png, pass, &width, &height);
         raw += (size_t)height * (row + 1);
     }
@@ -531,23 +512,21 @@ static void fuzz_unfilter(const unsigned char *data, size_t size) {
 
 /* Two bytes of capacity, then the stream; what comes out is packed, and unpacked again. */
 static void fuzz_inflate(const unsigned char *data, size_t size) {
-    olat__inflater z, y;
-    unsigned char *copy, *packed, *back;
-    uint32_t *table;
-    const char *problem;
     if (size < 2) return;
-    copy = copy_of(data + 2, size - 2);
+    unsigned char *copy = copy_of(data + 2, size - 2);
+    olat__inflater z;
     memset(&z, 0, sizeof z);
     z.in = copy;
     z.size = size - 2;
     z.capacity = (size_t)data[0] << 8 | data[1];
     z.out = (unsigned char *)malloc(z.capacity + !z.capacity);
-    problem = olat__inflate(&z);
+    const char *problem = olat__inflate(&z);
     HOLDS(z.length <= z.capacity && z.at <= z.size);
     if (!problem || z.length == z.capacity) { /* whatever the checksum says */
-        table = (uint32_t *)calloc(65536, sizeof *table);
-        packed = (unsigned char *)malloc(z.length + z.length / 8 + 128);
-        back = (unsigned char *)malloc(z.length + 1);
+        uint32_t *table = (uint32_t *)calloc(65536, sizeof *table);
+        unsigned char *packed = (unsigned char *)malloc(z.length + z.length / 8 + 128);
+        unsigned char *back = (unsigned char *)malloc(z.length + 1);
+        olat__inflater y;
         memset(&y, 0, sizeof y);
         y.size = olat__deflate(z.out, z.length, packed, table);
         y.in = packed;
@@ -568,7 +547,7 @@ static void fuzz_inflate(const unsigned char *data, size_t size) {
 static void fuzz_json(const unsigned char *data, size_t size) {
     char error[512] = "", path[] = "fuzz.json";
     olat__json j;
-    int i, child, seen = 1;
+    int seen = 1;
     memset(&j, 0, sizeof j);
     j.text = (char *)malloc(size + 1);
     HOLDS(j.text);
@@ -579,12 +558,12 @@ static void fuzz_json(const unsigned char *data, size_t size) {
     j.end = j.text + size;
     olat__json_parse(&j);
     HOLDS(j.failed == (error[0] != 0));
-    for (i = 0; !j.failed && i < j.count; i++) {
+    for (int i = 0; !j.failed && i < j.count; i++) {
         const olat__node *node = j.nodes + i;
         int children = 0;
         HOLDS(node->type != OLAT__NUMBER || isfinite(node->number));
         HOLDS(node->type != OLAT__STRING || (node->text >= j.text && node->text + node->text_length < j.end));
-        for (child = node->child; child; child = j.nodes[child].next, children++, seen++)
+        for (int child = node->child; child; child = j.nodes[child].next, children++, seen++)
             HOLDS(j.nodes[child].parent == i);
         HOLDS(children == node->size);
     }
@@ -596,14 +575,13 @@ static void fuzz_json(const unsigned char *data, size_t size) {
 /* A string's value by RFC 8259 and 3629, of one to its end at `end`; -1 where it is none. */
 static long string_value(const unsigned char *p, const unsigned char *end, unsigned char *out) {
     static const char escapes[] = "\"\"\\\\//b\bf\fn\nr\rt\t";
-    long length = 0, code, unit;
-    int i, more, halves;
+    long length = 0, code;
     for (p++; p < end && *p != '"';) {
         if (*p < 32) return -1;
         if (*p >= 128) { /* the shortest form, no surrogates, nothing beyond U+10FFFF */
-            more = *p >= 240 ? 3 : *p >= 224 ? 2 : 1;
+            const int more = *p >= 240 ? 3 : *p >= 224 ? 2 : 1;
             code = *p++ - (more == 3 ? 240 : more == 2 ? 224 : 192);
-            for (i = 0; i < more; i++, p++) {
+            for (int i = 0; i < more; i++, p++) {
                 if (p >= end || *p < 128 || *p > 191) return -1;
                 code = 64 * code + (*p - 128);
             }
@@ -611,13 +589,17 @@ static long string_value(const unsigned char *p, const unsigned char *end, unsig
         } else if (*p != '\\') code = *p++;
         else if (end - p < 2) return -1;
         else if (p[1] != 'u') {
+            int i;
             for (i = 0; escapes[i] && escapes[i] != p[1]; i += 2) {}
             if (!escapes[i]) return -1;
             code = escapes[i + 1];
             p += 2;
         } else {
+            int halves;
             for (code = 0, halves = 0; halves < 2; halves++) {
                 if (end - p < 6 || p[0] != '\\' || p[1] != 'u') return -1;
+                long unit;
+                int i;
                 for (unit = 0, i = 2; i < 6; i++) {
                     static const char digits[] = "0123456789abcdef0123456789ABCDEF";
                     const char *digit = p[i] ? strchr(digits, p[i]) : NULL;
@@ -633,7 +615,7 @@ static long string_value(const unsigned char *p, const unsigned char *end, unsig
         if (code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return -1;
         if (code < 0x80) out[length++] = (unsigned char)code;
         else {
-            more = code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+            int more = code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
             out[length++] = (unsigned char)((more == 1 ? 192 : more == 2 ? 224 : 240) + (code >> 6 * more));
             while (more-- > 0) out[length++] = (unsigned char)(128 + (code >> 6 * more) % 64);
         }
@@ -644,7 +626,6 @@ static long string_value(const unsigned char *p, const unsigned char *end, unsig
 /* Parses the text, whose value is so many bytes, -1: none; then what the value is written as. */
 static void parse_string(const char *text, size_t size, const unsigned char *want, long length) {
     char error[512] = "", path[] = "fuzz.json";
-    olat__writer w;
     olat__json j;
     memset(&j, 0, sizeof j);
     j.text = (char *)malloc(size + 1);
@@ -658,11 +639,12 @@ static void parse_string(const char *text, size_t size, const unsigned char *wan
     HOLDS(j.failed == (length < 0));
     if (length >= 0) {
         const olat__node *value = j.nodes;
-        long i, n;
         HOLDS(value->type == OLAT__STRING && value->text_length == (size_t)length &&
               !memcmp(value->text, want, (size_t)length));
-        for (i = 0; i < length; i += n) HOLDS((n = olat__utf8_length(value->text + i)) > 0);
+        long n;
+        for (long i = 0; i < length; i += n) HOLDS((n = olat__utf8_length(value->text + i)) > 0);
         if (strlen(value->text) == (size_t)length) {
+            olat__writer w;
             w.size = 0;
             w.room = 1;
             w.text = (char *)malloc(1);
@@ -680,14 +662,14 @@ static void parse_string(const char *text, size_t size, const unsigned char *wan
 static void fuzz_json_string(const unsigned char *data, size_t size) {
     char *text = (char *)malloc(4 * size + 40);
     unsigned char *want = (unsigned char *)malloc(4 * size + 40);
-    size_t used = 1, at;
+    size_t used = 1;
     HOLDS(text && want);
     text[0] = '"';
     if (size) memcpy(text + 1, data, size);
     text[1 + size] = '"';
     parse_string(text, size + 2, want,
                  string_value((unsigned char *)text, (unsigned char *)text + size + 2, want));
-    for (at = 0; at + 3 <= size; at += 3) {
+    for (size_t at = 0; at + 3 <= size; at += 3) {
         const unsigned bits = (unsigned)data[at] << 16 | (unsigned)data[at + 1] << 8 | data[at + 2],
                        code = bits & 0x1FFFFF;
         if (!(bits >> 22) && code < 0x80 && code > 31 && code != '"' && code != '\\')
@@ -714,18 +696,17 @@ static void fuzz_dataset(const unsigned char *data, size_t size) {
     input defaults = defaults_only();
     ssdgs_context *context = draw_context(&defaults);
     char error[512] = "";
-    olat_dataset set;
-    ssdgs_photo *photos;
-    int i, images;
     put_file("fuzz_transforms.json", data, text);
     put_file("fuzz_image.png", nul ? nul + 1 : data, nul ? size - text - 1 : 0);
-    for (images = 0; images < 2; images++) {
+    olat_dataset set;
+    ssdgs_photo *photos;
+    for (int images = 0; images < 2; images++) {
         if (olat_load(folder, "fuzz_transforms.json", images ? 0 : OLAT_NO_IMAGES, &set, error)) {
             HOLDS(error[0] && !set.count && !set.frames);
             continue;
         }
         HOLDS((photos = olat_photos(&set)) != NULL);
-        for (i = 0; i < set.count; i++) {
+        for (int i = 0; i < set.count; i++) {
             HOLDS(!ssdgs__camera_check(context, &photos[i].camera) &&
                   !ssdgs__lights_check(context, &photos[i].light, 1));
             HOLDS(!images || photos[i].pixels);
@@ -761,13 +742,13 @@ static void play_call(void) {
     ssdgs_photo photo = play.photo;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    ssdgs_metrics metrics;
     ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
     options.iterations = 4;
     options.densify_from = options.densify_every = 1;
     options.initial_points = 20;
+    ssdgs_metrics metrics;
     switch (what) {
     case 0:
     case 1:
@@ -860,17 +841,15 @@ PLAY_STAGE(SHADE_BACKWARD)
 PLAY_STAGE(PROJECT_BACKWARD)
 
 static void play_run(void *user, int count, void (*task)(void *data, int index), void *data) {
-    int i;
     (void)user;
-    for (i = 0; i < count; i++) task(data, i);
+    for (int i = 0; i < count; i++) task(data, i);
     play_within();
 }
 
 static void *play_allocate(void *user, size_t bytes) {
-    void *memory;
     (void)user;
     play_within();
-    memory = malloc(bytes);
+    void *memory = malloc(bytes);
     return memory;
 }
 
@@ -899,14 +878,14 @@ static void fuzz_hooks(const unsigned char *data, size_t size) {
     static unsigned char pixels[64 * 4];
     input in = {data, data + size, 1}, defaults = defaults_only();
     ssdgs_context_desc desc;
-    ssdgs_gpu_hook gpu;
     ssdgs_model *model = NULL;
-    int i, hooks = draw(&in), flags = draw(&in);
+    int hooks = draw(&in), flags = draw(&in);
     memset(&desc, 0, sizeof desc);
+    ssdgs_gpu_hook gpu;
     memset(&gpu, 0, sizeof gpu);
     desc.gpu = &gpu;
     desc.threads = 1 + (flags & 1);
-    for (i = 0; i < SSDGS_STAGE_COUNT; i++)
+    for (int i = 0; i < SSDGS_STAGE_COUNT; i++)
         if ((hooks | (flags & 2) << 7) >> i & 1) gpu.stage[i] = stages[i];
     if (flags & 4) desc.parallel.run = play_run;
     if (flags & 8) desc.allocator.allocate = play_allocate, desc.allocator.release = play_release;
@@ -920,7 +899,8 @@ static void fuzz_hooks(const unsigned char *data, size_t size) {
     HOLDS(!ssdgs_context_create(&desc, &play.context) && !ssdgs_model_create(play.context, NULL, 30, &model));
     play.model = model;
     play.in = &in;
-    for (i = 0; i < 40 && in.at < in.end && (play.model || play.context || play.trainer); i++) play_call();
+    for (int i = 0; i < 40 && in.at < in.end && (play.model || play.context || play.trainer); i++)
+        play_call();
     play.in = NULL;
     ssdgs_trainer_destroy(play.trainer);
     ssdgs_model_destroy(play.model);
@@ -948,10 +928,9 @@ static const target targets[] = {{"png", fuzz_png},
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
     const target *found = NULL;
-    size_t i, length;
     while (*path) {
-        length = strcspn(path, "/\\");
-        for (i = 0; i < sizeof targets / sizeof *targets; i++)
+        const size_t length = strcspn(path, "/\\");
+        for (size_t i = 0; i < sizeof targets / sizeof *targets; i++)
             if (strlen(targets[i].name) == length && !memcmp(path, targets[i].name, length))
                 found = targets + i;
         path += length + (path[length] != 0);
@@ -985,12 +964,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 #else
 int main(int argc, char **argv) {
+    int passed = 0, failed = argc < 2;
+    find_folder(argv[0]);
     char error[512];
     unsigned char *data;
     size_t size;
-    int i, passed = 0, failed = argc < 2;
-    find_folder(argv[0]);
-    for (i = 1; i < argc; i++) {
+    for (int i = 1; i < argc; i++) {
         const target *found = find_target(argv[i]);
         if (!found || olat__read_file(argv[i], &data, &size, error)) {
             printf("%s: no target's file, or not to be read\n", argv[i]);
