@@ -1,23 +1,16 @@
 /* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end
 
-Trains 3D Gaussians on photographs that each show an object under one known light, and renders them from new
-views under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that
-of "SSD-GS: Scattering and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026), whose
-equations the comments below number. It runs on the CPU and needs C99 or C++11, libc, libm and the system's
-threads.
+Trains 3D Gaussians on photographs that each show an object under one known light. Renders them from new views
+under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
+"SSD-GS: Scattering and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026); its equations
+are cited by number. It runs on the CPU and needs C99 or C++11, libc, libm and the system's threads.
 
 DO THIS
-  In one C or C++ file of the program, best one of its own, as the code defines short macros (R, V, F, VADD)
-  and undefines them at its end:
-      #define SSDGS_IMPLEMENTATION
-      #include "ssdgs.h"
-  Everywhere else include it without the define. Link with -lm -lpthread (nothing on Windows). Keep the name
-  ssdgs.h: the implementation includes its own file again for every instruction set, as "ssdgs.h" beside
-  itself. A renamed copy needs SSDGS_SELF, for instance -DSSDGS_SELF='"relight.h"'. Pasted into another file
-  it cannot work.
+  In one C or C++ file define SSDGS_IMPLEMENTATION, then include ssdgs.h. Everywhere else include it alone.
+  Link with -lm -lpthread (nothing on Windows) and optimise (-O2, /O2). Keep the file's name, as it includes
+  itself once per instruction set, or say -DSSDGS_SELF='"other.h"'.
 
-  Rendering, of a model file or, without one, of a single grey Gaussian:
-
+  Rendering a model file or, without one, a single grey Gaussian, into color, linear RGB:
 --- render example ---
     #define SSDGS_IMPLEMENTATION
     #include "ssdgs.h"
@@ -38,17 +31,10 @@ DO THIS
         return result != SSDGS_OK;
     }
 --- end ---
-
-  color now holds linear RGB; ssdgs_to_bytes() and ssdgs_to_pixels() make bytes of it. Training, on
-  photographs that the program has read:
-
+  Training on photographs that the program has read:
 --- train example ---
     #define SSDGS_IMPLEMENTATION
     #include "ssdgs.h"
-    static int progress(void *user, const ssdgs_train_stats *stats) {
-        if (stats->iteration % 100 == 0) printf("%d: %.2f dB\n", stats->iteration, stats->psnr);
-        return user == NULL;
-    }
     int train(const ssdgs_photo *photos, int count, int iterations, const char *path) {
         ssdgs_train_options options = ssdgs_train_options_default();
         ssdgs_context *context = NULL;
@@ -58,7 +44,7 @@ DO THIS
         options.iterations = iterations;
         if (!result) result = ssdgs_model_create(context, NULL, 0, &model);
         if (!result) result = ssdgs_trainer_create(model, photos, count, &options, &trainer);
-        if (!result) result = ssdgs_trainer_run(trainer, progress, NULL);
+        if (!result) result = ssdgs_trainer_run(trainer, NULL, NULL);
         if (!result) result = ssdgs_model_save(model, path);
         if (result) printf("%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(context));
         ssdgs_trainer_destroy(trainer);
@@ -68,236 +54,102 @@ DO THIS
     }
 --- end ---
 
-  progress returns 0 to stop early, which ssdgs_trainer_run() answers with SSDGS_ERR_CANCELLED; the model is
-  then whole, but terms that the schedule had not reached (stats->terms; in the default's all join after a
-  twelfth of a run) are untrained: render without them.
-
 WHAT IT COMPUTES
-  Splatting (eq. 1): every Gaussian is projected (EWA, + pixel_variance) and blended front to back, one
-  colour C each:
-      C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss),  E = light_scale intensity /
-      distance^2
-  (eq. 3), with
-  f_d    max(0, n . wi); n is the z axis of the shading frame, wi points to the light, wo to the eye (eq. 9)
-  f_s    Schlick's Fresnel (F0 = 0.04) times a weighted sum of 8 anisotropic spherical Gaussians (ASG) of
-         the half vector (eqs. 10 to 12)
-  S      the fraction of light that arrives, splatted from the light (eqs. 6, 7), refined by the shadow
-         network (eq. 8)
-  f_sss  a dipole (eq. 5); the scattering network predicts its sigma_s, sigma_a and r from x, wo, wi, n, a
-         material code (eq. 4)
-  A Gaussian's raw parameters, SSDGS_POSITION and on, are used as: scale = exp(log scale), opacity =
-  sigmoid, c_d, c_s, c_sss and ASG weights = softplus; both quaternions (w x y z) are normalised at use. The
-  8 ASG bases and both networks are shared by all Gaussians.
-  ssdgs_settings_default(): shading in linear light; sigma_s and sigma_a per colour channel; the scattering
-  network, 3 layers, 64 wide, also sees the depth cue, how far x lies behind what the light meets first, and
-  what true dipole transport brings to x from wherever the light enters (five sums, of lengths from short to
-  long; held fixed in training), but no sines of wo and few of wi (view_octaves, light_octaves); the shadow
-  network corrects the logit of eq. 7, where what lies nearer to the light by less than light_bias casts no
-  shadow. Direct light is deferred (ssdgs_asg): Gaussians blend what they would reflect without shadow,
-  their normals, sharpness and F0, and f_s and S are each pixel's own. A narrow highlight passes over one
-  Gaussian in few photographs, which its own normal fits by heart; the normals' mean at a pixel carries over
-  to other views. A shadow's edge is narrower than Gaussians are; what arrives at the pixel's place shows
-  it.
-  ssdgs_settings_published(): the paper's model, its dipole with Jensen's distances (settings.dipole).
-  Colours are the stored values; every Gaussian has a specular term; one sigma_s, sigma_a for all channels,
-  6 layers, 256 wide, four octaves, no depth cue, no transport; the shadow network's output is S, no bias;
-  both passes add 0.3 px^2, where the default adds 0.1 for the camera and keeps to a floor for the light.
-  Training minimises 0.8 L1 + 0.2 (1 - SSIM) (options.dssim is the 0.2) with Adam, one photograph a step.
-  Where light is deferred, the blended normals are drawn to those of the blended depth besides
-  (normal_weight): dark, shining surfaces tell nothing else of them, and a model finds wrong ones that fit
-  the photographs it was shown. Diffuse alone comes first, the other terms join together after 5,000
-  iterations of 60,000; shorter runs scale this, longer ones do not. In the paper's order, one term after
-  the other, scattering learns the highlights by heart before specular is there. Density control clones or
-  splits where the image pulls at a Gaussian, as published; it also halves what lies half in shadow
-  (densify_shadow) and drops what hardly shows (prune_weight) or lies outside of the outlines
-  (prune_outside).
-  ssdgs_train_options_published(): the paper's order and density control, 60,000 iterations.
+  Gaussians are projected and blended front to back (eq. 1). Each has the colour of eq. 3:
+      C = sum over lights of E (((c_d / pi) f_d + c_s f_s) S + c_sss f_sss)
+  E      light_scale x intensity / distance^2
+  f_d    max(0, n . wi) (eq. 9)        f_s  Fresnel x anisotropic spherical Gaussians, ASG (eqs. 10 to 12)
+  S      light that arrives (eqs. 6, 7), refined by the shadow network (eq. 8)
+  f_sss  a dipole (eq. 5) of the optical parameters that the scattering network predicts (eq. 4)
+  ssdgs_settings_published() is the paper's model. ssdgs_settings_default() differs in what measured as
+  better: it shades in linear light, highlights and shadows' edges are found per pixel from what Gaussians
+  blend to (deferred), networks are smaller, and the scattering network also sees what true dipole transport
+  brings.
 
 CONVENTIONS
-  camera    x right, y down, z forward. view is world to camera, (3,4) row-major, a rotation and a
-            translation. The centre of pixel (0,0), top left, is at (0.5, 0.5); a pinhole at fx, fy, cx, cy
-            in px. No lens distortion.
-  world     any right-handed axes and any unit, the same for cameras, lights and Gaussians; near_plane 0
-            means 0.02 of settings.length_unit (published: 0.01). Training starts within options.bounds_min,
-            bounds_max: [-0.5, 0.5]^3 unless set. Floats hold seven digits: of a scene 1,000 times its size
-            away from 0, give cameras, lights and bounds less a nearby point, and that point as
-            settings.origin.
-  light     point: position, RGB intensity, E = I / d^2. Directional: unit vector towards the light, RGB
-            irradiance. Any number of them in a rendering, one in a photograph. Intensities have the unit of
-            the photographs':
-            ssdgs_trainer_create() gives an empty model the light_scale that makes E's geometric mean 1 at
-            the centre of the bounds; it stays in the model.
-  colour    transfer says how stored values, in photographs and image files, relate to the colours that are
-            blended: SSDGS_TRANSFER_SRGB: stored = sRGB curve of linear light, and Gaussians blend linear
-            light; SSDGS_TRANSFER_NONE: they are the same. A photograph's alpha blends stored values, as
-            image programs do it, and
-            ssdgs_compose() does the same to a rendering. ssdgs_render() never encodes: linear light out (or
-            stored values), not clamped; render options give `background` likewise. ssdgs_to_bytes()
-            encodes. Training options,
-            ssdgs_evaluate() and ssdgs_refine_photo() take the background as a stored value;
-            ssdgs_evaluate() and
-            ssdgs_compare() deal in stored values.
-  images    (h,w,3) or (h,w), row-major, top row first, stride in pixels, up to 32768 pixels a side.
-            Photographs: RGBA, 8 or 16 bit, straight alpha, tightly packed. Those with transparency are
-            fitted on a new random background each step; random_background = 0 puts them on
-            options.background. Where none is transparent around the object, their borders decide: where
-            most are of about the colour of options.background, that is empty, and Gaussians of its colour
-            fade; else everything that they show is opaque. A note says which.
-  networks  per layer (out,in) weights, row-major, then (out) biases; ReLU between layers.
-
-OPTIONS, macros defined before the header; those with * the same way in every file that includes it
-  SSDGS_IMPLEMENTATION   not set      in one file: the code
-  SSDGS_STATIC           not set      every function is static: a private copy, in a file that has the
-                         implementation
-  SSDGS_API *            extern       what stands before every function, for instance __declspec(dllexport)
-  SSDGS_NO_STDIO *       not set      no file access: model and checkpoint functions with a path are gone
-  SSDGS_NO_TRAINER *     not set      no ssdgs_trainer_*, ssdgs_train_*, ssdgs_evaluate, ssdgs_refine_photo,
-                         ssdgs_compare, and no
-                                      backward stages: half of the code and of the time to compile
-  SSDGS_NO_THREADS       not set      no threads of its own; ssdgs_context_desc.parallel still works
-  SSDGS_NO_SIMD          not set      the scalar kernels alone
-  SSDGS_SCALAR           not set      the scalar kernels too, where every CPU has SSE2 or NEON
-  SSDGS_NO_AVX2          not set      no AVX2 and no AVX-512 kernels
-  SSDGS_NO_AVX512        not set      no AVX-512 kernels
-  SSDGS_REAL64 *         not set      ssdgs_real is double, see DOUBLE
-  SSDGS_SELF             "ssdgs.h"    how the file includes itself, quotes included
+  camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens
+          distortion.
+  world   right-handed, any unit, the same for cameras, lights and Gaussians. Floats hold seven digits: of a
+          scene 1,000 times its size away from 0 give all positions less a nearby point, and that as
+          settings.origin.
+  light   a point's E is intensity / distance^2, a directional light's is its intensity. Intensities have
+          the unit of the photographs': training sets light_scale such that E is 1 at the centre of the
+          bounds on average.
+  colour  renders are linear light, never encoded or clamped; ssdgs_to_pixels() and ssdgs_to_bytes() encode
+          them. Photographs, options.background and ssdgs_evaluate() deal in stored values, which
+          settings.transfer relates to linear ones. A photograph's alpha blends stored values, as
+          ssdgs_compose() does.
+  images  row-major, top row first, up to 32768 px a side.
 
 MEMORY
-  All of it comes from ssdgs_context_desc.allocator (malloc and free by default; allocate and release, both
-  or none), called only on the thread that called the library. Blocks are aligned to 64 bytes and zeroed
-  inside, so it need not do either. What the C library needs itself (qsort, stdio, threads) is not in it.
-  A frame's buffers belong to the context, serve all of its models, and only grow: once a frame of a size
-  has been rendered, the next allocates nothing unless it needs more (a larger image, more lights, many more
-  splats on screen). Photographs' pixels, image planes and paths stay the caller's. Pixels must outlive the
-  trainer. Contexts, models and trainers may be destroyed in any order: a model stays until its trainer is
-  gone, a context until its models and trainers are, and the log is told; the allocator and the log must be
-  there as long. Density control, saving, ssdgs_compare() and ssdgs_evaluate() allocate for as long as they
-  run. ssdgs_train_memory() tells before a run about how much it will hold at max_gaussians, the photographs
-  not counted.
+  All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
+  A frame's buffers belong to the context and only grow: a second frame of the same size allocates nothing.
+  Pixels, planes and paths stay the caller's. Contexts, models and trainers may be destroyed in any order.
 
 THREADS
-  A context serves one thread at a time, its models and trainers with it; contexts share nothing, so each
-  thread may have its own. It makes its threads when created (desc.threads, 0 = one per CPU, the caller
-  counted) and joins them when destroyed. desc.parallel, if set, replaces them: it gets batches of
-  independent tasks and returns when all are done. Hooks, the allocator, the log and the progress callback
-  run on the caller's thread. While a call is at work, any other that uses the same context, so all but
-  those that only tell something of it, returns SSDGS_ERR_ARGUMENT, and one that destroys does nothing,
-  whether it comes from a hook (which may call ssdgs_stage_cpu()), a task, the allocator, the log or, where
-  the compiler has atomic operations, another thread. The progress callback runs between two steps: it may
-  make any call but the one that destroys its trainer. After fork() the child may use and destroy its copies
-  of contexts; they have no threads of their own there.
-
-SPEED
-  ssdgs_render_options_exact()    the method as written; training and ssdgs_evaluate() use it
-  ssdgs_render_options_default()  max_error 1/16: less than 0.001 dB lost against photographs where it was
-                                  measured
-  ssdgs_render_options_fast()     max_error 1/8, light_detail 0.6, alpha_threshold 1/200: less than 0.1 dB
-  max_error leaves Gaussians unshaded that every pixel can spare: their weights sum to max_error at most in
-  any pixel, and they are blended in the colour of the Gaussian before them instead, a neighbour in the
-  order that training leaves (halved across the longest side, again and again). `make bench` shows what each
-  of these costs and gains. Left out without any change of a bit: what no pixel blends; neurons that are 0
-  for 64 neighbouring Gaussians; terms and networks not in use, gradients of those that rest; components and
-  planes nobody asked for. And what the last frame on the context found, where model, options and camera, or
-  lights, are the same: a camera at rest needs no projection, order and tiles, lights at rest no maps, no
-  shadow network and no transport. Writing through ssdgs_model_arrays() needs a new call of it each time,
-which is how the library knows. ssdgs_render_stats tells what was left out.
-
-SIMD
-  The kernels are compiled for SSE2, AVX2 with FMA and AVX-512F (x86; gcc, clang, MSVC) or NEON (64-bit
-  ARM), and for scalar code (anything else, tcc included); a context picks the best that CPU and system
-  have. desc.isa asks for one, and fails with SSDGS_ERR_ISA where it is missing. No -m flags are needed; do
-  switch optimisation on (-O2, /O2). MinGW's gcc without optimisation gets SSE2 at most.
-  ssdgs_render_options.bf16 lets rendering run the networks in bfloat16 where the CPU has it (AVX-512 BF16;
-  gcc 10 or clang 9 and on); training never does.
-
-GPU HOOK
-  desc.gpu.stage[SSDGS_STAGE_...] replaces stages of a frame; NULL leaves them to the CPU. A hook reads and
-  writes ssdgs_frame, whose members say which stage fills them. What stages write in ssdgs_splat_view has no
-  memory before them: a hook points the members at its own, valid until the library's call returns; PROJECT
-  also sets tiles_x and tiles_y. The rest is there. With any hook set no frame keeps results of the last.
-  Where layer_count is not 0, WALK fills the lights' falls, SHADE layers, and COMPOSITE adds the diffuse and
-  specular terms (ssdgs_asg) from what they blend to. In training SHADE and SHADE_BACKWARD must be replaced
-  together: the CPU keeps activations in between. ssdgs_stage_cpu(frame, stage) runs the CPU's version. An
-  image's components are the CPU's work, of layer_pixels and pixel_shadow or, where layer_count is 0, of
-  view 0's record, depth, order, tile_start, tile_list and tile_seen, which must be in host memory then. A
-  result other than SSDGS_OK ends the frame.
+  A context serves one thread at a time, with its models and trainers; contexts share nothing. Hooks,
+  allocator, log and progress run on the caller's thread. A call made while another is at work on the context,
+  from a hook or another thread, returns ERR_ARGUMENT; progress may call all but the trainer's destruction.
+  After fork() the child may use its copies, without threads.
 
 DETERMINISM
-  The same calls give the same bits for any number of threads and any desc.parallel: work is cut by the
-  problem, and sums are taken in a fixed order. A run resumed from a checkpoint gives the bits of one that
-  never stopped. One build gives the same bits on AVX2 and AVX-512 (so does NEON), and the same on SSE2 and
-  scalar code; between the two they differ, as FMA rounds once where SSE2 rounds twice. A checkpoint that
-  changes sides goes on, and tells the log. Builds agree as far as their C libraries do (density control
-  calls exp and log) and no -ffast-math or x87 is in play: the implementation turns the compiler's own
-  fusing of products and sums off.
+  The same calls give the same bits for any number of threads. AVX2, AVX-512 and NEON give the same bits, and
+so do SSE2 and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm does.
 
 ERRORS
-  Calls that can fail return ssdgs_result: SSDGS_OK is 0, ssdgs_result_string() words the code, and
-  ssdgs_error_message(context) says what it was about: the function and argument, file, setting, parameter
-  or byte. Without a context there is none. desc.logger hears every message as it comes, and notes with the
-  code SSDGS_OK. Options that no _default() function made are SSDGS_ERR_OPTIONS. Nothing exits or prints.
-  Cameras, lights and backgrounds that are not finite are refused, and so are models whose networks or ASG
-  are not; Gaussians that are not finite are not drawn, those whose colour is not are black. A training step
-  with a gradient that is not finite changes no parameter, counts in skipped_steps and returns
-  SSDGS_ERR_NONFINITE; ssdgs_trainer_run() goes on after it and gives up at ten in a row.
+  Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
+  parameter. Nothing exits or prints. Cameras, lights, networks and ASG that are not finite are refused.
+  Gaussians that are not finite are not drawn, or are black where the colour is not. A training step with a
+  gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
-  A model is one binary little-endian PLY: element vertex (x y z nx ny nz f_dc_ opacity scale_ rot_ as
-  splat viewers know them, with a typical look in f_dc_, then kd_ ks_ ksss_ alpha_asg_ local_q_
-  neural_material_, all raw), then ssdgs_settings, asg_basis, scattering_weight, shadow_weight. Reading
-  takes ASCII and both byte orders, skips what it does not know, mends or drops broken Gaussians and sorts
-  those that are in no order (ssdgs_load_stats). Limits: 8 GiB, 2^28 Gaussians, a header of 1 MiB. With
-  settings.origin x y z are doubles, in the dataset's coordinates. A plain 3DGS file (f_dc_, or red green
-  blue, no kd_) loads as baked colours: drawn as they are, whatever the light; it cannot be trained. One
-  with kd_ but no ssdgs_settings, as editors of splats leave it, gets the published settings, and networks
-  at their start unless it has them: ssdgs_model_adopt() gives it those of the original. Notes tell of all
-  this. Checkpoints hold a run's whole state in native byte order; other versions, precisions, options,
-  settings, cameras or lights are refused. Both kinds of file are written under another name and renamed
-  when complete: a link is replaced, not followed, and the file's mode is a new file's.
+  A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
+  added, then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. Reading takes ASCII and both
+  byte orders, skips what it does not know, and mends or drops broken Gaussians (ssdgs_load_stats). Limits:
+  8 GiB, 2^28 Gaussians, a header of 1 MiB. A plain splat file loads as baked colours: drawn as they are,
+  not trained. With settings.origin x y z are doubles. Checkpoints have native byte order and are refused by
+  other versions, precisions, options or cameras. Files are written under another name and renamed when
+  complete.
 
-DOUBLE
-  With SSDGS_REAL64 ssdgs_real is double and only the scalar kernels are built, on libm: for tests of values
-  and gradients.
+OUTLINES
+  Photographs should be transparent where the object is not. They show outlines where more than a hundredth
+  of the picture, but not all, is wholly transparent; of eight or more those are left out that contradict
+  the others. prune_outside removes Gaussians outside of them. Where too few are transparent, borders
+  decide: of the colour of options.background they are empty, and Gaussians of that colour fade; else all
+  that is shown is opaque. A note says which.
+
+SPEED
+  ssdgs_render_options_exact() is the method as written. _default() loses less than 0.001 dB against
+  photographs where it was measured, _fast() less than 0.1 dB. Left out without changing a bit: what no
+  pixel blends, neurons that are 0 for 64 neighbours, planes and terms nobody asked for, and what the last
+  frame found where model, camera or lights are the same. `make bench` measures all of it.
+
+MACROS, defined before the header; those with * in every file that includes it
+  SSDGS_IMPLEMENTATION  in one file: the code
+  SSDGS_STATIC          every function is static, in a file that has the implementation
+  SSDGS_API *           what stands before every function: __declspec(dllexport), else extern
+  SSDGS_STAGES          shows a frame's stages, for GPU hooks
+  SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
+  SSDGS_NO_STDIO *      no functions with a path
+  SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD  fewer kernels; without SIMD scalar ones
+  SSDGS_SCALAR          scalar kernels too, where every CPU has SSE2 or NEON
+  SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
 ssdgs.h DOES NOT
-  - read dataset folders, JSON or PNG, or write PNG: examples/olat.h does
-  - find cameras or lights: both must be known; refine_camera, refine_light and ssdgs_refine_photo() correct
-    small errors
-  - light or train with environment maps, train on photographs with several lights, or trace light between
-    objects
-  - contain GPU kernels, undistort lenses, compress models or open a window
-  - evaluate spherical harmonics beyond degree 0 of plain files, or compute LPIPS (PSNR, SSIM and FLIP it
-    does)
+  find cameras or lights (it corrects small errors: options.refine), read datasets or images
+  (examples/olat.h does), use environment maps, trace light between objects, undistort lenses, contain GPU
+  kernels, compress models, or evaluate spherical harmonics beyond degree 0.
 
 CONTENTS, search for the tag
-  >>config          what this compiler and CPU can do
-  >>memory          contexts, errors, aligned allocation
-  >>threads         a pool per context
-  >>cpu             which tables this machine can run
-  >>model           Gaussians, ASG bases, networks, settings
-  >>frame           memory of a frame, its views, the lights' cameras, what is kept from the last
-  >>project         records, order, instances, tile lists
-  >>shadow          visibility and depth cue from the lights, which Gaussians the camera sees
-  >>transport       what comes to them from where the light enters
-  >>shade           geometry, networks and colour of the Gaussians seen
-  >>composite       blending over tiles and its backward
-  >>render          the stages in order
-  >>loss            loss with its gradient, transfer curve, PSNR, SSIM, FLIP
-  >>ply             model files, files at large
-  >>trainer         schedule, one photograph forward and backward, Adam
-  >>density         clone, split, prune
-  >>steps           the trainer's public functions, evaluation
-  >>checkpoint      a run's whole state
-  >>kernels         vector macros, one body for every instruction set
-  >>vmath           elementary functions
-  >>project_kernel  EWA projection
-  >>bin_kernel      which parts of a tile an ellipse touches
-  >>walk_kernels    transmittance walks of camera and lights
-  >>composite_kernel, >>transport_kernel, >>dense_kernel, >>encode_kernel, >>asg_kernel, >>highlight_kernel,
-  >>dipole_kernel, >>colour_kernel, >>image_kernels
-
-VERSIONS
-  0.1.0  the first */
+  >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
+  >>model >>frame                    parameters and networks; a frame's memory, views and cache
+  >>project >>shadow >>transport     splats and tiles; visibility from the lights; dipole transport
+  >>shade >>composite >>render       colour of the Gaussians seen; blending, highlights; stages in order
+  >>loss >>ply                       loss and metrics; model files
+  >>trainer >>density                one photograph and Adam; clone, split, prune
+  >>steps >>checkpoint               the trainer's public functions; a run's whole state
+  >>kernels >>vmath >>*_kernel       vector macros, functions, and the kernels in the same order */
 
 /* ==== the interface ==== */
 
@@ -349,7 +201,8 @@ typedef enum ssdgs_result { SSDGS_RESULTS(SSDGS__RESULT_ENUM) SSDGS_RESULT_COUNT
 
 /* clang-format off */
 typedef enum ssdgs_isa {
-    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON, SSDGS_ISA_COUNT
+    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON,
+    SSDGS_ISA_COUNT
 } ssdgs_isa;
 /* clang-format on */
 
@@ -382,7 +235,7 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_parallel parallel;          /* threads of the context's own */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
     int threads;                      /* how many of its own, the caller counted; 0 = one per CPU */
-    ssdgs_isa isa; /* the best this CPU has; another fails with ERR_ISA where it is missing */
+    ssdgs_isa isa;                    /* the best this CPU has; ERR_ISA where one is missing */
 } ssdgs_context_desc;
 
 /* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
@@ -399,8 +252,9 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);   /* how many
 /* ---- model ---- */
 
 /* clang-format off */
-enum { /* terms of eq. 3; a mask */
-    SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8, SSDGS_ALL_TERMS = 15
+enum { /* of eq. 3; a mask */
+    SSDGS_DIFFUSE_TERM = 1, SSDGS_SPECULAR_TERM = 2, SSDGS_SHADOW_TERM = 4, SSDGS_SCATTERING_TERM = 8,
+    SSDGS_ALL_TERMS = 15
 };
 typedef enum ssdgs_transfer { SSDGS_TRANSFER_SRGB = 0, SSDGS_TRANSFER_NONE } ssdgs_transfer;
 typedef enum ssdgs_dipole { SSDGS_DIPOLE_JENSEN = 0, SSDGS_DIPOLE_PRINTED } ssdgs_dipole;
@@ -411,12 +265,6 @@ typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 #define SSDGS_MATERIAL_COUNT 6
 #define SSDGS_MAX_LAYERS 16   /* linear layers of a network */
 #define SSDGS_MAX_WIDTH 1024  /* neurons of a layer */
-
-/* Raw parameters of a Gaussian, one plane each: the first plane of each. ssdgs_gaussian has them in physical units. */
-enum {
-    SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11, SSDGS_SPECULAR = 14,
-    SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
-};
 /* clang-format on */
 
 /* What a model computes; stored in its file. 0 or 1 where nothing else is said. */
@@ -426,30 +274,28 @@ typedef struct ssdgs_settings {
     int baked;    /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
     int transfer; /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
     int dipole;   /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
-    int asg; /* ssdgs_asg: highlights per Gaussian (eq. 12), or deferred: per pixel, from blended normals */
-    int per_channel_optics; /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
-    int depth_cue; /* 1: the scattering network sees how far a point lies behind what the light meets first */
-    int transport; /* 1: it also sees what true dipole transport brings from where light enters */
+    int asg;      /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
+    int per_channel_optics;   /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
+    int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies */
+    int transport;            /* 1: it also sees what true dipole transport brings from where light enters */
     int residual_shadow;      /* 1: the shadow network corrects the logit of eq. 7; 0: its output is S */
     int shadow_on_scattering; /* 1: eq. 14, the paper's ablation: S darkens scattering too */
     int scattering_layers;    /* linear layers of the scattering network, 2 .. SSDGS_MAX_LAYERS */
     int scattering_width;     /* neurons of its hidden layers, up to SSDGS_MAX_WIDTH */
-    int view_octaves;      /* 0 .. 8: sines and cosines of wo that it sees; many let it learn photographs by
-                              heart */
-    int light_octaves;     /* 0 .. 8: and of wi */
-    int shadow_layers;     /* linear layers of the shadow network; 0 = none: S is eq. 7's transmittance */
-    int shadow_width;      /* neurons of its hidden layers */
-    int light_blur;        /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size;    /* px a side; 0 = such that a typical Gaussian is one pixel wide */
-    ssdgs_real light_bias; /* length units: what lies nearer to the light by less casts no shadow. For models
-                              made in code three standard deviations of their Gaussians */
+    int view_octaves;         /* 0 .. 8: of the sines of wo that it sees; many overfit */
+    int light_octaves;        /* 0 .. 8: of the sines of wi */
+    int shadow_layers;        /* linear layers of the shadow network; 0 = none: S is eq. 7's transmittance */
+    int shadow_width;         /* neurons of its hidden layers */
+    int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
+    int light_map_size;       /* px a side; 0 = such that a typical Gaussian is one pixel wide */
+    ssdgs_real light_bias; /* length units: what is nearer to the light by less casts no shadow. Models made
+                              in code: three standard deviations of their Gaussians */
     ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: added to a splat's in the camera pass */
     ssdgs_real eta;            /* index of refraction, 1 .. 2.5 */
     ssdgs_real centre[3];      /* world: origin of the networks' positions */
     ssdgs_real length_unit;    /* world units in one unit of the networks */
     ssdgs_real light_scale;    /* factor from the dataset's intensities to the model's */
-    ssdgs_real origin[3]; /* where the model's 0 lies in its dataset's world. Only files use it: for scenes so
-                             far from 0 that floats are too coarse */
+    ssdgs_real origin[3];      /* world: where the model's 0 lies; only files use it, see CONVENTIONS */
 } ssdgs_settings;
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
@@ -472,10 +318,9 @@ typedef struct ssdgs_gaussian {
     ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
     ssdgs_real specular[3];   /* c_s: 0 = none, about 1 for a dielectric of the highlight's sharpness */
     ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
-    ssdgs_real
-        sharpness[2];    /* lambda, mu of a deferred highlight: 1 = as trained ones start, more is narrower */
-    ssdgs_real f0;       /* reflectance at normal incidence of a deferred highlight: 0.04 for dielectrics */
-    ssdgs_real softness; /* 0: a deferred shadow is the pixel's, sharp; 1: the Gaussian's */
+    ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight: 1 = broad, more is narrower */
+    ssdgs_real f0;            /* of a deferred highlight, at normal incidence: 0.04 for dielectrics */
+    ssdgs_real softness;      /* 0: a deferred shadow is the pixel's, sharp; 1: the Gaussian's */
     ssdgs_real material[SSDGS_MATERIAL_COUNT]; /* code that the networks see */
 } ssdgs_gaussian;
 
@@ -488,23 +333,6 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
-
-/* The raw arrays, valid until the model changes. Call ssdgs_model_arrays() before each round of writing: it
-   is how rendering knows that what it has cached is out of date. */
-typedef struct ssdgs_model_view {
-    int count;             /* Gaussians */
-    size_t stride;         /* reals from one plane to the next */
-    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, stride): scale = exp, opacity = sigmoid, colours and weights =
-                              softplus */
-    ssdgs_real *asg_basis; /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
-    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
-    ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
-    ssdgs_real *scattering;    /* per layer: (out, in) weights, row-major, then (out) biases */
-    size_t scattering_count;
-    ssdgs_real *shadow;
-    size_t shadow_count;
-} ssdgs_model_view;
-SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
     int zero_rotations;           /* replaced by the identity */
@@ -534,8 +362,7 @@ typedef struct ssdgs_camera {  /* a pinhole */
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major, world to camera: x right, y down, z forward */
-    ssdgs_real
-        near_plane; /* world units: Gaussians with nearer centres are not drawn. 0 = 0.02 length units */
+    ssdgs_real near_plane;     /* world units: nearer Gaussians are not drawn; 0 = 0.02 length units */
 } ssdgs_camera;
 
 typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
@@ -684,7 +511,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real densify_shadow; /* px: one half in shadow on more of a photograph, on average, is split; 0.5 */
     ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
     ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
-                                  removed;  OUTLINES in the manual; 0.02 */
+                                  removed, see OUTLINES in the manual; 0.02 */
     ssdgs_real
         adam_epsilon; /* Adam's, relative to the gradient of a one-byte error in one pixel; 0.1; 0 = 1e-15 */
     ssdgs_rates rates;
@@ -764,6 +591,33 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* ==== raw arrays of a model, seen with SSDGS_STAGES ==== */
+
+/* clang-format off */
+/* The first plane of each of a Gaussian's raw parameters. */
+enum {
+    SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11,
+    SSDGS_SPECULAR = 14, SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
+};
+/* clang-format on */
+
+/* The raw arrays, valid until the model changes. Call ssdgs_model_arrays() before each round of writing: it
+   is how rendering knows that what it has cached is out of date. */
+typedef struct ssdgs_model_view {
+    int count;             /* Gaussians */
+    size_t stride;         /* reals from one plane to the next */
+    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, stride): scale = exp, opacity = sigmoid, colours and weights =
+                              softplus */
+    ssdgs_real *asg_basis; /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
+    ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
+    ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
+    ssdgs_real *scattering;    /* per layer: (out, in) weights, row-major, then (out) biases */
+    size_t scattering_count;
+    ssdgs_real *shadow;
+    size_t shadow_count;
+} ssdgs_model_view;
+SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model);
 
 /* ==== stages of a frame, seen with SSDGS_STAGES: for GPUs and engines that run some of their own ====
    ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A hook reads and writes the
@@ -10691,9 +10545,19 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
     }
 }
 
-/* ==== >>highlight_kernel  eqs. 9, 10 and 12 of a tile's pixels under one light, from what their Gaussians
-   blend to ==== Q = layers 1, 2 / A, depth and F0 = layer 3 / A with A, the sum of the weights, its third;
-   the normal is layer 4's direction, M = layer 5. */
+/* ==== >>highlight_kernel  deferred: eqs. 9, 10 and 12 of a tile's pixels under one light ====
+   Reads what the pixel's Gaussians blend to. One term per pixel and light:
+       S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q
+   h))) D = (c_d / pi) f_d E and M = c_s E are blended, and so are the normal n and, over the pixel's alpha,
+   Q = lambda xx' + mu yy' of the frames' axes and F0. p is h less its part along n: t_j chooses between the
+   normals' mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what
+   shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001), n.wi >= 0, wo.h >=
+   SSDGS__GRAZING. Why per pixel: a narrow highlight passes over one Gaussian in few photographs, which its
+   own normal fits by heart. The normals' mean at a pixel carries over to other views. A shadow's edge is
+   narrower than Gaussians are. S is eq. 8's of the blended answers of the shadow network and of (1 - soft) v
+   + soft v_g. v is the transmittance to the place at the pixel's depth, from the light map; v_g is the
+   Gaussians', over alpha as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes
+   out beside where it went in. */
 
 typedef struct F(highlight_geometry) {
     V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing,

@@ -7,7 +7,7 @@ int main(void) {
     ssdgs_model *model = NULL;
     CHECK(ssdgs_context_create(NULL, &context) == SSDGS_OK);
     CHECK(ssdgs_model_create(context, NULL, 3, &model) == SSDGS_OK);
-    CHECK(model && ssdgs_model_arrays(model).count == 3);
+    CHECK(model && ssdgs_model_settings(model)->terms == SSDGS_ALL_TERMS);
     CHECK(!strcmp(ssdgs_result_string(SSDGS_OK), "ok"));
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
