@@ -13,13 +13,12 @@ WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdoub
 STRICT_1 = $(WARNINGS) $(if $(findstring ++,$(CC)),,-Wstrict-prototypes -Wmissing-prototypes)
 COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT))
 # The library is compiled once, and once in double: kernels.o has its kernels, ssdgs.o all else. Programs link both; those that reach
-# into the library (ssdgs__) compile what is not kernels as their own, and link the kernels.
+# into the library (ssdgs__) compile what is not kernels as their own, the tests only what they call, and link the kernels.
 KERNELS = -DSSDGS_SELF='"tests/kernels.h"'
 INSIDE := $(shell grep -l ssdgs__ tests/*.c tests/fuzz/*.c examples/*.c)
-OBJECTS = $(BUILD)/ssdgs.o $(BUILD)/kernels.o
-OBJECTS_64 = $(OBJECTS:.o=_64.o)
-PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS),-DSSDGS__IMPLEMENTED)
-LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o %/ssdgs_64.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
+OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
+PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
+LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
 HEADERS = ssdgs.h examples/olat.h tests/test.h tests/kernels.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
@@ -134,9 +133,10 @@ $(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
-$(BUILD)/%_64: tests/%.c $(HEADERS) $(OBJECTS_64)
+$(BUILD)/hashes_64: $(BUILD)/ssdgs_64.o
+$(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
-$(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(OBJECTS_64)
+$(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) $(LINKED)
 $(BUILD)/fuzz: tests/fuzz/fuzz.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)

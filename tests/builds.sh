@@ -16,8 +16,8 @@ exported() { nm -gP "$1" | awk '$2 ~ /^[TDBRCS]$/ { sub(/^_/, "", $1); if ($1 !~
 check "exported without the prefix" "$(exported "$build/ssdgs.o" | grep -v '^ssdgs_[a-z]')"
 check "exported, not in compile_c.c" \
     "$(for name in $(exported "$build/ssdgs.o"); do grep -qw "$name" tests/compile_c.c || echo "$name"; done)"
-check "exported with SSDGS_STATIC" "$(exported "$build/kernels.o")" # which is built so
-for option in STATIC NO_STDIO NO_THREADS; do # nothing to the kernels, which take most of the time
+check "exported with SSDGS_STATIC" "$(exported "$build/kernels.o")" # which is built with it
+for option in NO_STDIO NO_THREADS; do # nothing to the kernels, which take most of the time
     compiles "SSDGS_$option" tests/library.c "$@" -DSSDGS_$option -DSSDGS_SELF='"tests/kernels.h"'
 done
 for option in NO_SIMD NO_AVX2 NO_AVX512 REAL64; do compiles "SSDGS_$option" tests/library.c "$@" -DSSDGS_$option; done
@@ -27,7 +27,7 @@ for example in train relight minimal bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -fsyntax-only
 done
 # without the trainer the same is rendered, with half of the code
-"$@" tests/render_only.c -o "$build/render_only" -lm -lpthread
+"$@" -DSSDGS__IMPLEMENTED tests/render_only.c "$build/ssdgs.o" "$build/kernels.o" -o "$build/render_only" -lm -lpthread
 output=$("$@" -DSSDGS_NO_TRAINER tests/render_only.c -o "$build/render_only_small" -lm -lpthread 2>&1) && output= || output=${output:-no message}
 check SSDGS_NO_TRAINER "$output"
 whole=$("$build/render_only") small=$("$build/render_only_small")
