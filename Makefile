@@ -4,7 +4,7 @@ CXX ?= c++
 BUILD = build
 ITERATIONS = 5000
 BENCH =
-DATA = ../shared/data
+DATA = data
 FUZZ_SECONDS = 1800
 FUZZ_TARGETS = render train ply checkpoint png unfilter inflate dataset json json_string hooks
 SCENES = waxcow:black blocks:white anisometal:white
@@ -42,6 +42,7 @@ bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measure
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
 
 experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours; PARTS="components ..." alone) into tests/EXPERIMENTS.md
+	@[ -d "$(DATA)" ] || { echo "no folder $(DATA): make experiments DATA=FOLDER, where FOLDER/$(firstword $(subst :, ,$(SCENES))) and the other SCENES lie"; exit 1; }
 	sh tests/experiments.sh $(BUILD) "$(DATA)" $(ITERATIONS) $(SCENES)
 	mkdir -p tests/images
 	cp $(BUILD)/experiments/EXPERIMENTS.md tests
