@@ -4,16 +4,23 @@ CXX ?= c++
 BUILD = build
 ITERATIONS = 5000
 BENCH =
-DATA = ../shared/data
+DATA = data
 FUZZ_SECONDS = 1800
 FUZZ_TARGETS = render train ply checkpoint png unfilter inflate dataset json json_string hooks
 SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) $(if $(findstring ++,$(CC)),,-Wstrict-prototypes -Wmissing-prototypes)
-COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT)) -DSSDGS_SCALAR # tests try the scalar kernels too
+COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT)) -DSSDGS_SCALAR -DSSDGS_STAGES # tests try the scalar kernels and the stages too
+# The library is compiled once, and once in double: kernels.o has its kernels, ssdgs.o all else. Programs link both; those that reach
+# into the library (ssdgs__) compile what is not kernels as their own, the tests only what they call, and link the kernels.
+KERNELS = -DSSDGS_SELF='"tests/kernels.h"'
+INSIDE := $(shell grep -l ssdgs__ tests/*.c tests/fuzz/*.c examples/*.c)
+OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
+PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
+LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
-HEADERS = ssdgs.h examples/olat.h tests/test.h
+HEADERS = ssdgs.h examples/olat.h tests/test.h tests/kernels.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
@@ -35,6 +42,7 @@ bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measure
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
 
 experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours; PARTS="components ..." alone) into tests/EXPERIMENTS.md
+	@[ -d "$(DATA)" ] || { echo "no folder $(DATA): make experiments DATA=FOLDER, where FOLDER/$(firstword $(subst :, ,$(SCENES))) and the other SCENES lie"; exit 1; }
 	sh tests/experiments.sh $(BUILD) "$(DATA)" $(ITERATIONS) $(SCENES)
 	mkdir -p tests/images
 	cp $(BUILD)/experiments/EXPERIMENTS.md tests
@@ -62,7 +70,7 @@ $(filter-out %/fuzz.log,$(TESTS:=.log)): %.log: %
 	@$(RUN) $* $(KEEP_LOG)
 $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
-$(BUILD)/builds.log: %.log: $(BUILD)/multi_a.o
+$(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 $(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
@@ -91,9 +99,7 @@ test-c99: ## tests with -std=c99
 test-matrix: ## tests with every compiler and machine at hand (hours); others are named
 	sh tests/matrix.sh $(BUILD)
 
-hashes: tests/hashes.c $(HEADERS) | $(BUILD) ## bits of training and renders: the same before and after code is moved
-	$(COMPILE) $< -o $(BUILD)/hashes $(LDLIBS)
-	$(COMPILE) -DSSDGS_REAL64 $< -o $(BUILD)/hashes_64 $(LDLIBS)
+hashes: $(BUILD)/hashes $(BUILD)/hashes_64 ## bits of training and renders: the same before and after code is moved
 	@$(BUILD)/hashes; $(BUILD)/hashes_64
 
 size: ## what including ssdgs.h costs: seconds of compiling and bytes of code
@@ -120,40 +126,39 @@ help: ## this list
 
 $(BUILD):
 	mkdir -p $(BUILD)
-$(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) | $(BUILD)
-	$(COMPILE) $< -o $@ $(LDLIBS)
-$(BUILD)/t_%_64: tests/t_%.c $(HEADERS) | $(BUILD)
-	$(COMPILE) -DSSDGS_REAL64 $< -o $@ $(LDLIBS)
-$(BUILD)/t_%: tests/t_%.c $(HEADERS) | $(BUILD)
-	$(COMPILE) $< -o $@ $(LDLIBS)
-$(BUILD)/show: tests/show.c $(HEADERS) | $(BUILD)
-	$(COMPILE) $< -o $@ $(LDLIBS)
-$(BUILD)/%.o: tests/%.c $(HEADERS) | $(BUILD)
-	$(COMPILE) -c $< -o $@
-$(BUILD)/multi: $(BUILD)/multi_a.o $(BUILD)/multi_b.o
-	$(COMPILE) $^ -o $@ $(LDLIBS)
-$(BUILD)/compile_c: $(BUILD)/multi_a.o $(BUILD)/compile_c.o
-	$(COMPILE) $^ -o $@ $(LDLIBS)
-# Without a C++ compiler there is nothing to check.
-$(BUILD)/compile_cpp: tests/compile_cpp.cpp tests/compile_c.c $(HEADERS) | $(BUILD)
-	if command -v $(CXX) >/dev/null; then $(CXX) $(CFLAGS) -std=c++11 $< -o $@ $(LDLIBS); \
-	else printf '#!/bin/sh\necho "$(CXX) is missing: C++ not tested"\necho "0 passed, 0 failed"\n' >$@; chmod +x $@; fi
-$(BUILD)/readme: tests/readme.c README.md $(HEADERS) | $(BUILD)
+$(BUILD)/ssdgs.o $(BUILD)/ssdgs_64.o: tests/library.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $(KERNELS) $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
+$(BUILD)/kernels.o $(BUILD)/kernels_64.o: tests/library.c $(HEADERS) | $(BUILD)
+	$(COMPILE) $(KERNELS) -DSSDGS_STATIC -DTEST_KERNELS $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
+$(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) $(OBJECTS)
+	$(PROGRAM) $(LINKED)
+$(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
+	$(PROGRAM) $(LINKED)
+$(BUILD)/hashes_64: $(BUILD)/ssdgs_64.o
+$(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
+	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
+$(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(BUILD)/kernels_64.o
+	$(PROGRAM) $(LINKED)
+$(BUILD)/fuzz: tests/fuzz/fuzz.c $(HEADERS) $(OBJECTS)
+	$(PROGRAM) $(LINKED)
+# What the manuals show is taken from there.
+$(BUILD)/readme: tests/readme.c README.md $(HEADERS) $(OBJECTS)
 	sed -n '/^\/\* readme example \*\//,/^```/{/^```/d;p;}' README.md >$(BUILD)/readme_example.c
-	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
+	$(PROGRAM) -I. -I$(BUILD) $(LINKED)
+$(BUILD)/manual: tests/manual.c $(HEADERS) $(OBJECTS)
+	for e in render train; do \
+	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
+	$(PROGRAM) -I. -I$(BUILD) $(LINKED)
+# All of it as C++, unoptimised: that takes long. Without a C++ compiler there is nothing to check.
+$(BUILD)/compile_cpp: tests/compile_cpp.cpp tests/compile_c.c $(HEADERS) | $(BUILD)
+	if command -v $(CXX) >/dev/null; then $(CXX) $(CFLAGS) -O0 -std=c++11 $< -o $@ $(LDLIBS); \
+	else printf '#!/bin/sh\necho "$(CXX) is missing: C++ not tested"\necho "0 passed, 0 failed"\n' >$@; chmod +x $@; fi
 
-$(BUILD)/fuzz: tests/fuzz/fuzz.c $(HEADERS) | $(BUILD)
-	$(COMPILE) $< -o $@ $(LDLIBS)
 # AVX-512 would be the kernels of AVX2 once more, and take long to build.
 $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	mkdir -p $(BUILD)/fuzzers
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
-
-$(BUILD)/manual: tests/manual.c $(HEADERS) | $(BUILD)
-	for e in render train; do \
-	  sed -n "/^--- $$e example ---/,/^--- end ---/s/^    //p" ssdgs.h >$(BUILD)/manual_$$e.c; done
-	$(COMPILE) -I. -I$(BUILD) $< -o $@ $(LDLIBS)
 
 .PHONY: $(LOGS) all demo bench size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

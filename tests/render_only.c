@@ -2,7 +2,7 @@
    the trainer. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
-#include <stdio.h>
+#include "test.h"
 
 int main(void) {
     enum { SIDE = 48, COUNT = 500 };
@@ -25,7 +25,7 @@ int main(void) {
         for (int i = 0; i < COUNT; i++)
             for (int c = 0; c < SSDGS_CHANNELS; c++)
                 view.gaussians[(size_t)c * view.stride + (size_t)i] +=
-                    (ssdgs_real)(0.8 * ssdgs__uniform(3, (uint64_t)(i * SSDGS_CHANNELS + c)) - 0.4);
+                    (ssdgs_real)(0.8 * test_uniform(3, (uint64_t)(i * SSDGS_CHANNELS + c)) - 0.4);
         if (ssdgs_render(model, &camera, &light, 1, &image)) return 1;
         for (int i = 0; i < (int)sizeof color; i++)
             hash = (hash ^ ((const unsigned char *)color)[i]) * UINT64_C(0x100000001B3);

@@ -25,9 +25,9 @@
     EACH(each_cos, (F(sincos)(x, &s, &c), c)) \
     EACH(each_sigmoid, F(sigmoid)(x)) \
     EACH(each_softplus, F(softplus)(x)) \
-    static each_function *const F(elementary)[MAPS] = {F(each_exp2),    F(each_exp),     F(each_log), \
-                                                       F(each_log1p),   F(each_sin),     F(each_cos), \
-                                                       F(each_sigmoid), F(each_softplus)}; \
+    static SSDGS__UNUSED each_function *const F(elementary)[MAPS] = { \
+        F(each_exp2), F(each_exp), F(each_log),     F(each_log1p), \
+        F(each_sin),  F(each_cos), F(each_sigmoid), F(each_softplus)}; \
     SSDGS__FN void F(profile)(int form, const R *ss, const R *sa, const R *r, R virtual_depth, R *f, R *d, \
                               size_t n) { \
         for (size_t i = 0; i < n; i += SSDGS__VW) { \
@@ -37,15 +37,22 @@
             for (size_t j = 0; j < 3; j++) VSTORE(d + j * n + i, slope[j]); \
         } \
     } \
-    static const ssdgs__kernels
+    static const SSDGS__UNUSED ssdgs__kernels
 #include "../ssdgs.h"
 #undef ssdgs__kernels
 #undef EACH
+#ifdef TEST_HAS_KERNELS
+#include "kernels.h"
+#endif
 #else
 
 #include "../ssdgs.h"
 #include "test.h"
 enum { EXP2, EXP, LOG, LOG1P, SIN, COS, SIGMOID, SOFTPLUS, MAPS, SRGB_ENCODE = MAPS, SRGB_DECODE };
+#ifdef SSDGS_SELF /* the Makefile's: the tables are linked */
+#undef SSDGS_SELF
+#define TEST_HAS_KERNELS
+#endif
 #define SSDGS_SELF "tests/t_accuracy.c" /* as seen from the header */
 typedef void each_function(const ssdgs_real *, const ssdgs_real *, ssdgs_real *, size_t);
 #define SSDGS_IMPLEMENTATION

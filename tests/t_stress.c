@@ -44,7 +44,7 @@ static void released(void *user, void *memory) {
 
 /* ---- scenes ---- */
 
-static double draw(uint64_t key, uint64_t counter) { return 2 * ssdgs__uniform(key, counter) - 1; }
+static double draw(uint64_t key, uint64_t counter) { return 2 * test_uniform(key, counter) - 1; }
 static double bits_number(uint32_t bits) {
     float value;
     memcpy(&value, &bits, 4);
@@ -1169,20 +1169,21 @@ static void row_44(void) { /* networks with weights a thousand times too large, 
             if (!CHECK(a.shadow[i] >= 0 && a.shadow[i] <= a.alpha[i] * (ssdgs_real)1.00001)) break;
         ssdgs_model_destroy(model);
     }
-    unsigned char *bytes;
+    static unsigned char bytes[1 << 20];
     size_t size;
     for (int k = 0; k < 2; k++) {
         ssdgs_model *model = cloud(full(), 10);
         const ssdgs_model_view v = ssdgs_model_arrays(model);
         (k ? v.shadow : v.scattering)[5] = 12345;
-        CHECK(!ssdgs_model_save(model, path) && !ssdgs__read_file(context, path, &bytes, &size));
+        FILE *file = CHECK(!ssdgs_model_save(model, path)) ? fopen(path, "rb") : NULL;
+        size = file ? fread(bytes, 1, sizeof bytes, file) : 0;
+        if (file) fclose(file);
         size_t i, at;
         for (i = 0, at = size; i + 4 <= size; i++)
             at = memcmp(bytes + i, "\0\344\100\106", 4) ? at : i;    /* 12345 */
         if (CHECK(at < size)) memcpy(bytes + at, "\0\0\300\177", 4); /* NaN */
         CHECK(ssdgs_model_load_memory(context, bytes, size, &back, NULL) == SSDGS_ERR_FORMAT && !back);
         CHECK(strstr(ssdgs_error_message(context), k ? "shadow" : "scattering"));
-        ssdgs__release(context, bytes);
         (k ? v.shadow : v.scattering)[5] = (ssdgs_real)NOT_A_NUMBER;
         CHECK(ssdgs_model_save(model, path) == SSDGS_ERR_NONFINITE);
         remove(path);
@@ -1463,10 +1464,12 @@ int main(int count, char **argument) {
     desc.allocator.allocate = metered;
     desc.allocator.release = released;
     for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (int eight = 0; eight < 2 && ssdgs__table(isa); eight++) {
+        for (int eight = 0; eight < 2; eight++) {
             desc.isa = (ssdgs_isa)isa;
             desc.threads = eight ? 8 : 1;
-            if (!CHECK(!ssdgs_context_create(&desc, &context))) return 1;
+            const ssdgs_result result = ssdgs_context_create(&desc, &context);
+            if (result == SSDGS_ERR_ISA) break;
+            if (!CHECK(!result)) return 1;
             for (int r = 0; r < ROWS; r++) {
                 const int failed = test_failed;
                 const size_t before = held;
@@ -1485,6 +1488,7 @@ int main(int count, char **argument) {
             ssdgs_context_destroy(context);
             CHECK(held == 0);
         }
+    CHECK(ran > 0);
     for (int r = 0; r < ROWS; r++) {
         if (only && rows[r].number != only) continue;
         char number[16];

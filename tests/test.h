@@ -24,6 +24,16 @@ static inline int test_finite(double value) {
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
+/* A number of 0 .. 1 for each counter, in any order. */
+static inline double test_uniform(uint64_t key, uint64_t counter) {
+    uint64_t x = key * UINT64_C(0x9E3779B97F4A7C15) + counter;
+    x = (x ^ (x >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94D049BB133111EB);
+    x ^= x >> 31;
+    x = (x + UINT64_C(0x9E3779B97F4A7C15)) * UINT64_C(0xD6E8FEB86659FD93);
+    return (double)((x ^ (x >> 32)) >> 11) * (1.0 / 9007199254740992.0);
+}
+
 /* How far got is outside of absolute + relative * |want|: 1 is just inside. */
 static inline double test_error(double got, double want, double absolute, double relative) {
     return test_finite(got) ? fabs(got - want) / (absolute + relative * fabs(want) + 1e-300) : 1e300;

@@ -1,4 +1,4 @@
-/* The other of two translation units: sees the interface only. */
+/* One of two translation units: sees the interface only; the other is library.c. */
 #include "../ssdgs.h"
 #include "test.h"
 
