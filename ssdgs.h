@@ -1025,49 +1025,87 @@ typedef struct ssdgs__lighting {
         cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
 } ssdgs__lighting;
 
+/* A network's layers: sizes (layers + 1), and per layer (out, in) weights, then (out) biases. */
+typedef struct ssdgs__network {
+    const int *sizes;
+    int layers;
+    const ssdgs_real *weights;
+} ssdgs__network;
+
+/* A block under one light, rows of SSDGS__BLOCK: what its colour is made of, and the gradients. */
+typedef struct ssdgs__colour_in {
+    const ssdgs_real *gauss;      /* (SSDGS_CHANNELS) raw parameters */
+    const ssdgs_real *geometry;   /* (SSDGS__ROWS) */
+    const ssdgs_real *visibility; /* (1) */
+    const ssdgs_real *shadow;     /* (1) the shadow network's output, or NULL */
+    const ssdgs_real *optics;     /* (3 or 7) the scattering network's, or NULL */
+} ssdgs__colour_in;
+typedef struct ssdgs__colour_gradient {
+    const ssdgs_real *color, *diffuse,
+        *specular;        /* (3) in; the last two are color unless light is deferred */
+    ssdgs_real *gauss;    /* added to */
+    ssdgs_real *geometry; /* irradiance, f_d, f_s are written, as all that follow */
+    ssdgs_real *shadow, *optics, *visibility;
+} ssdgs__colour_gradient;
+
+/* Adam's numbers for a group of parameters: learning rate, bias corrections of mean and square, epsilon. */
+typedef struct ssdgs__adam_rate {
+    ssdgs_real rate, correct_mean, correct_square, epsilon;
+} ssdgs__adam_rate;
+
 typedef struct ssdgs__kernels {
-    void (*project)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t, ssdgs_real *,
-                    ssdgs_real *);
-    void (*project_backward)(const ssdgs__projection *, const ssdgs_real *, size_t, size_t, size_t,
-                             const ssdgs_real *, ssdgs_real *, size_t, ssdgs_real *);
-    void (*bin)(const ssdgs_splat_view *, const uint16_t *, ssdgs_real, int, int, uint32_t);
-    void (*walk_camera)(const ssdgs__tile *, uint16_t *, unsigned char *);
-    void (*walk_light)(const ssdgs__tile *, ssdgs_real *);
-    void (*composite)(const ssdgs__tile *, int, const ssdgs_real *const *, ssdgs_real *);
-    void (*composite_backward)(const ssdgs__tile *, int, const ssdgs_real *const *, const ssdgs_real *,
-                               ssdgs_real *, ssdgs_real *, size_t, int);
-    void (*highlight)(const ssdgs__lighting *, const ssdgs__tile *, ssdgs_real *, ssdgs_real *);
-    void (*highlight_backward)(const ssdgs__lighting *, const ssdgs__tile *, const ssdgs_real *,
-                               const ssdgs_real *, ssdgs_real *, ssdgs_real *);
-    void (*lobe)(const ssdgs_real *, ssdgs_real *);
-    void (*lobe_backward)(const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
-    void (*transport)(const ssdgs_real *, int, const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
-    void (*dense)(const ssdgs__product *);
-    int (*live_rows)(const ssdgs_real *, int, uint16_t *);
-    void (*transpose)(const ssdgs_real *, int, size_t, size_t, ssdgs_real *);
-    void (*row_sums)(ssdgs_real *, size_t, const ssdgs_real *, const uint16_t *, int);
-    void (*encode)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
-    void (*encode_backward)(ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real, int, int);
-    void (*reflect)(const ssdgs__lighting *, const ssdgs_real *, ssdgs_real *);
-    void (*reflect_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, ssdgs_real *,
-                             ssdgs_real *);
-    void (*colour)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                   const ssdgs_real *, const ssdgs_real *, ssdgs_real *);
-    void (*colour_backward)(const ssdgs__lighting *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, const ssdgs_real *,
-                            const ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, ssdgs_real *,
-                            ssdgs_real *, ssdgs_real *);
-    void (*depth_normals)(const ssdgs_camera *, const ssdgs_real *, size_t, int, ssdgs_real, ssdgs_real *);
-    void (*srgb_encode)(ssdgs_real *, ssdgs_real *, const ssdgs_real *, size_t);
-    void (*srgb_decode)(ssdgs_real *, const ssdgs_real *, size_t);
-    void (*ssim_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *, ssdgs_real *,
-                     ssdgs_real *, ssdgs_real *, ssdgs_real *);
-    void (*ssim_backward_row)(const ssdgs_real *, const ssdgs_real *, int, size_t, ssdgs_real *,
-                              const ssdgs_real *, const ssdgs_real *, const ssdgs_real *, ssdgs_real,
-                              ssdgs_real, ssdgs_real *);
-    int (*finite)(const ssdgs_real *, size_t);
-    void (*adam)(ssdgs_real *, const ssdgs_real *, ssdgs_real *, ssdgs_real *, size_t, ssdgs_real, ssdgs_real,
-                 ssdgs_real, ssdgs_real);
+    void (*project)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, size_t begin,
+                    size_t end, ssdgs_real *record, ssdgs_real *depth);
+    void (*project_backward)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride,
+                             size_t begin, size_t end, const ssdgs_real *splat, ssdgs_real *gradient,
+                             size_t gradient_stride, ssdgs_real *view_slot);
+    void (*bin)(const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, int begin,
+                int end, uint32_t at);
+    void (*walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed);
+    void (*walk_light)(const ssdgs__tile *tile, ssdgs_real *sums);
+    void (*composite)(const ssdgs__tile *tile, int layers, const ssdgs_real *const *color,
+                      ssdgs_real *pixels);
+    void (*composite_backward)(const ssdgs__tile *tile, int layers, const ssdgs_real *const *color,
+                               const ssdgs_real *pixels, ssdgs_real *scratch, ssdgs_real *sums, size_t stride,
+                               int slot);
+    void (*highlight)(const ssdgs__lighting *lighting, const ssdgs__tile *tile, ssdgs_real *layers,
+                      ssdgs_real *visibility);
+    void (*highlight_backward)(const ssdgs__lighting *lighting, const ssdgs__tile *tile,
+                               const ssdgs_real *layers, const ssdgs_real *visibility, ssdgs_real *gradient,
+                               ssdgs_real *sums);
+    void (*lobe)(const ssdgs_real *gauss, ssdgs_real *rows);
+    void (*lobe_backward)(const ssdgs_real *gauss, const ssdgs_real *drows, ssdgs_real *dgauss);
+    void (*transport)(const ssdgs_real *sources, int count, const ssdgs_real *x, const ssdgs_real *scale,
+                      ssdgs_real *sums);
+    void (*dense)(const ssdgs__product *product);
+    int (*live_rows)(const ssdgs_real *rows, int count, uint16_t *list);
+    void (*transpose)(const ssdgs_real *rows, int count, size_t padded, size_t stride, ssdgs_real *out);
+    void (*row_sums)(ssdgs_real *sums, size_t stride, const ssdgs_real *rows, const uint16_t *list,
+                     int count);
+    void (*encode)(ssdgs_real *out, const ssdgs_real *in, const ssdgs_real *origin, ssdgs_real scale,
+                   int dims, int levels);
+    void (*encode_backward)(ssdgs_real *din, const ssdgs_real *dout, const ssdgs_real *out, ssdgs_real scale,
+                            int dims, int levels);
+    void (*reflect)(const ssdgs__lighting *lighting, const ssdgs_real *gauss, ssdgs_real *rows);
+    void (*reflect_backward)(const ssdgs__lighting *lighting, const ssdgs_real *gauss,
+                             const ssdgs_real *drows, ssdgs_real *dgauss, ssdgs_real *lane_sums);
+    void (*colour)(const ssdgs__lighting *lighting, const ssdgs__colour_in *in, ssdgs_real *out);
+    void (*colour_backward)(const ssdgs__lighting *lighting, const ssdgs__colour_in *in,
+                            const ssdgs__colour_gradient *d);
+    void (*depth_normals)(const ssdgs_camera *camera, const ssdgs_real *depth, size_t stride, int y,
+                          ssdgs_real weight, ssdgs_real *out);
+    void (*srgb_encode)(ssdgs_real *out, ssdgs_real *slope, const ssdgs_real *in, size_t n);
+    void (*srgb_decode)(ssdgs_real *out, const ssdgs_real *in, size_t n);
+    void (*ssim_row)(const ssdgs_real *image, const ssdgs_real *reference, int width, size_t stride,
+                     ssdgs_real *scratch, ssdgs_real *d_mean, ssdgs_real *d_square, ssdgs_real *d_product,
+                     ssdgs_real *sums);
+    void (*ssim_backward_row)(const ssdgs_real *image, const ssdgs_real *reference, int width, size_t stride,
+                              ssdgs_real *scratch, const ssdgs_real *d_mean, const ssdgs_real *d_square,
+                              const ssdgs_real *d_product, ssdgs_real by_l1, ssdgs_real by_ssim,
+                              ssdgs_real *gradient);
+    int (*finite)(const ssdgs_real *values, size_t n);
+    void (*adam)(ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean, ssdgs_real *square,
+                 size_t n, const ssdgs__adam_rate *rate);
 } ssdgs__kernels;
 
 /* Pixel offsets of the lanes of a 4x4 micro-tile, and the lanes' numbers. */
@@ -1189,6 +1227,41 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* ---- the tables ---- */
 
+/* The kernels have short names for vectors. An includer's macros of these names are put away until the tables
+   are made. */
+#pragma push_macro("R")
+#pragma push_macro("V")
+#pragma push_macro("VM")
+#pragma push_macro("VLOAD")
+#pragma push_macro("VSTORE")
+#pragma push_macro("VSET")
+#pragma push_macro("VADD")
+#pragma push_macro("VSUB")
+#pragma push_macro("VMUL")
+#pragma push_macro("VDIV")
+#pragma push_macro("VFMA")
+#pragma push_macro("VFNMA")
+#pragma push_macro("VMIN")
+#pragma push_macro("VMAX")
+#pragma push_macro("VSQRT")
+#pragma push_macro("VLT")
+#pragma push_macro("VGE")
+#pragma push_macro("VAND")
+#pragma push_macro("VBITS")
+#pragma push_macro("VSEL")
+#pragma push_macro("VROUND")
+#pragma push_macro("VLDEXP")
+#pragma push_macro("VEXPONENT")
+#pragma push_macro("VEXP")
+#pragma push_macro("VLOG")
+#pragma push_macro("VNEG")
+#pragma push_macro("VUNROLL")
+#pragma push_macro("VABS")
+#pragma push_macro("VDOT3")
+#pragma push_macro("F")
+#define SSDGS__ISA 0 /* undefines them */
+#include SSDGS_SELF
+#undef SSDGS__ISA
 #define SSDGS__ISA SSDGS__ISA_SCALAR
 #include SSDGS_SELF
 #undef SSDGS__ISA
@@ -1212,6 +1285,37 @@ static int ssdgs__finite(ssdgs_real x) {
 #include SSDGS_SELF
 #undef SSDGS__ISA
 #endif
+
+#pragma pop_macro("R")
+#pragma pop_macro("V")
+#pragma pop_macro("VM")
+#pragma pop_macro("VLOAD")
+#pragma pop_macro("VSTORE")
+#pragma pop_macro("VSET")
+#pragma pop_macro("VADD")
+#pragma pop_macro("VSUB")
+#pragma pop_macro("VMUL")
+#pragma pop_macro("VDIV")
+#pragma pop_macro("VFMA")
+#pragma pop_macro("VFNMA")
+#pragma pop_macro("VMIN")
+#pragma pop_macro("VMAX")
+#pragma pop_macro("VSQRT")
+#pragma pop_macro("VLT")
+#pragma pop_macro("VGE")
+#pragma pop_macro("VAND")
+#pragma pop_macro("VBITS")
+#pragma pop_macro("VSEL")
+#pragma pop_macro("VROUND")
+#pragma pop_macro("VLDEXP")
+#pragma pop_macro("VEXPONENT")
+#pragma pop_macro("VEXP")
+#pragma pop_macro("VLOG")
+#pragma pop_macro("VNEG")
+#pragma pop_macro("VUNROLL")
+#pragma pop_macro("VABS")
+#pragma pop_macro("VDOT3")
+#pragma pop_macro("F")
 
 /* ==== >>memory  contexts, errors, aligned allocation ==== */
 
@@ -3844,9 +3948,10 @@ static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
 
 /* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that
    are 0 in the whole block are left out of the sums, which changes no bit. */
-static void ssdgs__network_forward(const ssdgs__kernels *k, const int *sizes, int layers,
-                                   const ssdgs_real *weights, ssdgs__row_lists *lists,
-                                   const ssdgs_real *inputs, ssdgs_real *outputs) {
+static void ssdgs__network_forward(const ssdgs__kernels *k, const ssdgs__network *net,
+                                   ssdgs__row_lists *lists, const ssdgs_real *inputs, ssdgs_real *outputs) {
+    const int *sizes = net->sizes, layers = net->layers;
+    const ssdgs_real *weights = net->weights;
     ssdgs__product p;
     memset(&p, 0, sizeof p);
     p.row_list = lists->all;
@@ -3908,14 +4013,21 @@ static void ssdgs__sum_slots(const int *sizes, int layers, const ssdgs_real *slo
     }
 }
 
+typedef struct ssdgs__network_scratch {
+    ssdgs_real *d, *spare;  /* (rows of the widest layer and one, BLOCK) each */
+    ssdgs_real *transposed; /* (BLOCK, inputs of the widest layer and 32) */
+} ssdgs__network_scratch;
+
 /* d holds dL/d(outputs) and ends as dL/d(inputs), the first `asked` rows of it, in d or spare: that one is
    returned. Adds to the slot's gradient unless that is NULL. Neurons that are 0 in the whole block have no
    part in it. */
-static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const int *sizes, int layers,
-                                           const ssdgs_real *weights, const ssdgs_real *inputs,
-                                           const ssdgs_real *outputs, ssdgs_real *d, ssdgs_real *spare,
-                                           ssdgs_real *transposed, ssdgs__row_lists *lists, int asked,
-                                           ssdgs_real *slot_gradient) {
+static ssdgs_real *ssdgs__network_backward(const ssdgs__kernels *k, const ssdgs__network *net,
+                                           const ssdgs_real *inputs, const ssdgs_real *outputs,
+                                           const ssdgs__network_scratch *scratch, ssdgs__row_lists *lists,
+                                           int asked, ssdgs_real *slot_gradient) {
+    const int *sizes = net->sizes, layers = net->layers;
+    const ssdgs_real *weights = net->weights;
+    ssdgs_real *d = scratch->d, *spare = scratch->spare, *transposed = scratch->transposed;
     const ssdgs_real *layer_in = layers > 1 ? outputs : inputs;
     int live_out = sizes[layers];
     const uint16_t *outs = lists->all;
@@ -4123,6 +4235,8 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
+    const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
+    const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
     for (int light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
@@ -4146,18 +4260,17 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             shadow = part + l->scattering_at - SSDGS__BLOCK;
             if (!ssdgs__shadow_recall(job, light, at, shadow)) {
                 ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
-                ssdgs__network_forward(k, l->shadow, l->shadow_layers, frame->gaussians.shadow, lists, inputs,
-                                       part + l->shadow_at);
+                ssdgs__network_forward(k, &shadow_net, lists, inputs, part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
             } else lists->shadows_cached += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            ssdgs__network_forward(k, l->scattering, l->scattering_layers, frame->gaussians.scattering, lists,
-                                   inputs, part + l->scattering_at);
+            ssdgs__network_forward(k, &scattering_net, lists, inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
-        k->colour(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, outs);
+        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
+        k->colour(lighting, &in, outs);
         if (lighting->deferred) {
             const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
             ssdgs__layer_store(frame, layer, at, live, outs + 3 * SSDGS__BLOCK);
@@ -4353,6 +4466,9 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
     ssdgs_real dresidual[3 * SSDGS__BLOCK];
+    const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
+    const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
+    const ssdgs__network_scratch backward = {dnet, dnet2, scratch + l->transposed};
     for (int light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = job->lightings + light;
         const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
@@ -4371,24 +4487,29 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             for (int s = 0; s < SSDGS__BLOCK; s++)
                 dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
-        k->colour_backward(lighting, gauss, part + l->rows, part + l->visibility, shadow, scattering, dcolor,
-                           lighting->deferred ? ddiffuse : dcolor, lighting->deferred ? dspecular : dcolor,
-                           dgauss, drows, dshadow, dnet, dvisibility);
+        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
+        const ssdgs__colour_gradient out = {dcolor,
+                                            lighting->deferred ? ddiffuse : dcolor,
+                                            lighting->deferred ? dspecular : dcolor,
+                                            dgauss,
+                                            drows,
+                                            dshadow,
+                                            dnet,
+                                            dvisibility};
+        k->colour_backward(lighting, &in, &out);
         for (int s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
-            ssdgs_real *dinputs = ssdgs__network_backward(
-                k, l->scattering, l->scattering_layers, frame->gaussians.scattering, inputs,
-                part + l->scattering_at, dnet, dnet2, scratch + l->transposed, lists,
-                ssdgs__inputs_asked(frame, l), frame->frozen[0] ? NULL : slot_gradient);
+            ssdgs_real *dinputs = ssdgs__network_backward(k, &scattering_net, inputs, part + l->scattering_at,
+                                                          &backward, lists, ssdgs__inputs_asked(frame, l),
+                                                          frame->frozen[0] ? NULL : slot_gradient);
             ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
             ssdgs_real *dinputs = ssdgs__network_backward(
-                k, l->shadow, l->shadow_layers, frame->gaussians.shadow, inputs, part + l->shadow_at, dnet,
-                dnet2, scratch + l->transposed, lists, l->shadow[0],
+                k, &shadow_net, inputs, part + l->shadow_at, &backward, lists, l->shadow[0],
                 frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
             ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
@@ -7034,7 +7155,7 @@ typedef struct ssdgs__adam_range {
     ssdgs_real *parameter, *mean, *square;
     const ssdgs_real *gradient;
     size_t n;
-    ssdgs_real rate, correct_mean, correct_square, epsilon;
+    ssdgs__adam_rate rate;
     int group;
     size_t first_chunk;
     size_t bad; /* first non-finite gradient + 1, per range */
@@ -7061,8 +7182,7 @@ static void ssdgs__adam_task(void *data, int index) {
     while (r + 1 < job->range + job->ranges && r[1].first_chunk <= (size_t)index) r++;
     const size_t begin = ((size_t)index - r->first_chunk) * SSDGS__ADAM_CHUNK;
     const size_t n = r->n - begin < SSDGS__ADAM_CHUNK ? r->n - begin : SSDGS__ADAM_CHUNK;
-    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, r->rate,
-                 r->correct_mean, r->correct_square, r->epsilon);
+    job->k->adam(r->parameter + begin, r->gradient + begin, r->mean + begin, r->square + begin, n, &r->rate);
 }
 
 static ssdgs_real ssdgs__bias_correction(double beta,
@@ -7085,11 +7205,11 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->n = n;
     r->group = group;
     r->bad = 0;
-    r->rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
-    r->correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
-    r->correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
+    r->rate.rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
+    r->rate.correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
+    r->rate.correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
     if (group == SSDGS__G_POSITION) epsilon /= trainer->unit; /* of a move by the bounds' longest side */
-    r->epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
+    r->rate.epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
     r->first_chunk = job->chunks;
     job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
 }
@@ -9033,6 +9153,7 @@ SSDGS__SMALL_END
 #endif
 #endif /* SSDGS_IMPLEMENTATION */
 #else  /* SSDGS__ISA: the kernels, included once per instruction set */
+#if SSDGS__ISA
 
 /* ==== >>kernels  one body for every instruction set ====
    V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm
@@ -10956,8 +11077,8 @@ SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int 
 }
 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
-SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows, const R *visibility,
-                         const R *shadow, const R *optics, R *out) {
+SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R *out) {
+    const R *gauss = in->gauss, *rows = in->geometry, *visibility = in->visibility, *shadow = in->shadow;
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
                 factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
@@ -10980,7 +11101,7 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
             if (k->scattering) {
                 const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) {
-                    F(optics)(k, optics, c, s, unit);
+                    F(optics)(k, in->optics, c, s, unit);
                     profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
                                         VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
                                         k->virtual_depth, NULL);
@@ -10996,10 +11117,12 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const R *gauss, const R *rows
 
 /* dcolor (3, BLOCK), ddiffuse and dspecular for those terms alone: dcolor, unless they are deferred. Adds to
    dgauss; writes drows' irradiance, f_d, f_s, and the output gradients dshadow (1), doptics (3 or 7). */
-SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, const R *rows,
-                                  const R *visibility, const R *shadow, const R *optics, const R *dcolor,
-                                  const R *ddiffuse, const R *dspecular, R *dgauss, R *drows, R *dshadow,
-                                  R *doptics, R *dvisibility) {
+SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_in *in,
+                                  const ssdgs__colour_gradient *out) {
+    const R *gauss = in->gauss, *rows = in->geometry, *visibility = in->visibility, *shadow = in->shadow;
+    const R *dcolor = out->color, *ddiffuse = out->diffuse, *dspecular = out->specular;
+    R *dgauss = out->gauss, *drows = out->geometry, *dshadow = out->shadow, *doptics = out->optics;
+    R *dvisibility = out->visibility;
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
                 factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
@@ -11016,9 +11139,9 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067)), surface = VMUL(kd, cosine);
                 const V push = VMUL(VLOAD(ddiffuse + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
                         lit = VMUL(VMUL(push, irradiance), direct);
-                R *out = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
-                VSTORE(out,
-                       VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(out)));
+                R *to = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
+                VSTORE(to,
+                       VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(to)));
                 dcosine = VFMA(lit, kd, dcosine);
                 dirradiance = VFMA(VMUL(push, direct), surface, dirradiance);
                 ddirect = VFMA(VMUL(push, irradiance), surface, ddirect);
@@ -11027,8 +11150,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
                 const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
                 const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
                         lobe_lit = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
-                R *out = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
-                VSTORE(out, VFMA(VMUL(lobe_lit, gloss), F(sigmoid)(raw), VLOAD(out)));
+                R *to = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
+                VSTORE(to, VFMA(VMUL(lobe_lit, gloss), F(sigmoid)(raw), VLOAD(to)));
                 dgloss = VFMA(lobe_lit, ks, dgloss);
                 dirradiance = VFMA(VMUL(push, direct), shine, dirradiance);
                 ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
@@ -11036,15 +11159,15 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const R *gauss, cons
             if (k->scattering) { /* c_sss f_sss */
                 const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s),
                         kss = F(softplus)(raw);
-                R *out = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
+                R *to = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
                 const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
                 if (c == 0 || k->per_channel_optics) {
-                    F(optics)(k, optics, c, s, unit);
+                    F(optics)(k, in->optics, c, s, unit);
                     profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
                                         VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
                                         k->virtual_depth, d);
                 }
-                VSTORE(out, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(out)));
+                VSTORE(to, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(to)));
                 dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
                 if (k->shadow_on_scattering) dfactor = VFMA(VMUL(g, irradiance), VMUL(kss, profile), dfactor);
                 const V dprofile = VMUL(lamp, kss);
@@ -11228,8 +11351,8 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
    Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that
    flushes subnormals finds the same. Those beyond 1e18 count as that: no square and no product with a rate
    overflows. */
-SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square, R rate, R correct_mean,
-                             R correct_square, R epsilon) {
+SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square,
+                             const ssdgs__adam_rate *rate) {
     V g = VLOAD(gradient);
     g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
     V m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
@@ -11238,17 +11361,16 @@ SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square
     v = VSEL(VLT(v, VSET(1e-36)), VSET(0), v);
     VSTORE(mean, m);
     VSTORE(square, v);
-    m = VMUL(VSET(rate), VMUL(m, VSET(correct_mean)));
-    v = VADD(VSQRT(VMUL(v, VSET(correct_square))), VSET(epsilon));
+    m = VMUL(VSET(rate->rate), VMUL(m, VSET(rate->correct_mean)));
+    v = VADD(VSQRT(VMUL(v, VSET(rate->correct_square))), VSET(rate->epsilon));
     VSTORE(parameter, VSUB(VLOAD(parameter), VDIV(m, v)));
 }
 
-SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n, R rate, R correct_mean,
-                       R correct_square, R epsilon) {
+SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n,
+                       const ssdgs__adam_rate *rate) {
     size_t i;
     for (i = 0; i + SSDGS__VW <= n; i += SSDGS__VW) {
-        F(adam_lanes)
-        (parameter + i, gradient + i, mean + i, square + i, rate, correct_mean, correct_square, epsilon);
+        F(adam_lanes)(parameter + i, gradient + i, mean + i, square + i, rate);
     }
     if (i == n) return;
     R tail[4][SSDGS__VW];
@@ -11258,7 +11380,7 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
         tail[2][l] = i + l < n ? mean[i + l] : 0;
         tail[3][l] = i + l < n ? square[i + l] : 0;
     }
-    F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate, correct_mean, correct_square, epsilon);
+    F(adam_lanes)(tail[0], tail[1], tail[2], tail[3], rate);
     for (size_t l = 0; i + l < n; l++) {
         parameter[i + l] = tail[0][l];
         mean[i + l] = tail[2][l];
@@ -11297,6 +11419,7 @@ static const ssdgs__kernels F(kernels) = {F(project),
                                           SSDGS__TRAINS(F(adam))};
 
 #endif /* SSDGS__SCALAR */
+#endif /* SSDGS__ISA, else the names alone */
 
 #undef SSDGS__NAME
 #undef SSDGS__TR

@@ -300,18 +300,18 @@ static void kernel_task(void *data, int task) {
     const kernel *job = (const kernel *)data;
     const ssdgs__kernels *k = job->context->k;
     const network *n = job->net;
+    const ssdgs__network net = {n ? n->sizes : NULL, n ? n->layers : 0, n ? n->weights : NULL};
+    const ssdgs__network_scratch backward = {n ? n->d : NULL, n ? n->spare : NULL, n ? n->transposed : NULL};
     const uint64_t *p = job->words + (size_t)task * job->share;
     uint64_t a = 0, b = 0, c = 0, d = 0;
     if (job->work == PEAK_RATE) sink = (double)job->peak(job->repeat);
     else
         for (long r = 0; r < job->repeat; r++) switch (job->work) {
-            case FORWARD:
-                ssdgs__network_forward(k, n->sizes, n->layers, n->weights, n->lists, n->inputs, n->outputs);
-                break;
+            case FORWARD: ssdgs__network_forward(k, &net, n->lists, n->inputs, n->outputs); break;
             case BACKWARD:
                 memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
-                ssdgs__network_backward(k, n->sizes, n->layers, n->weights, n->inputs, n->outputs, n->d,
-                                        n->spare, n->transposed, n->lists, n->sizes[0], n->gradient);
+                ssdgs__network_backward(k, &net, n->inputs, n->outputs, &backward, n->lists, n->sizes[0],
+                                        n->gradient);
                 break;
             default:
                 for (size_t i = 0; i < job->share; i += 8) {

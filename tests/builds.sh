@@ -23,6 +23,10 @@ done
 for option in NO_SIMD NO_AVX2 NO_AVX512 REAL64; do compiles "SSDGS_$option" tests/library.c "$@" -DSSDGS_$option; done
 compiles "a name that Windows' headers take" tests/library.c "$@" -fsyntax-only -Dnear= -Dfar= -DNEAR= -DFAR= -DIN= -DOUT= -DOPTIONAL= -DPLANES=14 -DERROR=0 \
     -Dsmall=char -Dinterface=struct
+# the kernels' short names are the includer's again afterwards
+printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS_IMPLEMENTATION\n#include "ssdgs.h"
+extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
+compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
 for example in train relight minimal bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -fsyntax-only
 done

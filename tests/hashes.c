@@ -3,6 +3,9 @@
    after. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 enum { PHOTOS = 6, SIDE = 48, PIXELS = SIDE * SIDE };
 static unsigned char pixels[PHOTOS][PIXELS * 4];

@@ -437,12 +437,14 @@ static void test_dead_neurons(void) {
             ssdgs__row_lists lists;
             ssdgs__row_lists_fill(&lists);
             memset(gradient[part], 0, sizeof gradient[part]);
-            ssdgs__network_forward(&k, sizes, 3, weights, &lists, inputs, outputs[part]);
+            const ssdgs__network net = {sizes, 3, weights};
+            const ssdgs__network_scratch backward = {d[part], spare, transposed};
+            ssdgs__network_forward(&k, &net, &lists, inputs, outputs[part]);
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
             for (int i = 0; i < OUTS * SSDGS__BLOCK; i++)
                 d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
-            dinputs[part] = ssdgs__network_backward(&k, sizes, 3, weights, inputs, outputs[part], d[part],
-                                                    spare, transposed, &lists, INS, gradient[part]);
+            dinputs[part] = ssdgs__network_backward(&k, &net, inputs, outputs[part], &backward, &lists, INS,
+                                                    gradient[part]);
             if (dinputs[part] == spare) memcpy(d[part], spare, sizeof spare);
         }
         CHECK(!memcmp(outputs[0], outputs[1], sizeof outputs[0]));

@@ -399,9 +399,11 @@ static void test_network(const char *name, int shadow, int residual, int default
         ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at),
                    *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
         ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, inputs);
-        ssdgs__network_forward(context->k, sizes, layers, weights, &lists, inputs, outputs);
-        context->k->colour(&k, gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head,
-                           outs);
+        const ssdgs__network net = {sizes, layers, weights};
+        const ssdgs__colour_in in = {gauss, part, part + l.visibility, shadow ? head : NULL,
+                                     shadow ? NULL : head};
+        ssdgs__network_forward(context->k, &net, &lists, inputs, outputs);
+        context->k->colour(&k, &in, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         ssdgs_real one[3 * BLOCK];
         memset(one, 0, sizeof one);
@@ -430,12 +432,13 @@ static void test_network(const char *name, int shadow, int residual, int default
         dother = reals((size_t)(l.widest + 1) * BLOCK);
         dweights = reals(count);
         slot = reals(ssdgs__slot_gradient_size(sizes, layers));
-        context->k->colour_backward(&k, gauss, part, part + l.visibility, shadow ? head : NULL,
-                                    shadow ? NULL : head, one, one, one, dgauss, drows,
-                                    shadow ? dnet : dother, shadow ? dother : dnet, dvisibility);
+        const ssdgs__colour_gradient gradients = {
+            one, one, one, dgauss, drows, shadow ? dnet : dother, shadow ? dother : dnet, dvisibility};
+        const ssdgs__network_scratch backward = {dnet, spare, transposed};
+        context->k->colour_backward(&k, &in, &gradients);
         memset(dgauss, 0, SSDGS_CHANNELS * BLOCK * sizeof *dgauss);
-        ssdgs_real *dinputs = ssdgs__network_backward(context->k, sizes, layers, weights, inputs, outputs,
-                                                      dnet, spare, transposed, &lists, sizes[0], slot);
+        ssdgs_real *dinputs =
+            ssdgs__network_backward(context->k, &net, inputs, outputs, &backward, &lists, sizes[0], slot);
         ssdgs__sum_slots(sizes, layers, slot, 0, 1, 0, 1, dweights);
         ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
     }
@@ -611,8 +614,9 @@ static void test_adam(void) {
     ssdgs_real *v = reals(n);
     const ssdgs_real rate = (ssdgs_real)gold(&file, "lr", NULL)[0];
     for (size_t t = 0; t < steps; t++) {
-        context->k->adam(p, g + t * n, m, v, n, rate, ssdgs__bias_correction(0.9, (int)t + 1),
-                         ssdgs__bias_correction(0.999, (int)t + 1), (ssdgs_real)1e-15);
+        const ssdgs__adam_rate step = {rate, ssdgs__bias_correction(0.9, (int)t + 1),
+                                       ssdgs__bias_correction(0.999, (int)t + 1), (ssdgs_real)1e-15};
+        context->k->adam(p, g + t * n, m, v, n, &step);
         CHECK_NEAR(p, gold(&file, "trajectory", NULL) + t * n, n, real64 ? 1e-12 : 1e-6, real64 ? 1e-9 : 2e-6,
                    "adam: trajectory");
     }
