@@ -1190,20 +1190,35 @@ static void look_at_machine(bench *b) {
     if (all > 2) b->threads[b->thread_count++] = all;
 }
 
+static const char *const help[] = {
+    "usage: bench [OPTION...] [DATASET DEFAULT.ply PUBLISHED.ply]",
+    "Measures this machine: peak arithmetic, every stage and instruction set, frames of both models with "
+    "every",
+    "shortcut, scaling with pixels and Gaussians, training. Writes bench.json and bench.svg beside the "
+    "program.",
+    "",
+    "  --quick       about a minute: fewer views, the best instruction set alone",
+    "  --models DIR  where waxcow.ply and waxcow_published.ply are; build/demo",
+    "  DATASET ...   another dataset, with models of the default and the published networks; "
+    "examples/data/waxcow"};
+
 int main(int argc, char **argv) {
     static bench b;
     const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
     int files = 0;
     double start = now();
     for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--help")) {
+            for (size_t line = 0; line < sizeof help / sizeof *help; line++) puts(help[line]);
+            return 0;
+        }
         if (!strcmp(argv[i], "--quick")) b.quick = 1;
         else if (!strcmp(argv[i], "--models") && i + 1 < argc) folder = argv[++i];
         else if (argv[i][0] != '-' && files < 3) given[files++] = argv[i];
         else files = 4;
     }
     if (files != 0 && files != 3) {
-        fprintf(stderr,
-                "usage: bench [--quick] [--models DIR] [DATASET default_model.ply published_model.ply]\n");
+        fprintf(stderr, "%s; bench --help lists them\n", help[0]);
         return 2;
     }
     char paths[2][1024];

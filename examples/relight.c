@@ -19,15 +19,28 @@ static const char *const option_names[OPTION_COUNT] = {"--split",    "--out",   
                                                        "--sheet",    "--threads",    "--isa",
                                                        "--networks", "--trajectory", "--components"};
 
+static const char *const help[] = {
+    "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
+    "Renders a model in the views and lights of a dataset's frames to PNG. Where frames have photographs, "
+    "prints how",
+    "near it comes to them and writes that to DIR/metrics.json. No file that is read is replaced.",
+    "",
+    "  --out DIR                where the images go",
+    "  --split NAME             test (default), train or valid: the frames of transforms_NAME.json",
+    "  --background COLOUR      black (default) or white",
+    "  --components             also writes each term, shadow, normal, depth and alpha",
+    "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms, shadow, "
+    "normal",
+    "  --trajectory             renders the paper's path instead: light and camera turn round the object",
+    "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped them",
+    "  --threads N              0 = one per CPU (default); the result does not depend on it",
+    "  --isa NAME               scalar, sse2, avx2, avx512 or neon; the best that this machine has"};
+
 static int usage(const char *problem, const char *what) {
-    fprintf(stderr,
-            "relight: %s %s\n"
-            "usage: relight MODEL.ply DATASET --out DIR [--split test|train|valid] [--trajectory] "
-            "[--components]\n"
-            "               [--sheet FILE.png] [--background black|white] [--threads N] [--isa NAME]\n"
-            "               [--networks ORIGINAL.ply]: settings and networks of the model before an editor "
-            "dropped them\n",
-            problem, what);
+    fprintf(
+        stderr,
+        "relight: %s %s\nusage: relight MODEL.ply DATASET --out DIR [OPTION...]; relight --help lists them\n",
+        problem, what);
     return 2;
 }
 
@@ -570,6 +583,11 @@ static int relight(job *j) {
 int main(int argc, char **argv) {
     job j;
     memset(&j, 0, sizeof j);
+    for (int i = 1; i < argc; i++)
+        if (!strcmp(argv[i], "--help")) {
+            for (size_t line = 0; line < sizeof help / sizeof *help; line++) puts(help[line]);
+            return 0;
+        }
     int status = parse(&j, argc, argv);
     if (!status) status = relight(&j);
     ssdgs_model_destroy(j.model);
