@@ -132,8 +132,8 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
-  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD  fewer kernels; without SIMD scalar ones
-  SSDGS_SCALAR          scalar kernels too, where every CPU has SSE2 or NEON
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside SSE2 or NEON
+  SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
 ssdgs.h DOES NOT
@@ -666,6 +666,15 @@ typedef struct ssdgs_instances {
 
 enum { SSDGS_SEEN = 1, SSDGS_SKIPPED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
+/* A Gaussian projected: alpha at pixel (x + dx, y + dy) is 2^(xx dx^2 + xy dx dy + yy dy^2 +
+   log2_opacity). */
+typedef struct ssdgs_record {
+    ssdgs_real x, y;       /* px: the centre */
+    ssdgs_real xx, xy, yy; /* the conic (eq. 1), its exponent times log2(e) */
+    ssdgs_real log2_opacity;
+    ssdgs_real extent_x, extent_y; /* px: half the box that it touches */
+} ssdgs_record;
+
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
 typedef struct ssdgs_splat_view {
     int light;            /* -1: the camera */
@@ -680,10 +689,9 @@ typedef struct ssdgs_splat_view {
     ssdgs_real variance; /* px^2, of the blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
     /* SSDGS_STAGE_PROJECT */
-    ssdgs_real
-        *record; /* (n, 8): centre x, y; conic a, 2b, c times -log2(e)/2; log2 opacity; half extents x, y */
-    ssdgs_real *depth; /* (n) camera depth or distance to the light; negative = not drawn, see
-                          ssdgs_camera.near_plane */
+    ssdgs_record *record; /* (n) */
+    ssdgs_real *depth;    /* (n) camera depth or distance to the light; negative = not drawn, see
+                             ssdgs_camera.near_plane */
     /* SSDGS_STAGE_SORT */
     uint32_t *order; /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
     int visible;
@@ -783,6 +791,10 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #include <string.h>
 #ifndef SSDGS_NO_STDIO
 #include <stdio.h>
+#endif
+
+#ifndef SSDGS_ASSERT
+#define SSDGS_ASSERT(condition) ((void)0) /* invariants: a bug of the library's where one is false */
 #endif
 
 #ifndef SSDGS_SELF
@@ -955,12 +967,13 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__MOST_LIGHT 1e30    /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
 #define SSDGS__MAP_STEPS 3 /* levels of transmittance below which a light's map says where it falls */
-enum { /* a map's pixel: distances of the falls, what is left after the first of them, what there was before
-          the others, and behind all */
-       SSDGS__LEFT = SSDGS__MAP_STEPS,
-       SSDGS__BEFORE = 2 * SSDGS__MAP_STEPS - 1,
-       SSDGS__BEHIND = 3 * SSDGS__MAP_STEPS - 2,
-       SSDGS__MAP_VALUES
+/* A map's pixel: distances of the steps, what is left after the first of them, what there was before the
+   others, and behind all */
+enum {
+    SSDGS__LEFT = SSDGS__MAP_STEPS,
+    SSDGS__BEFORE = 2 * SSDGS__MAP_STEPS - 1,
+    SSDGS__BEHIND = 3 * SSDGS__MAP_STEPS - 2,
+    SSDGS__MAP_VALUES
 };
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
@@ -969,6 +982,8 @@ enum { /* a map's pixel: distances of the falls, what is left after the first of
 #define SSDGS__LIGHT_LAYER 5 /* the first light's: M, D, residual of S; the next light's follow */
 #define SSDGS__PER_LIGHT 3
 #define SSDGS__DEPTH_LAYER 3
+#define SSDGS__TILE_FOURTH \
+    48 /* in a micro-tile's 64 values, after three of 16 lanes: transmittance, or the gradients' product */
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
 #define SSDGS__LOBE 11         /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS \
@@ -979,15 +994,16 @@ enum { /* a map's pixel: distances of the falls, what is left after the first of
 #define SSDGS__STEEP 1.5
 #define SSDGS__BACK 0.2
 
-enum { /* rows of a block's geometry */
-       SSDGS__WI = 0,
-       SSDGS__WO = 3,
-       SSDGS__NORMAL = 6,
-       SSDGS__IRRADIANCE = 9,
-       SSDGS__COSINE,
-       SSDGS__GLOSS,
-       SSDGS__ROWS,
-       SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
+/* Rows of a block's geometry */
+enum {
+    SSDGS__WI = 0,
+    SSDGS__WO = 3,
+    SSDGS__NORMAL = 6,
+    SSDGS__IRRADIANCE = 9,
+    SSDGS__COSINE,
+    SSDGS__GLOSS,
+    SSDGS__ROWS,
+    SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
 };
 
 /* ---- what the kernels are called with ---- */
@@ -998,7 +1014,8 @@ typedef struct ssdgs__projection {
 } ssdgs__projection;
 
 typedef struct ssdgs__tile {
-    const ssdgs_real *record, *depth;
+    const ssdgs_record *record;
+    const ssdgs_real *depth;
     const ssdgs_tile_entry *list; /* (count) */
     const uint16_t *seen;         /* (count) micro-tiles that the walk saw blend, NULL before it */
     uint32_t count;
@@ -1055,7 +1072,7 @@ typedef struct ssdgs__adam_rate {
 
 typedef struct ssdgs__kernels {
     void (*project)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, size_t begin,
-                    size_t end, ssdgs_real *record, ssdgs_real *depth);
+                    size_t end, ssdgs_record *record, ssdgs_real *depth);
     void (*project_backward)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride,
                              size_t begin, size_t end, const ssdgs_real *splat, ssdgs_real *gradient,
                              size_t gradient_stride, ssdgs_real *view_slot);
@@ -1955,25 +1972,26 @@ struct ssdgs_model {
     ssdgs_real *globals; /* the groups of ssdgs__global_groups, in order */
 };
 
-enum { /* parameters that learn together: planes of every Gaussian, then what all share */
-       SSDGS__G_POSITION = 0,
-       SSDGS__G_ROTATION,
-       SSDGS__G_SCALE,
-       SSDGS__G_OPACITY,
-       SSDGS__G_DIFFUSE,
-       SSDGS__G_SPECULAR,
-       SSDGS__G_SCATTERING,
-       SSDGS__G_FRAME,
-       SSDGS__G_ASG_WEIGHT,
-       SSDGS__G_MATERIAL,
-       SSDGS__PLANE_GROUPS,
-       SSDGS__ASG_BASIS = 0,
-       SSDGS__ASG_SHARPNESS,
-       SSDGS__ASG_SIGMA,
-       SSDGS__SCATTERING_NET,
-       SSDGS__SHADOW_NET,
-       SSDGS__GLOBAL_GROUPS,
-       SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
+/* Parameters that learn together: planes of every Gaussian, then what all share */
+enum {
+    SSDGS__G_POSITION = 0,
+    SSDGS__G_ROTATION,
+    SSDGS__G_SCALE,
+    SSDGS__G_OPACITY,
+    SSDGS__G_DIFFUSE,
+    SSDGS__G_SPECULAR,
+    SSDGS__G_SCATTERING,
+    SSDGS__G_FRAME,
+    SSDGS__G_ASG_WEIGHT,
+    SSDGS__G_MATERIAL,
+    SSDGS__PLANE_GROUPS,
+    SSDGS__ASG_BASIS = 0,
+    SSDGS__ASG_SHARPNESS,
+    SSDGS__ASG_SIGMA,
+    SSDGS__SCATTERING_NET,
+    SSDGS__SHADOW_NET,
+    SSDGS__GLOBAL_GROUPS,
+    SSDGS__GROUPS = SSDGS__PLANE_GROUPS + SSDGS__GLOBAL_GROUPS
 };
 
 /* Whether positions are in a length unit, which the paper's form does not have. */
@@ -3147,7 +3165,7 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
-        SSDGS__RESERVE(m->record, v->record, ssdgs_real, n * 8);
+        SSDGS__RESERVE(m->record, v->record, ssdgs_record, n);
         SSDGS__RESERVE(m->depth, v->depth, ssdgs_real, n);
         v->tiles_x = (v->width + 15) / 16;
         v->tiles_y = (v->height + 15) / 16;
@@ -3210,9 +3228,9 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
 }
 
 /* Tiles the record's bounding box touches: first and last column and row. */
-static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_real *record, uint16_t box[4]) {
-    const ssdgs_real low[2] = {record[0] - record[6] - 1, record[1] - record[7] - 1},
-                     high[2] = {record[0] + record[6] + 1, record[1] + record[7] + 1};
+static void ssdgs__tile_box(const ssdgs_splat_view *v, const ssdgs_record *record, uint16_t box[4]) {
+    const ssdgs_real low[2] = {record->x - record->extent_x - 1, record->y - record->extent_y - 1};
+    const ssdgs_real high[2] = {record->x + record->extent_x + 1, record->y + record->extent_y + 1};
     const int tiles[2] = {v->tiles_x, v->tiles_y};
     for (int a = 0; a < 2; a++) {
         const ssdgs_real last = (ssdgs_real)(16 * tiles[a] - 1);
@@ -3242,7 +3260,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     for (int g = begin; g < end; g++) {
         uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
         if (v->depth[g] >= 0) {
-            ssdgs__tile_box(v, v->record + 8 * (size_t)g, box);
+            ssdgs__tile_box(v, v->record + g, box);
             room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
         } else {
             box[0] = box[1] = 1;
@@ -4802,13 +4820,14 @@ static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradie
     for (int micro = 0; micro < 16; micro++)
         for (int lane = 0; lane < 16; lane++) {
             const int at = micro * 64 + lane;
-            ssdgs_real total = transmittance ? pixels[at + 48] * gradient[at + 48] : 0;
+            ssdgs_real total =
+                transmittance ? pixels[at + SSDGS__TILE_FOURTH] * gradient[at + SSDGS__TILE_FOURTH] : 0;
             for (int layer = 0; layer < layers; layer++)
                 for (int c = 0; c < 3; c++) {
                     const int value = layer * SSDGS__TILE_LAYER + at + 16 * c;
                     total += gradient[value] * pixels[value];
                 }
-            gradient[at + 48] = total;
+            gradient[at + SSDGS__TILE_FOURTH] = total;
         }
 }
 
@@ -4876,10 +4895,10 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
     for (size_t g = (size_t)begin; g < (size_t)end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
-        const ssdgs_real *r = v->record + 8 * g;
+        const ssdgs_record *r = v->record + g;
         ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g;
         if (!of.count) continue;
-        const ssdgs_real a = -2 * ln2 * r[2], b = -ln2 * r[3], c = -2 * ln2 * r[4]; /* the conic */
+        const ssdgs_real a = -2 * ln2 * r->xx, b = -ln2 * r->xy, c = -2 * ln2 * r->yy; /* the conic */
         ssdgs_real sum[8];
         memset(sum, 0, sizeof sum);
         for (uint32_t instance = of.first; instance < of.first + of.count; instance++) {
@@ -5707,45 +5726,66 @@ typedef struct ssdgs__ply_field {
     int integer;
 } ssdgs__ply_field;
 
-#define SSDGS__V(stem, count, word) {SSDGS__PLY_VERTEX, stem, count, word, 0},
-#define SSDGS__I(member) {SSDGS__PLY_SETTINGS, #member, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1},
+#define SSDGS__V(stem, count, word) \
+    { SSDGS__PLY_VERTEX, stem, count, word, 0 }
+#define SSDGS__I(member) \
+    { SSDGS__PLY_SETTINGS, #member, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1 }
 #define SSDGS__R(stem, count, member) \
-    {SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0},
-#define SSDGS__G(kind, stem, count, group) {kind, stem, count, 4 * group, 0},
-static const ssdgs__ply_field ssdgs__ply_fields[] =
-    {/* in the order of the file; red, green, blue are only read */
-     SSDGS__V("x", 0, SSDGS_POSITION) SSDGS__V("y", 0, SSDGS_POSITION + 1)
-         SSDGS__V("z", 0, SSDGS_POSITION + 2) SSDGS__V("nx", 0, SSDGS__PLY_NORMAL) SSDGS__V(
-             "ny", 0, SSDGS__PLY_NORMAL + 1) SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2)
-             SSDGS__V("f_dc_", 3, SSDGS__PLY_DC) SSDGS__V("opacity", 0, SSDGS_OPACITY) SSDGS__V(
-                 "scale_", 3, SSDGS_LOG_SCALE) SSDGS__V("rot_", 4, SSDGS_ROTATION)
-                 SSDGS__V("kd_", 3, SSDGS_DIFFUSE) SSDGS__V("ks_", 3, SSDGS_SPECULAR) SSDGS__V(
-                     "ksss_", 3, SSDGS_SCATTERING) SSDGS__V("alpha_asg_", SSDGS_ASG_COUNT, SSDGS_ASG_WEIGHT)
-                     SSDGS__V("local_q_", 4, SSDGS_FRAME) SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT,
-                                                                   SSDGS_MATERIAL)
-                         SSDGS__V("red", 0, SSDGS__PLY_RGB) SSDGS__V("green", 0, SSDGS__PLY_RGB + 1) SSDGS__V(
-                             "blue", 0, SSDGS__PLY_RGB + 2) SSDGS__I(version) SSDGS__I(terms) SSDGS__I(baked)
-                             SSDGS__I(transfer) SSDGS__I(dipole)
-                                 SSDGS__I(asg) SSDGS__I(per_channel_optics) SSDGS__I(depth_cue) SSDGS__I(
-                                     transport) SSDGS__I(residual_shadow) SSDGS__I(shadow_on_scattering)
-                                     SSDGS__I(scattering_layers) SSDGS__I(scattering_width) SSDGS__I(
-                                         view_octaves) SSDGS__I(light_octaves) SSDGS__I(shadow_layers)
-                                         SSDGS__I(shadow_width) SSDGS__I(light_blur) SSDGS__I(light_map_size)
-                                             SSDGS__R("light_bias", 0, light_bias)
-                                                 SSDGS__R("pixel_variance", 0, pixel_variance) SSDGS__R(
-                                                     "eta", 0, eta) SSDGS__R("centre_", 3, centre)
-                                                     SSDGS__R("length_unit", 0, length_unit) SSDGS__R(
-                                                         "light_scale", 0, light_scale) SSDGS__R("origin_", 3,
-                                                                                                 origin)
-                                                         SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS)
-                                                             SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2,
-                                                                      SSDGS__ASG_SHARPNESS)
-                                                                 SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0,
-                                                                          SSDGS__ASG_SIGMA)
-                                                                     SSDGS__G(SSDGS__PLY_SCATTERING, "value",
-                                                                              0, SSDGS__SCATTERING_NET)
-                                                                         SSDGS__G(SSDGS__PLY_SHADOW, "value",
-                                                                                  0, SSDGS__SHADOW_NET)};
+    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0 }
+#define SSDGS__G(kind, stem, count, group) \
+    { kind, stem, count, 4 * group, 0 }
+/* In the order of the file; red, green, blue are only read. */
+static const ssdgs__ply_field ssdgs__ply_fields[] = {
+    SSDGS__V("x", 0, SSDGS_POSITION),
+    SSDGS__V("y", 0, SSDGS_POSITION + 1),
+    SSDGS__V("z", 0, SSDGS_POSITION + 2),
+    SSDGS__V("nx", 0, SSDGS__PLY_NORMAL),
+    SSDGS__V("ny", 0, SSDGS__PLY_NORMAL + 1),
+    SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2),
+    SSDGS__V("f_dc_", 3, SSDGS__PLY_DC),
+    SSDGS__V("opacity", 0, SSDGS_OPACITY),
+    SSDGS__V("scale_", 3, SSDGS_LOG_SCALE),
+    SSDGS__V("rot_", 4, SSDGS_ROTATION),
+    SSDGS__V("kd_", 3, SSDGS_DIFFUSE),
+    SSDGS__V("ks_", 3, SSDGS_SPECULAR),
+    SSDGS__V("ksss_", 3, SSDGS_SCATTERING),
+    SSDGS__V("alpha_asg_", SSDGS_ASG_COUNT, SSDGS_ASG_WEIGHT),
+    SSDGS__V("local_q_", 4, SSDGS_FRAME),
+    SSDGS__V("neural_material_", SSDGS_MATERIAL_COUNT, SSDGS_MATERIAL),
+    SSDGS__V("red", 0, SSDGS__PLY_RGB),
+    SSDGS__V("green", 0, SSDGS__PLY_RGB + 1),
+    SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2),
+    SSDGS__I(version),
+    SSDGS__I(terms),
+    SSDGS__I(baked),
+    SSDGS__I(transfer),
+    SSDGS__I(dipole),
+    SSDGS__I(asg),
+    SSDGS__I(per_channel_optics),
+    SSDGS__I(depth_cue),
+    SSDGS__I(transport),
+    SSDGS__I(residual_shadow),
+    SSDGS__I(shadow_on_scattering),
+    SSDGS__I(scattering_layers),
+    SSDGS__I(scattering_width),
+    SSDGS__I(view_octaves),
+    SSDGS__I(light_octaves),
+    SSDGS__I(shadow_layers),
+    SSDGS__I(shadow_width),
+    SSDGS__I(light_blur),
+    SSDGS__I(light_map_size),
+    SSDGS__R("light_bias", 0, light_bias),
+    SSDGS__R("pixel_variance", 0, pixel_variance),
+    SSDGS__R("eta", 0, eta),
+    SSDGS__R("centre_", 3, centre),
+    SSDGS__R("length_unit", 0, length_unit),
+    SSDGS__R("light_scale", 0, light_scale),
+    SSDGS__R("origin_", 3, origin),
+    SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS),
+    SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS),
+    SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA),
+    SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET),
+    SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)};
 #undef SSDGS__V
 #undef SSDGS__I
 #undef SSDGS__R
@@ -5826,11 +5866,8 @@ static int ssdgs__ply_finite(uint32_t bits) { return (bits & 0x7f800000u) != 0x7
 
 /* ---- reading ---- */
 
-enum { /* limits of a header */
-       SSDGS__PLY_MAX_HEADER = 1 << 20,
-       SSDGS__PLY_MAX_ELEMENTS = 64,
-       SSDGS__PLY_MAX_PROPERTIES = 1024
-};
+/* Limits of a header */
+enum { SSDGS__PLY_MAX_HEADER = 1 << 20, SSDGS__PLY_MAX_ELEMENTS = 64, SSDGS__PLY_MAX_PROPERTIES = 1024 };
 enum {
     SSDGS__PLY_UINT8 = 1,
     SSDGS__PLY_UINT16 = 3,
@@ -9618,7 +9655,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
-                          size_t end, R *record, R *depth) {
+                          size_t end, ssdgs_record *record, R *depth) {
     const V log2e = VSET(1.44269504088896341);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
@@ -9669,10 +9706,10 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
         for (int f = 0; f < 8; f += 4)
             for (int l = 0; l < SSDGS__VW; l += 4)
-                F(transpose4)(fields[f] + l, SSDGS__VW, record + (i + (size_t)l) * 8 + f, 8);
+                F(transpose4)(fields[f] + l, SSDGS__VW, (R *)(void *)(record + i + (size_t)l) + f, 8);
 #else
         for (int f = 0; f < 8; f++)
-            for (int l = 0; l < SSDGS__VW; l++) record[(i + (size_t)l) * 8 + (size_t)f] = fields[f][l];
+            for (int l = 0; l < SSDGS__VW; l++) ((R *)(void *)(record + i + (size_t)l))[f] = fields[f][l];
 #endif
     }
 }
@@ -9795,25 +9832,25 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
     const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
     const V zero = VSET(0), side = VSET(3);
     for (int g = begin; g < end; g++) {
-        const R *record = view->record + 8 * (size_t)g;
+        const ssdgs_record *record = view->record + g;
         const uint16_t *box = boxes + 4 * (size_t)g;
         ssdgs_instances *of = view->of_gaussian + g;
         int left = (box[2] - box[0] + 1) * (box[3] - box[1] + 1), tx = box[0], ty = box[1];
         of->first = at;
         of->count = 0;
         if (!left) continue;
-        const V a = VSET(record[2] * margin);
-        const V b = VSET(record[3]);
-        const V c = VSET(record[4] * margin);
-        const V best_x = VSET(-record[3] / (2 * record[2]));
-        const V best_y = VSET(-record[3] / (2 * record[4]));
-        const V least = VSET(log2_threshold - record[5] - (R)1e-3);
+        const V a = VSET(record->xx * margin);
+        const V b = VSET(record->xy);
+        const V c = VSET(record->yy * margin);
+        const V best_x = VSET(-record->xy / (2 * record->xx));
+        const V best_y = VSET(-record->xy / (2 * record->yy));
+        const V least = VSET(log2_threshold - record->log2_opacity - (R)1e-3);
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record[0])),
+                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record->x)),
                   x1 = VADD(x0, side);
-                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record[1])),
+                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record->y)),
                   y1 = VADD(y0, side);
                 V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
                 V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
@@ -9838,7 +9875,8 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
    them take the same decisions. */
 
 typedef struct F(batch) {
-    R record[SSDGS__BATCH][8];
+    ssdgs_record record[SSDGS__BATCH];
+    R distance[SSDGS__BATCH];     /* a light's walk: of the Gaussian, less the nearest one's */
     uint32_t place[SSDGS__BATCH]; /* in the tile's lists */
     uint16_t mask[SSDGS__BATCH];
     uint64_t entries[16]; /* per micro-tile, which of the batch touch it */
@@ -9871,9 +9909,10 @@ SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
 
 SSDGS__FI void F(batch_add)(F(batch) * batch, int index, const ssdgs__tile *tile, uint32_t place,
                             unsigned mask) {
+    SSDGS_ASSERT(index < SSDGS__BATCH && place < tile->count);
     batch->place[index] = place;
     batch->mask[index] = (uint16_t)mask;
-    memcpy(batch->record[index], tile->record + (size_t)tile->list[place].gaussian * 8, 8 * sizeof(R));
+    batch->record[index] = tile->record[tile->list[place].gaussian];
 }
 
 /* Gathers the list's next entries that touch anything from *from on; returns how many. */
@@ -9888,13 +9927,14 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
 }
 
 /* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
-SSDGS__FI V F(alpha)(const R *record, V px, V py, V log2_threshold, V *dx, V *dy, V *raw, VM *drawn) {
-    *dx = VSUB(px, VSET(record[0]));
-    *dy = VSUB(py, VSET(record[1]));
-    V p = VFMA(VFMA(VSET(record[4]), *dy, VMUL(VSET(record[3]), *dx)), *dy,
-               VFMA(VMUL(VSET(record[2]), *dx), *dx, VSET(record[5])));
-    p = VMIN(VSET(record[5]),
-             p); /* of a needle with its centre far away p is a small difference of large terms */
+SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V *dx, V *dy, V *raw,
+                     VM *drawn) {
+    *dx = VSUB(px, VSET(record->x));
+    *dy = VSUB(py, VSET(record->y));
+    V p = VFMA(VFMA(VSET(record->yy), *dy, VMUL(VSET(record->xy), *dx)), *dy,
+               VFMA(VMUL(VSET(record->xx), *dx), *dx, VSET(record->log2_opacity)));
+    /* of a needle with its centre far away p is a small difference of large terms */
+    p = VMIN(VSET(record->log2_opacity), p);
     *drawn = VGE(p, log2_threshold);
     *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
@@ -9950,7 +9990,7 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                     V dx, dy, raw;
                     VM drawn;
                     const V alpha =
-                        F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                        F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     const VM blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
                     if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget
@@ -10008,7 +10048,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             const int n = sample ? samples : applies;
             if (n == (sample ? SSDGS__BATCH : SSDGS__BATCH - 1)) break;
             F(batch_add)(batch, n, tile, place, tile->list[place].mask);
-            batch->record[n][6] = tile->depth[tile->list[place].gaussian] - tile->depth_origin;
+            batch->distance[n] = tile->depth[tile->list[place].gaussian] - tile->depth_origin;
             if (sample) {
                 nearer[n] = ((uint64_t)1 << applies) - 1;
                 memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
@@ -10050,13 +10090,13 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             }
             for (uint64_t left = entries; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
-                const V distance = VSET(applied.record[index][6]);
+                const V distance = VSET(applied.distance[index]);
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V before = t[v];
                     V dx, dy, raw;
                     VM drawn;
                     const V alpha =
-                        F(alpha)(applied.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                        F(alpha)(applied.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
                     const unsigned fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW)))
@@ -10065,7 +10105,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                         R from[16];
                         VSTORE(from + v * SSDGS__VW, before);
                         ssdgs__light_map_note(tile, micro, fell, from, history[0][index + 1],
-                                              applied.record[index][6], next[micro], steps[micro]);
+                                              applied.distance[index], next[micro], steps[micro]);
                     }
                     if (cue) {
                         const V w = VMUL(alpha, before);
@@ -10078,13 +10118,13 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
-                const V distance = VSET(sampled.record[index][6]);
+                const V distance = VSET(sampled.distance[index]);
                 V(*sum)[SSDGS__NV] = lanes[index];
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
                     V dx, dy, raw;
                     VM drawn;
-                    (void)F(alpha)(sampled.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    (void)F(alpha)(sampled.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     raw = VSEL(drawn, raw,
                                VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
                     sum[0][v] = VFMA(raw, past, sum[0][v]);
@@ -10120,7 +10160,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
     memset(pixels, 0, (size_t)layers * SSDGS__TILE_LAYER * sizeof *pixels);
     R transmittance[16][16];
     for (int micro = 0; micro < 16; micro++) {
-        for (int v = 48; v < 64; v++) pixels[micro * 64 + v] = 1;
+        for (int v = 0; v < 16; v++) pixels[micro * 64 + SSDGS__TILE_FOURTH + v] = 1;
         for (int v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
     }
     R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16];
@@ -10139,7 +10179,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
             F(pixel_centres)(tile, micro, px, py);
             V t[SSDGS__NV], last[SSDGS__NV];
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                last[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
+                last[v] = VLOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
             int used;
@@ -10149,14 +10189,14 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     V dx, dy, raw;
                     VM drawn, live = VGE(t[v], stop);
                     const V alpha =
-                        F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                        F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
                 }
             }
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VSTORE(pixel + 48 + v * SSDGS__VW, last[v]);
+                VSTORE(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW, last[v]);
                 VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
             for (int layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
@@ -10228,7 +10268,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VUNROLL for (int layer = 0; layer < layers; layer++) VUNROLL for (int i = 0; i < 3; i++)
                     dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
-                product[v] = VLOAD(pixel + 48 + v * SSDGS__VW);
+                product[v] = VLOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
                 before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
             }
@@ -10240,7 +10280,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw, before_it = t[v];
                     VM drawn;
-                    V alpha = F(alpha)(batch.record[index], px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
                     const V w = VMUL(alpha, before_it);
@@ -10401,6 +10441,7 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * dept
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
     F(offsets) depth[SSDGS_MAX_WIDTH];
+    SSDGS_ASSERT(p->depth <= SSDGS_MAX_WIDTH && p->columns % 16 == 0);
     int column = 0;
     for (int k = 0; k < p->depth; k++) {
         depth[k].a = (uint32_t)(p->depth_list[k] * p->a_k);
@@ -10661,7 +10702,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             VSTORE(out, VSUB(VLOAD(out), VADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
             VSTORE(out, VADD(VLOAD(out), to_light));
-            VSTORE(out + 48, VADD(VLOAD(out + 48), to_eye));
+            VSTORE(out + 3 * 16, VADD(VLOAD(out + 3 * 16), to_eye)); /* the eye's, after the light's three */
         }
     }
 }

@@ -1315,7 +1315,8 @@ static void true_conic(int n, double variance, double conic[3]) {
    float it is, for needles of more than 2000 : 1, by the rounding of the conic's entries times (px from the
    centre)^2; the walks cut that off. */
 static void test_conic(int step) {
-    static ssdgs_real record[TURNS][8], depth[TURNS];
+    static ssdgs_record record[TURNS];
+    static ssdgs_real depth[TURNS];
     double worst = 0, excess = -1, needle_excess = 0;
     for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
         for (int size = 1; size <= 6 && ssdgs__table(isa); size++)
@@ -1326,10 +1327,10 @@ static void test_conic(int step) {
                 p.fx = p.fy = FOCAL, p.cx = p.cy = SCREEN / 2, p.near_plane = (ssdgs_real)0.01;
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
                 int n = fill_turned(pow(10, size), pow(10, aspect), step);
-                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record[0],
+                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
                                            depth);
                 while (n--) {
-                    const ssdgs_real *r = record[n];
+                    const ssdgs_real *r = &record[n].x; /* its eight numbers */
                     CHECK(depth[n] > 0);
                     double want[3];
                     true_conic(n, (double)p.variance, want);

@@ -121,12 +121,12 @@ static void test_raster(void) {
     CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
     double *out = (double *)malloc(n * 8 * sizeof *out);
     for (size_t i = 0; i < n; i++) {
-        const ssdgs_real *r = frame.views[0].record + 8 * i;
-        out[2 * i] = (double)r[0];
-        out[2 * i + 1] = (double)r[1];
-        out[2 * n + 4 * i] = (double)r[2] * -2 * log(2);
-        out[2 * n + 4 * i + 1] = out[2 * n + 4 * i + 2] = (double)r[3] * -log(2);
-        out[2 * n + 4 * i + 3] = (double)r[4] * -2 * log(2);
+        const ssdgs_record *r = frame.views[0].record + i;
+        out[2 * i] = (double)r->x;
+        out[2 * i + 1] = (double)r->y;
+        out[2 * n + 4 * i] = (double)r->xx * -2 * log(2);
+        out[2 * n + 4 * i + 1] = out[2 * n + 4 * i + 2] = (double)r->xy * -log(2);
+        out[2 * n + 4 * i + 3] = (double)r->yy * -2 * log(2);
         out[6 * n + i] = (double)frame.views[0].depth[i];
     }
     CHECK_NEAR(out, gold(&file, "mean2d", NULL), 2 * n, value_bound(), 1e-6, "raster: mean2d");
