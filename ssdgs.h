@@ -1042,6 +1042,15 @@ typedef struct ssdgs__lighting {
         cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
 } ssdgs__lighting;
 
+/* Gradients of a projection: dL/d(splat) (n, SSDGS__SPLAT) in, those of the planes added to, of the view (12)
+   written. */
+typedef struct ssdgs__project_gradient {
+    const ssdgs_real *splat;
+    ssdgs_real *planes;
+    size_t stride;
+    ssdgs_real *view;
+} ssdgs__project_gradient;
+
 /* A network's layers: sizes (layers + 1), and per layer (out, in) weights, then (out) biases. */
 typedef struct ssdgs__network {
     const int *sizes;
@@ -1065,6 +1074,16 @@ typedef struct ssdgs__colour_gradient {
     ssdgs_real *shadow, *optics, *visibility;
 } ssdgs__colour_gradient;
 
+/* A row of SSIM: pointers to its column 0 in planes of a stride, with borders of 5 rows and 16 columns. */
+typedef struct ssdgs__ssim_row {
+    const ssdgs_real *image, *reference;
+    ssdgs_real *d_mean, *d_square,
+        *d_product;      /* d(SSIM)/d(mean, E[i^2], E[ij]): out, then in of the backward */
+    ssdgs_real *scratch; /* 5 rows */
+    size_t stride;
+    int width;
+} ssdgs__ssim_row;
+
 /* Adam's numbers for a group of parameters: learning rate, bias corrections of mean and square, epsilon. */
 typedef struct ssdgs__adam_rate {
     ssdgs_real rate, correct_mean, correct_square, epsilon;
@@ -1074,8 +1093,7 @@ typedef struct ssdgs__kernels {
     void (*project)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, size_t begin,
                     size_t end, ssdgs_record *record, ssdgs_real *depth);
     void (*project_backward)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride,
-                             size_t begin, size_t end, const ssdgs_real *splat, ssdgs_real *gradient,
-                             size_t gradient_stride, ssdgs_real *view_slot);
+                             size_t begin, size_t end, const ssdgs__project_gradient *d);
     void (*bin)(const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, int begin,
                 int end, uint32_t at);
     void (*walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed);
@@ -1113,12 +1131,8 @@ typedef struct ssdgs__kernels {
                           ssdgs_real weight, ssdgs_real *out);
     void (*srgb_encode)(ssdgs_real *out, ssdgs_real *slope, const ssdgs_real *in, size_t n);
     void (*srgb_decode)(ssdgs_real *out, const ssdgs_real *in, size_t n);
-    void (*ssim_row)(const ssdgs_real *image, const ssdgs_real *reference, int width, size_t stride,
-                     ssdgs_real *scratch, ssdgs_real *d_mean, ssdgs_real *d_square, ssdgs_real *d_product,
-                     ssdgs_real *sums);
-    void (*ssim_backward_row)(const ssdgs_real *image, const ssdgs_real *reference, int width, size_t stride,
-                              ssdgs_real *scratch, const ssdgs_real *d_mean, const ssdgs_real *d_square,
-                              const ssdgs_real *d_product, ssdgs_real by_l1, ssdgs_real by_ssim,
+    void (*ssim_row)(const ssdgs__ssim_row *row, ssdgs_real *sums);
+    void (*ssim_backward_row)(const ssdgs__ssim_row *row, ssdgs_real by_l1, ssdgs_real by_ssim,
                               ssdgs_real *gradient);
     int (*finite)(const ssdgs_real *values, size_t n);
     void (*adam)(ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean, ssdgs_real *square,
@@ -4981,9 +4995,10 @@ static void ssdgs__project_backward_task(void *data, int chunk) {
     const ssdgs__projection p = ssdgs__projection_of(frame, frame->views);
     const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
                  end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    const ssdgs__project_gradient d = {frame->splat_gradient, frame->gradient, frame->gaussians.stride,
+                                       (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk};
     frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end,
-                                        frame->splat_gradient, frame->gradient, frame->gaussians.stride,
-                                        (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk);
+                                        &d);
 }
 
 static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
@@ -5374,17 +5389,29 @@ static void ssdgs__loss_pad_task(void *data, int index) {
         }
 }
 
+static ssdgs__ssim_row ssdgs__loss_row(const ssdgs__loss_job *job, int task, int y) {
+    const size_t at = ssdgs__padded_at(job, task / job->bands, y);
+    ssdgs__ssim_row row;
+    row.image = job->padded[0] + at;
+    row.reference = job->padded[1] + at;
+    row.d_mean = job->padded[2] + at;
+    row.d_square = job->padded[3] + at;
+    row.d_product = job->padded[4] + at;
+    row.scratch = job->scratch + (size_t)task * 5 * job->stride;
+    row.stride = job->stride;
+    row.width = job->width;
+    return row;
+}
+
 static void ssdgs__loss_task(void *data, int index) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
-    const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
+    const int begin = index % job->bands * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
     for (int i = 0; i < 3; i++) job->sums[3 * index + i] = 0;
     for (int y = begin; y < end; y++) {
-        const size_t at = ssdgs__padded_at(job, channel, y);
+        const ssdgs__ssim_row at = ssdgs__loss_row(job, index, y);
         ssdgs_real sums[3];
-        job->k->ssim_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride,
-                         job->scratch + (size_t)index * 5 * job->stride, job->padded[2] + at,
-                         job->padded[3] + at, job->padded[4] + at, sums);
+        job->k->ssim_row(&at, sums);
         for (int i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
     }
 }
@@ -5393,28 +5420,32 @@ static void ssdgs__loss_backward_task(void *data, int index) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
     const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
-    ssdgs_real *scratch = job->scratch + (size_t)index * 5 * job->stride, *row = scratch + 4 * job->stride;
     for (int y = begin; y < end; y++) {
-        const size_t at = ssdgs__padded_at(job, channel, y);
-        job->k->ssim_backward_row(job->padded[0] + at, job->padded[1] + at, job->width, job->stride, scratch,
-                                  job->padded[2] + at, job->padded[3] + at, job->padded[4] + at, job->by_l1,
-                                  job->by_ssim, row);
+        const ssdgs__ssim_row at = ssdgs__loss_row(job, index, y);
+        ssdgs_real *row = at.scratch + 4 * job->stride;
+        job->k->ssim_backward_row(&at, job->by_l1, job->by_ssim, row);
         memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row,
                (size_t)job->width * sizeof *row);
     }
 }
 
-/* image, target, gradient: (3, h, w) stored values. gradient may be NULL. */
-static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, const ssdgs_real *image,
-                                const ssdgs_real *target, int width, int height, ssdgs_real dssim,
-                                ssdgs_real *gradient, ssdgs__loss_values *values) {
+/* Images (3, h, w) of stored values that are compared. */
+typedef struct ssdgs__images {
+    const ssdgs_real *image, *target;
+    int width, height;
+} ssdgs__images;
+
+/* gradient (3, h, w) may be NULL. */
+static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, const ssdgs__images *images,
+                                ssdgs_real dssim, ssdgs_real *gradient, ssdgs__loss_values *values) {
+    const int width = images->width, height = images->height;
     ssdgs__loss_job job;
     const double pixels = 3.0 * width * height;
     double sum[3] = {0, 0, 0};
     memset(&job, 0, sizeof job);
     job.k = context->k;
-    job.image = image;
-    job.target = target;
+    job.image = images->image;
+    job.target = images->target;
     job.gradient = gradient;
     job.width = width;
     job.height = height;
@@ -5649,8 +5680,8 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
                 const ssdgs_real x = (c < 3 ? image : reference)[3 * i + c % 3];
                 p[pixels * c + i] = x > 0 ? (x < 1 ? x : 1) : 0;
             }
-        result =
-            ssdgs__loss(context, &memory, p, p + 3 * pixels, width, height, (ssdgs_real)0.2, NULL, &values);
+        const ssdgs__images images = {p, p + 3 * pixels, width, height};
+        result = ssdgs__loss(context, &memory, &images, (ssdgs_real)0.2, NULL, &values);
     }
     if (!result) result = ssdgs__flip(context, image, reference, width, height, &metrics->flip);
     if (!result) {
@@ -7152,35 +7183,43 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
 }
 
 /* The loss of one photograph under `terms` and all gradients, left in the frame. */
-static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_photo *photo,
-                                          const ssdgs_camera *camera, const ssdgs_light *light,
-                                          const ssdgs_real background[3], int terms, const int frozen[2],
-                                          ssdgs_real dssim, ssdgs_real normal_weight,
-                                          ssdgs__loss_values *values) {
+typedef struct ssdgs__photo_job {
+    const ssdgs_photo *photo;
+    const ssdgs_camera *camera; /* of the photograph, or refined */
+    const ssdgs_light *light;
+    const ssdgs_real *background; /* stored values */
+    int terms;                    /* to render */
+    int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
+    ssdgs_real dssim, normal_weight;
+} ssdgs__photo_job;
+
+static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
+                                          const ssdgs__photo_job *shot, ssdgs__loss_values *values) {
+    const ssdgs_camera *camera = shot->camera;
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options = ssdgs_render_options_exact();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
-    options.terms = terms;
-    ssdgs_result result = ssdgs__frame_begin(frame, model, camera, light, 1, &options, 0, 1);
+    options.terms = shot->terms;
+    ssdgs_result result = ssdgs__frame_begin(frame, model, camera, shot->light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     ssdgs__exposure_job job;
     SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 9);
     SSDGS__RESERVE(frame->memory->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
-    job.photo = photo;
-    job.background = background;
+    job.photo = shot->photo;
+    job.background = shot->background;
     job.slope = job.image + pixels * 3;
     job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
-    result = ssdgs__loss(context, &frame->memory->loss, job.image, job.target, camera->width, camera->height,
-                         dssim, frame->pixel_gradient, values);
+    const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
+    result = ssdgs__loss(context, &frame->memory->loss, &images, shot->dssim, frame->pixel_gradient, values);
     if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
-    result = ssdgs__normals_loss(frame, normal_weight);
+    result = ssdgs__normals_loss(frame, shot->normal_weight);
     if (result) return result;
-    memcpy(frame->frozen, frozen, sizeof frame->frozen);
+    memcpy(frame->frozen, shot->frozen, sizeof frame->frozen);
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
 
@@ -7230,16 +7269,12 @@ static ssdgs_real ssdgs__bias_correction(double beta,
     return (ssdgs_real)(1 / (1 - power));
 }
 
-static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t,
-                            ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean,
-                            ssdgs_real *square, size_t n, double epsilon) {
+/* Adds a group's range, of which the arrays and their length are given. */
+static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, double epsilon,
+                            const ssdgs__adam_range *arrays) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     const double rate = ssdgs__group_rate(trainer, group, t);
-    r->parameter = parameter;
-    r->gradient = gradient;
-    r->mean = mean;
-    r->square = square;
-    r->n = n;
+    *r = *arrays;
     r->group = group;
     r->bad = 0;
     r->rate.rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
@@ -7248,7 +7283,7 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     if (group == SSDGS__G_POSITION) epsilon /= trainer->unit; /* of a move by the bounds' longest side */
     r->rate.epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
     r->first_chunk = job->chunks;
-    job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
+    job->chunks += (r->n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
 }
 
 /* Which terms a group serves: it rests while none of them is in use. Where light is deferred an ASG weight is
@@ -7276,6 +7311,8 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     ssdgs__adam_job job;
+    ssdgs__adam_range arrays;
+    memset(&arrays, 0, sizeof arrays);
     job.k = context->k;
     job.ranges = 0;
     job.chunks = 0;
@@ -7284,14 +7321,22 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
         if (!learns[group] || !ssdgs__group_used(group, terms, model->settings.asg)) continue;
         if (shared >= 0) {
             const size_t at = first[shared], n = first[shared + 1] - at;
-            if (n)
-                ssdgs__adam_add(&job, trainer, group, t, model->globals + at, frame->global_gradient + at,
-                                trainer->global_mean + at, trainer->global_square + at, n, epsilon);
+            if (!n) continue;
+            arrays.parameter = model->globals + at;
+            arrays.gradient = frame->global_gradient + at;
+            arrays.mean = trainer->global_mean + at;
+            arrays.square = trainer->global_square + at;
+            arrays.n = n;
+            ssdgs__adam_add(&job, trainer, group, t, epsilon, &arrays);
         } else {
             for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
-                ssdgs__adam_add(&job, trainer, group, t, model->gaussians + at, frame->gradient + at,
-                                trainer->mean + at, trainer->square + at, (size_t)model->count, epsilon);
+                arrays.parameter = model->gaussians + at;
+                arrays.gradient = frame->gradient + at;
+                arrays.mean = trainer->mean + at;
+                arrays.square = trainer->square + at;
+                arrays.n = (size_t)model->count;
+                ssdgs__adam_add(&job, trainer, group, t, epsilon, &arrays);
             }
         }
     }
@@ -8647,8 +8692,9 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
         frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
     ssdgs__loss_values values;
     ssdgs_frame frame;
-    result = ssdgs__photo_backward(&frame, trainer->model, trainer->photos + photo, &camera, &light,
-                                   background, terms, frozen, o->dssim, o->normal_weight, &values);
+    const ssdgs__photo_job shot = {trainer->photos + photo, &camera,  &light,          background, terms,
+                                   {frozen[0], frozen[1]},  o->dssim, o->normal_weight};
+    result = ssdgs__photo_backward(&frame, trainer->model, &shot, &values);
     if (result) return result;
     double gradient[9];
     ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
@@ -8878,8 +8924,10 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         ssdgs__correct(photo, correction.value, &camera, &light);
         ssdgs__loss_values values;
         ssdgs_frame frame;
-        result = ssdgs__photo_backward(&frame, model, photo, &camera, &light, background,
-                                       model->settings.terms, frozen, (ssdgs_real)0.2, 0, &values);
+        const ssdgs__photo_job shot = {
+            photo,           &camera, &light, background, model->settings.terms, {frozen[0], frozen[1]},
+            (ssdgs_real)0.2, 0};
+        result = ssdgs__photo_backward(&frame, model, &shot, &values);
         if (result) return result;
         double gradient[9];
         ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
@@ -9717,8 +9765,10 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
 /* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes;
    view_slot (12) is overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride,
-                                   size_t begin, size_t end, const R *splat, R *gradient,
-                                   size_t gradient_stride, R *view_slot) {
+                                   size_t begin, size_t end, const ssdgs__project_gradient *out) {
+    const R *splat = out->splat;
+    R *gradient = out->planes, *view_slot = out->view;
+    const size_t gradient_stride = out->stride;
     V view_sum[12][SSDGS__NV];
     for (int j = 0; j < 12; j++)
         for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
@@ -11246,8 +11296,11 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
    "black"; values are stored less 1/2, which leaves variances as they are and keeps them from cancelling.
    Writes d(SSIM)/d(mean, E[i^2], E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows
    of the stride. */
-SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
-                           R *d_mean, R *d_square, R *d_product, R sums[3]) {
+SSDGS__FN void F(ssim_row)(const ssdgs__ssim_row *at, R sums[3]) {
+    const R *image = at->image, *reference = at->reference;
+    R *scratch = at->scratch, *d_mean = at->d_mean, *d_square = at->d_square, *d_product = at->d_product;
+    const size_t stride = at->stride;
+    const int width = at->width;
     const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
     for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[5];
@@ -11307,9 +11360,12 @@ SSDGS__FN void F(ssim_row)(const R *image, const R *reference, int width, size_t
 
 /* gradient = by_l1 sign(i - j) + by_ssim (B[d_mean] + 2 i B[d_square] + j B[d_product]), B the window
    again. */
-SSDGS__FN void F(ssim_backward_row)(const R *image, const R *reference, int width, size_t stride, R *scratch,
-                                    const R *d_mean, const R *d_square, const R *d_product, R by_l1,
-                                    R by_ssim, R *gradient) {
+SSDGS__FN void F(ssim_backward_row)(const ssdgs__ssim_row *at, R by_l1, R by_ssim, R *gradient) {
+    const R *image = at->image, *reference = at->reference;
+    const R *d_mean = at->d_mean, *d_square = at->d_square, *d_product = at->d_product;
+    R *scratch = at->scratch;
+    const size_t stride = at->stride;
+    const int width = at->width;
     for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[3];
         for (int m = 0; m < 3; m++) sum[m] = VSET(0);

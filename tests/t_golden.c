@@ -484,8 +484,10 @@ static void test_loss(void) {
     gold_planes("image", image);
     gold_planes("target", target);
     ssdgs__loss_values values;
-    CHECK(!ssdgs__loss(context, &memory, image, target, (int)a->dims[1], (int)a->dims[0],
-                       (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient, &values));
+    const ssdgs__images images = {image, target, (int)a->dims[1], (int)a->dims[0]};
+    const ssdgs__images equal = {target, target, (int)a->dims[1], (int)a->dims[0]};
+    CHECK(!ssdgs__loss(context, &memory, &images, (ssdgs_real)gold(&file, "lambda_dssim", NULL)[0], gradient,
+                       &values));
     double got[4];
     got[0] = values.l1;
     got[1] = values.ssim;
@@ -500,8 +502,7 @@ static void test_loss(void) {
     double *rows = (double *)malloc(3 * pixels * sizeof *rows);
     for (size_t i = 0; i < 3 * pixels; i++) rows[i] = (double)gradient[pixels * (i % 3) + i / 3];
     CHECK_L2(rows, gold(&file, "grad_image", NULL), 3 * pixels, gradient_bound(), "loss: grad_image");
-    CHECK(!ssdgs__loss(context, &memory, target, target, (int)a->dims[1], (int)a->dims[0], (ssdgs_real)0.2,
-                       gradient, &values));
+    CHECK(!ssdgs__loss(context, &memory, &equal, (ssdgs_real)0.2, gradient, &values));
     for (size_t i = 0; i < 3 * pixels; i++)
         rows[i] = 0; /* equal images pull at nothing, where one grey level makes 1e-4 */
     CHECK_NEAR(gradient, rows, 3 * pixels, real64 ? 1e-15 : 1e-8, 0, "loss: gradient of equal images");
@@ -572,7 +573,8 @@ static void test_needles(void) {
                     (ssdgs_real)log(j == i % 3 ? long_side[i % 4] : thin_side[i / 4 % 2]);
         }
         ssdgs_real slot[12];
-        context->k->project_backward(&view, gaussians, MANY, 0, MANY, splat, gradient, MANY, slot);
+        const ssdgs__project_gradient d = {splat, gradient, MANY, slot};
+        context->k->project_backward(&view, gaussians, MANY, 0, MANY, &d);
         for (int i = 0; i < MANY; i++) {
             double raw[7], error[2] = {0, 0}, norm[2] = {0, 0};
             for (int j = 0; j < 7; j++)
@@ -703,8 +705,8 @@ static void test_full(const char *name, int defaults) {
     if (defaults) context->k->srgb_encode(image, slope, image, 3 * pixels);
     gold_planes("target", target);
     ssdgs__loss_values values;
-    CHECK(!ssdgs__loss(context, &memory, image, target, camera.width, camera.height, 0, frame.pixel_gradient,
-                       &values));
+    const ssdgs__images images = {image, target, camera.width, camera.height};
+    CHECK(!ssdgs__loss(context, &memory, &images, 0, frame.pixel_gradient, &values));
     double loss[1];
     loss[0] = values.loss;
     CHECK_NEAR(loss, gold(&file, "loss", NULL), 1, value_bound(), 0, "full: loss");

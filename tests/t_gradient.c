@@ -438,9 +438,9 @@ static void test_photo(int transfer, double intensity) {
     const size_t stride = model->capacity;
     ssdgs__loss_values values;
     ssdgs_frame frame;
-    if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
-                              SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
-        exit(1);
+    const ssdgs__photo_job shot = {
+        &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, {frozen[0], frozen[1]}, 0.2, 0};
+    if (ssdgs__photo_backward(&frame, model, &shot, &values)) exit(1);
     ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
     for (size_t i = 0; i < SSDGS_CHANNELS * COUNT; i++)
         gradient[i] = frame.gradient[i / COUNT * stride + i % COUNT];
@@ -449,9 +449,7 @@ static void test_photo(int transfer, double intensity) {
         double loss[2];
         for (int side = 0; side < 2; side++) {
             *value = start + (side ? 1e-6 : -1e-6);
-            if (ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, background,
-                                      SSDGS_DIFFUSE_TERM, frozen, 0.2, 0, &values))
-                exit(1);
+            if (ssdgs__photo_backward(&frame, model, &shot, &values)) exit(1);
             loss[side] = values.loss;
         }
         *value = start;

@@ -381,7 +381,8 @@ static void row_55(void) {
                 (ssdgs_real)(0.5 * (double)image[j] + 0.5 * ssdgs__uniform(22, (uint64_t)(i * 1000 + j)));
         }
         ssdgs__loss_values values;
-        CHECK(!ssdgs__loss(context, &memory, image, reference, w, h, (ssdgs_real)0.2, gradient, &values));
+        const ssdgs__images images = {image, reference, w, h};
+        CHECK(!ssdgs__loss(context, &memory, &images, (ssdgs_real)0.2, gradient, &values));
         ssdgs__release(context, memory.memory);
         CHECK(fabs(values.ssim - ssim_oracle(image, reference, w, h)) < 1e-6);
         training t = start(context, NULL, NULL, &o, PHOTOS);
@@ -419,7 +420,8 @@ static void row_56(void) {
                                         : i == 4 ? ssdgs__uniform(31, (uint64_t)j)
                                                  : 0.5 + 0.5 * sin(0.2 * (j % SIDE)));
             ssdgs__loss_values values;
-            CHECK(!ssdgs__loss(context, &memory, image, image, SIDE, SIDE, 1, gradient, &values));
+            const ssdgs__images images = {image, image, SIDE, SIDE};
+            CHECK(!ssdgs__loss(context, &memory, &images, 1, gradient, &values));
             for (int j = 0; j < 3 * LARGEST; j++)
                 here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
             here *= 3 * LARGEST;

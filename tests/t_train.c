@@ -1897,8 +1897,15 @@ static void test_clipped(void) {
             photo.pixels = bytes;
             ssdgs__loss_values values;
             ssdgs_frame frame;
-            CHECK(!ssdgs__photo_backward(&frame, model, &photo, &photo.camera, &photo.light, black,
-                                         SSDGS_DIFFUSE_TERM, frozen, (ssdgs_real)0.2, 0, &values));
+            const ssdgs__photo_job shot = {&photo,
+                                           &photo.camera,
+                                           &photo.light,
+                                           black,
+                                           SSDGS_DIFFUSE_TERM,
+                                           {frozen[0], frozen[1]},
+                                           (ssdgs_real)0.2,
+                                           0};
+            CHECK(!ssdgs__photo_backward(&frame, model, &shot, &values));
             CHECK(full > SIDE);
             if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01))
                 printf("    transfer %d, %d: loss %g\n", transfer, dim, values.loss);
