@@ -400,19 +400,35 @@ static int fail(const char *message) {
    steps. */
 static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps,
                              const char *label) {
-    ssdgs_metrics m, mean = {0, 0, 0};
+    double psnr = 0, ssim = 0, flip = 0;
     int count = (all + step - 1) / step;
     for (int i = 0; i < count; i++) {
         ssdgs_photo photo = photos[i * step];
         ssdgs_result result =
             fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
-        if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, NULL, &m);
+        olat_frame frame;
+        memset(&frame, 0, sizeof frame);
+        frame.camera = photo.camera;
+        frame.format = photo.format;
+        memcpy(&frame.pixels, &photo.pixels, sizeof frame.pixels); /* which are only read */
+        const size_t values = 3 * (size_t)photo.camera.width * (size_t)photo.camera.height;
+        ssdgs_real *images = (ssdgs_real *)malloc(2 * values * sizeof *images); /* rendered, photographed */
+        if (!result && !images) result = SSDGS_ERR_MEMORY;
+        ssdgs_metrics m;
+        if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, images, &m);
+        double seen = 0;
+        if (!result) {
+            olat_compose(&frame, j->options.background, images + values);
+            seen = olat_flip(images, images + values, photo.camera.width, photo.camera.height);
+            if (seen < 0) result = SSDGS_ERR_MEMORY;
+        }
+        free(images);
         if (result) return result;
-        mean.psnr += m.psnr / count;
-        mean.ssim += m.ssim / count;
-        mean.flip += m.flip / count;
+        psnr += m.psnr / count;
+        ssim += m.ssim / count;
+        flip += seen / count;
     }
-    printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, mean.psnr, mean.ssim, mean.flip, count);
+    printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, psnr, ssim, flip, count);
     return SSDGS_OK;
 }
 

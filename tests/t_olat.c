@@ -1856,6 +1856,26 @@ static void test_cow(void) {
     CHECK(live == 0);
 }
 
+/* FLIP: 0 for equal images, symmetric, near 1 for the colours furthest apart, and what it was when the
+   library had it. */
+static void test_flip(void) {
+    enum { W = 20, H = 12, COUNT = W * H * 3 };
+    static ssdgs_real a[COUNT], b[COUNT], green[COUNT], blue[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        a[i] = (ssdgs_real)(7 * i % 29) / 28;
+        b[i] = (ssdgs_real)(5 * i % 31) / 30;
+        green[i] = i % 3 == 1;
+        blue[i] = i % 3 == 2;
+    }
+    CHECK(olat_flip(a, a, W, H) == 0);
+    CHECK(fabs(olat_flip(a, b, W, H) - 0.353510128) < 1e-5);
+    CHECK(fabs(olat_flip(a, b, W, H) - olat_flip(b, a, W, H)) < 1e-9);
+    CHECK(olat_flip(green, blue, W, H) > 0.99 && olat_flip(green, blue, W, H) < 1.001);
+    calls = 0, fail_at = 1;
+    CHECK(olat_flip(a, b, W, H) == -1);
+    fail_at = 0;
+}
+
 int main(void) {
     mkdir("build", 0777);
     mkdir(FOLDER, 0777);
@@ -1878,5 +1898,6 @@ int main(void) {
     TEST_ROW("83", "allocations that fail", test_memory());
     test_views();
     test_cow();
+    test_flip();
     TEST_END();
 }
