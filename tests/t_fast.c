@@ -4,7 +4,7 @@
 #include "../ssdgs.h"
 #include "test.h"
 
-enum { SIDE = 96, PIXELS = SIDE * SIDE, COUNT = 3000 };
+enum { SIDE = 96, PIXELS = SIDE * SIDE, COUNT = 3000, FEWER = 1000 };
 static const ssdgs_real target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
 static ssdgs_real image[2][PIXELS * 3];
 
@@ -12,16 +12,16 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
 /* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to
    say. */
-static ssdgs_model *make_model(ssdgs_context *context) {
+static ssdgs_model *make_model(ssdgs_context *context, int count) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
     ssdgs_model_view v;
     size_t i, c;
     settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
-    if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
+    if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
     v = ssdgs_model_get(model);
-    for (i = 0; i < COUNT; i++) {
-        const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
+    for (i = 0; i < (size_t)count; i++) {
+        const double z = 1 - (2 * (double)i + 1) / count, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
         const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z,
                                -r * sin(turn),      r * cos(turn),       0};
         for (c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
@@ -88,8 +88,8 @@ static void test_kept(void) {
     ssdgs_render_stats stats;
     ssdgs_model_view view;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
-    other = make_model(context);
+    model = make_model(context, FEWER);
+    other = make_model(context, FEWER);
     lights[0] = light_at(1);
     lights[1] = light_at(4);
 #define FIRST() render(model, &a, lights, 2, &options, image[0], NULL)
@@ -210,7 +210,7 @@ static void test_walk(void) {
     desc.allocator.release = pool_release;
     for (k = 0; k < 2; k++) {
         if (!CHECK(!ssdgs_context_create(k ? NULL : &desc, &context[k]))) exit(1);
-        for (i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
+        for (i = 0; i < MODELS; i++) models[k][i] = make_model(context[k], FEWER);
         models[k][1]->settings.asg = SSDGS_ASG_GEOMETRIC;
     }
     for (i = 0; i < VIEWS; i++) cameras[i] = camera_at(2 * i);
@@ -223,7 +223,7 @@ static void test_walk(void) {
         ssdgs_light other;
         for (change = 0; change < changes; change++) {
             const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
-                      gaussian = PICK(COUNT), light = PICK(LIGHTS);
+                      gaussian = PICK(FEWER), light = PICK(LIGHTS);
             const ssdgs_real value = (ssdgs_real)draw(at++);
             switch (kind) {
             case 0: view = PICK(VIEWS); break;
@@ -311,7 +311,7 @@ static void test_max_error(void) {
         desc.isa = (ssdgs_isa)isa;
         if (!ssdgs__table(isa)) continue;
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-        model = make_model(context);
+        model = make_model(context, COUNT);
         for (b = 0, last = COUNT; b < 3; b++) {
             ssdgs_render_options options = ssdgs_render_options_exact();
             ssdgs_frame frame;
@@ -388,7 +388,7 @@ static void test_presets(void) {
     options[1] = ssdgs_render_options_default();
     options[2] = ssdgs_render_options_fast();
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
+    model = make_model(context, COUNT);
     for (o = 0; o < 3; o++) {
         double squares = 0;
         render(model, &camera, &light, 1, options + o, image[o > 0], stats + o);
@@ -491,7 +491,7 @@ static void test_frozen(void) {
     size_t first[SSDGS__GLOBAL_GROUPS + 1], n, i;
     int part, g;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    model = make_model(context);
+    model = make_model(context, COUNT);
     ssdgs__global_groups(&model->settings, first);
     n = model->capacity * SSDGS_CHANNELS;
     for (part = 0; part < 4; part++) {
