@@ -4,7 +4,7 @@
 #include "../ssdgs.h"
 #include "test.h"
 
-enum { SIDE = 96, PIXELS = SIDE * SIDE, COUNT = 3000 };
+enum { SIDE = 96, PIXELS = SIDE * SIDE, COUNT = 3000, FEWER = 1000 };
 static const ssdgs_real target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
 static ssdgs_real image[2][PIXELS * 3];
 
@@ -12,14 +12,14 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
 /* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to
    say. */
-static ssdgs_model *make_model(ssdgs_context *context) {
+static ssdgs_model *make_model(ssdgs_context *context, int count) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
     settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
-    if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
+    if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
     ssdgs_model_view v = ssdgs_model_arrays(model);
-    for (size_t i = 0; i < COUNT; i++) {
-        const double z = 1 - (2 * (double)i + 1) / COUNT, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
+    for (size_t i = 0; i < (size_t)count; i++) {
+        const double z = 1 - (2 * (double)i + 1) / count, r = sqrt(1 - z * z), turn = 2.4 * (double)i;
         const double raw[7] = {0.5 * r * cos(turn), 0.5 * r * sin(turn), 0.5 * z, 1 + z,
                                -r * sin(turn),      r * cos(turn),       0};
         for (size_t c = 0; c < 3; c++) v.gaussians[(SSDGS_POSITION + c) * v.stride + i] = (ssdgs_real)raw[c];
@@ -82,8 +82,8 @@ static void test_kept(void) {
     ssdgs_camera a = camera_at(0), b = camera_at(1);
     ssdgs_light moved = light_at(2);
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    ssdgs_model *model = make_model(context);
-    ssdgs_model *other = make_model(context);
+    ssdgs_model *model = make_model(context, FEWER);
+    ssdgs_model *other = make_model(context, FEWER);
     ssdgs_light lights[2];
     lights[0] = light_at(1);
     lights[1] = light_at(4);
@@ -202,7 +202,7 @@ static void test_walk(void) {
     ssdgs_model *models[2][MODELS];
     for (int k = 0; k < 2; k++) {
         if (!CHECK(!ssdgs_context_create(k ? NULL : &desc, &context[k]))) exit(1);
-        for (int i = 0; i < MODELS; i++) models[k][i] = make_model(context[k]);
+        for (int i = 0; i < MODELS; i++) models[k][i] = make_model(context[k], FEWER);
         models[k][1]->settings.asg = SSDGS_ASG_GEOMETRIC;
     }
     ssdgs_camera cameras[VIEWS];
@@ -216,7 +216,7 @@ static void test_walk(void) {
         ssdgs_light other;
         for (int change = 0; change < changes; change++) {
             const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
-                      gaussian = PICK(COUNT), light = PICK(LIGHTS);
+                      gaussian = PICK(FEWER), light = PICK(LIGHTS);
             const ssdgs_real value = (ssdgs_real)draw(at++);
             switch (kind) {
             case 0: view = PICK(VIEWS); break;
@@ -304,7 +304,7 @@ static void test_max_error(void) {
         desc.isa = (ssdgs_isa)isa;
         if (!ssdgs__table(isa)) continue;
         if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-        ssdgs_model *model = make_model(context);
+        ssdgs_model *model = make_model(context, COUNT);
         int b;
         for (b = 0, last = COUNT; b < 3; b++) {
             ssdgs_render_options options = ssdgs_render_options_exact();
@@ -378,7 +378,7 @@ static void test_presets(void) {
     options[1] = ssdgs_render_options_default();
     options[2] = ssdgs_render_options_fast();
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    ssdgs_model *model = make_model(context);
+    ssdgs_model *model = make_model(context, COUNT);
     ssdgs_render_stats stats[3];
     for (int o = 0; o < 3; o++) {
         double squares = 0;
@@ -477,7 +477,7 @@ static void test_frozen(void) {
     ssdgs_camera camera = camera_at(0);
     ssdgs_real *planes = NULL;
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
-    ssdgs_model *model = make_model(context);
+    ssdgs_model *model = make_model(context, COUNT);
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     const size_t n = model->capacity * SSDGS_CHANNELS;
