@@ -784,6 +784,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 
 /* ==== >>config  what this compiler and CPU can do ==== */
 
+/* Reads the compiler's macros. Defines which kernels are built, all limits and clamps, and the structs
+   that kernels are called with. */
+
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
@@ -1350,6 +1353,8 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* ==== >>memory  contexts, errors, aligned allocation ==== */
 
+/* Reads desc's allocator and log. Holds messages, notes and buffers that only grow. Every room calls it. */
+
 #define SSDGS__MESSAGE 512
 
 /* Values that several threads read and write. Compilers without atomic operations neither wait for a value
@@ -1602,8 +1607,10 @@ static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer
     return SSDGS_OK;
 }
 
-/* ==== >>threads  a pool per context ====
-   Work is cut by the problem, never by the thread count; every task writes its own place. */
+/* ==== >>threads  a pool per context ==== */
+
+/* Runs the tasks of a stage, on the context's threads or desc.parallel. Work is cut by the problem, never
+   by the thread count, and every task writes its own place. */
 
 typedef void (*ssdgs__task)(void *data, int index);
 
@@ -1804,6 +1811,8 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
 
 /* ==== >>cpu  which tables this machine can run ==== */
 
+/* Reads CPUID. Picks a table of kernels. Makes and destroys contexts. */
+
 #if SSDGS__X86
 /* All 0 for a leaf that the CPU has not. Without <cpuid.h>: clang 14's lets ebx come out where the subleaf
    goes in. */
@@ -1971,6 +1980,9 @@ SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) {
 SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return context ? context->threads : 0; }
 
 /* ==== >>model  Gaussians, ASG bases, networks, settings ==== */
+
+/* Reads settings. Holds raw parameters, ASG and networks, and their public functions. Files and the
+   trainer make models of them. */
 
 struct ssdgs_model {
     ssdgs_context *context;
@@ -2567,7 +2579,10 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
     return further > (n - AROUND) / 3;
 }
 
-/* ==== >>frame  memory of a frame, its views ==== */
+/* ==== >>frame  memory of a frame, its views, its cache ==== */
+
+/* Reads model, camera, lights and options. Writes ssdgs_frame, and finds what of the last frame still
+   holds. Called by render and by the trainer. */
 
 typedef struct ssdgs__view_memory {
     ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
@@ -3131,6 +3146,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
 
 /* ==== >>project  records, order, instances, tile lists ==== */
 
+/* Reads raw parameters and views. Writes record, depth, order, instance, tile_start, tile_list. Stages
+   PROJECT, SORT and BIN. */
+
 #define SSDGS__BIN_CHUNKS 64
 
 static ssdgs_real ssdgs__log2_threshold(const ssdgs_frame *frame) {
@@ -3416,8 +3434,10 @@ static SSDGS__INLINE ssdgs_real ssdgs__nearest(const ssdgs_splat_view *view) {
     return view->visible ? view->depth[view->order[0]] : 0;
 }
 
-/* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ====
-   Tiles of all views in one loop: the camera's walk and the light pass run side by side. */
+/* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ==== */
+
+/* Reads records and tile lists of all views in one loop: the camera's walk and the light pass run side by
+   side. Writes seen, visibility, depth_cue, flux and the light maps. Stage WALK. */
 
 /* With walked, of its entries those that the walk saw blended. */
 static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index,
@@ -3544,9 +3564,11 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
-/* ==== >>transport  true dipole transport: what comes to the Gaussians seen from where the light enters ====
-   Where a light's flux enters: nodes of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one.
-   In the order that training leaves they are compact. */
+/* ==== >>transport  true dipole transport: what comes to Gaussians from where light enters ==== */
+
+/* Reads flux. Writes SSDGS__LENGTHS sums per Gaussian and light; shade calls it. Where flux enters: nodes
+   of 8 consecutive Gaussians, then of 8 such nodes, and so on up to one. In the order that training leaves
+   they are compact. */
 
 typedef struct ssdgs__node {
     ssdgs_real x[3], flux, radius;
@@ -3834,7 +3856,10 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     return SSDGS_OK;
 }
 
-/* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks: geometry, both networks, colour ==== */
+/* ==== >>shade  eqs. 3 to 13 for the Gaussians seen, in blocks ==== */
+
+/* Reads raw parameters, visibility, cues and flux. Runs both networks. Writes color, layers or components.
+   Stages SHADE and SHADE_BACKWARD. */
 
 /* How a block's memory is laid out, in values. What the backward asks for again: the Gaussians' channels and,
    per light, the geometry, the cues and the layers' outputs. Scratch, one per slot: the networks' inputs,
@@ -4622,7 +4647,10 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
-/* ==== >>composite  eq. 1 and its backward over tiles ==== */
+/* ==== >>composite  eq. 1, highlights per pixel, and their backward over tiles ==== */
+
+/* Reads color, layers, tile lists and light maps. Writes pixels, layer_pixels, transmittance. Stages
+   COMPOSITE, COMPOSITE_BACKWARD and PROJECT_BACKWARD. */
 
 /* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes or come from them. */
 static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count,
@@ -5014,6 +5042,9 @@ static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) 
 
 /* ==== >>render  the stages in order ==== */
 
+/* Runs each stage's hook or the CPU's version, then fills ssdgs_image. Public: ssdgs_render(),
+   ssdgs_stage_cpu(). */
+
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     if (!frame) return SSDGS_ERR_ARGUMENT;
     switch (stage) {
@@ -5209,7 +5240,10 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
 }
 
-/* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, image metrics ==== */
+/* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */
+
+/* Reads images of stored values. Writes loss, gradient, bytes and metrics. Called by the trainer and by
+   users. */
 
 #if SSDGS__X86 && (defined(__x86_64__) || defined(_M_X64))
 #define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_sse2 /* the widest that needs no look at the CPU */
@@ -5518,6 +5552,8 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 #endif /* SSDGS_NO_TRAINER */
 
 /* ==== >>ply  model files, files at large ==== */
+
+/* Reads and writes PLY and whole files. Checkpoints use the writer too. */
 
 SSDGS__SMALL_BEGIN
 
@@ -6631,6 +6667,9 @@ SSDGS__SMALL_END
 
 /* ==== >>trainer  schedule, one photograph forward and backward, Adam ==== */
 
+/* Reads a photograph and the options. Writes gradients, then parameters and their moments. Called by
+   steps. */
+
 static const int ssdgs__group_plane[SSDGS__PLANE_GROUPS + 1] = {
     SSDGS_POSITION,   SSDGS_ROTATION, SSDGS_LOG_SCALE,  SSDGS_OPACITY,  SSDGS_DIFFUSE, SSDGS_SPECULAR,
     SSDGS_SCATTERING, SSDGS_FRAME,    SSDGS_ASG_WEIGHT, SSDGS_MATERIAL, SSDGS_CHANNELS};
@@ -7233,6 +7272,9 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
+/* Reads gradients and weights gathered over the photographs. Adds, halves and removes Gaussians. Called by
+   steps. */
+
 #define SSDGS__STATISTICS 4
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
@@ -7572,6 +7614,8 @@ static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *
 }
 
 /* ==== >>steps  the trainer's public functions ==== */
+
+/* Judges the photographs, starts a run, steps, evaluates, refines. Users call it. */
 
 SSDGS__SMALL_BEGIN
 
@@ -8769,7 +8813,9 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 }
 
 #ifndef SSDGS_NO_STDIO
-/* ==== >>checkpoint  a run's whole state; native byte order, refused elsewhere ==== */
+/* ==== >>checkpoint  a run's whole state ==== */
+
+/* Reads and writes it in native byte order; another version, precision or run is refused. */
 
 #define SSDGS__CHECKPOINT_MAGIC "SSDGSCK2" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
@@ -9054,8 +9100,9 @@ SSDGS__SMALL_END
 #else  /* SSDGS__ISA: the kernels, included once per instruction set */
 #if SSDGS__ISA
 
-/* ==== >>kernels  one body for every instruction set ====
-   V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm
+/* ==== >>kernels  one body for every instruction set ==== */
+
+/* V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm
    (except in the double build) and fuse only through VFMA, so a forward and its backward round alike. */
 
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
@@ -9301,7 +9348,9 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 #endif
 }
 
-/* ==== >>vmath  elementary functions on V ==== */
+/* ==== >>vmath  elementary functions on V, the transfer curve ==== */
+
+/* The kernels call them; the host calls their scalar forms. */
 
 #ifdef SSDGS_REAL64
 SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
@@ -9733,10 +9782,11 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
     }
 }
 
-/* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ====
-   The tile's list is taken in batches; in a batch each 4x4 micro-tile runs through the entries that touch it
-   with its pixels in registers. Every walk finds alpha by the same operations in the same order, so all of
-   them take the same decisions. */
+/* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ==== */
+
+/* The tile's list is taken in batches; in a batch each 4x4 micro-tile runs through the entries that touch
+   it with its pixels in registers. Every walk finds alpha by the same operations in the same order, so all
+   of them take the same decisions. */
 
 typedef struct F(batch) {
     ssdgs_record record[SSDGS__BATCH];
@@ -10013,8 +10063,9 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
 
-/* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ====
-   pixels: [layer][micro-tile][3 colours, transmittance in the first layer][16 lanes]. */
+/* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ==== */
+
+/* pixels: [layer][micro-tile][3 colours, transmittance in the first layer][16 lanes]. */
 SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color,
                                    R *pixels) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
@@ -10206,8 +10257,9 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
     else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, scratch, sums, stride, slot);
 }
 
-/* ==== >>transport_kernel ====
-   sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest
+/* ==== >>transport_kernel  light that comes through the object ==== */
+
+/* sources (count, 4): x, y, z, flux; x (3, BLOCK), of which 16 lanes; scale: soft^2, -log2(e) / longest
    length. Adds flux exp(-r / l_k) / r to sums (SSDGS__LENGTHS, BLOCK), r = sqrt(distance^2 + soft^2): one
    exponential for the longest l, its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
@@ -10232,11 +10284,12 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
     }
 }
 
-/* ==== >>dense_kernel  all three matrix products of a linear layer ====
-   out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows and
-   the depths listed; a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of the
-   outputs all serve without a copy; lanes run over the columns, a multiple of 16. Tiles of SSDGS__TR rows x
-   SSDGS__TV vectors stay in registers. */
+/* ==== >>dense_kernel  all three matrix products of a linear layer ==== */
+
+/* out (rows, columns) = a (rows, depth) b (depth, columns) [+ bias per row] [+ out] [ReLU] for the rows
+   and the depths listed; a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of
+   the outputs all serve without a copy; lanes run over the columns, a multiple of 16. Tiles of SSDGS__TR
+   rows x SSDGS__TV vectors stay in registers. */
 typedef struct F(offsets) {
     uint32_t a, b;
 } F(offsets); /* of a depth, multiplied out before the inner loop */
@@ -10359,9 +10412,10 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
         }
 }
 
-/* ==== >>encode_kernel  enc_L(v) = (v, sin v, .., sin 2^(L-1) v, cos v, .., cos 2^(L-1) v), each per
-   component ==== in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the others by
-   doubling the angle. */
+/* ==== >>encode_kernel  enc_L(v) = (v, sin v .. sin 2^(L-1) v, cos v .. cos 2^(L-1) v) ==== */
+
+/* Each component on its own. in (dims, BLOCK) is read as (in - origin) * scale; one sine and cosine, the
+   others by doubling the angle. */
 SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims, int levels) {
     for (int d = 0; d < dims; d++)
         for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
@@ -10396,8 +10450,9 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
         }
 }
 
-/* ==== >>asg_kernel  eqs. 9 to 12: directions, Lambert's cosine, Fresnel x ASG of a block under one light
-   ==== */
+/* ==== >>asg_kernel  eqs. 9 to 12 of a block under one light ==== */
+
+/* Directions, Lambert's cosine, Fresnel x ASG. */
 
 /* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
 SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
@@ -10571,19 +10626,27 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
     }
 }
 
-/* ==== >>highlight_kernel  deferred: eqs. 9, 10 and 12 of a tile's pixels under one light ====
-   Reads what the pixel's Gaussians blend to. One term per pixel and light:
-       S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j exp(-s_j ((1 - t_j) p.Q p + t_j h.Q
-   h))) D = (c_d / pi) f_d E and M = c_s E are blended, and so are the normal n and, over the pixel's alpha,
-   Q = lambda xx' + mu yy' of the frames' axes and F0. p is h less its part along n: t_j chooses between the
-   normals' mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what
-   shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001), n.wi >= 0, wo.h >=
-   SSDGS__GRAZING. Why per pixel: a narrow highlight passes over one Gaussian in few photographs, which its
-   own normal fits by heart. The normals' mean at a pixel carries over to other views. A shadow's edge is
-   narrower than Gaussians are. S is eq. 8's of the blended answers of the shadow network and of (1 - soft) v
-   + soft v_g. v is the transmittance to the place at the pixel's depth, from the light map; v_g is the
-   Gaussians', over alpha as their softness is: 0 for a shadow's edge on what reflects, 1 where light comes
-   out beside where it went in. */
+/* ==== >>highlight_kernel  deferred: eqs. 9, 10 and 12 of a tile's pixels under one light ==== */
+
+/* Reads what the pixel's Gaussians blend to. One term per pixel and light:
+       S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j e_j)
+       e_j = exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))
+
+   D = (c_d / pi) f_d E and M = c_s E are blended, and so are the normal n and, over the pixel's alpha, F0 and
+   Q = lambda xx' + mu yy' of the frames' axes. p is h less its part along n: t_j chooses between the normals'
+   mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what shadowing
+   and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0, wo.h >= SSDGS__GRAZING.
+
+   S is eq. 8's of two blended things: the shadow network's answers, and (1 - soft) v + soft v_g. v is the
+   transmittance to the place at the pixel's depth, from the light map. v_g is the Gaussians' own. Softness is
+   0 for a shadow's edge on what reflects, 1 where light comes out beside where it went in.
+
+   Why per pixel: a narrow highlight passes over one Gaussian in few photographs, which its own normal fits by
+   heart. The normals' mean at a pixel carries over to other views. A shadow's edge is narrower than
+   Gaussians.
+
+   Layers: Q is layers 1, 2 over A, depth and F0 layer 3 over A, with A, the sum of weights, its third; the
+   normal is layer 4's direction, M is layer 5. */
 
 typedef struct F(highlight_geometry) {
     V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing,
@@ -10969,8 +11032,7 @@ SSDGS__FI V F(dipole)(const int printed, V ss, V sa, V r, R virtual_depth, V *d)
     return VMUL(scale, f);
 }
 
-/* ==== >>colour_kernel  eqs. 3, 8 and 13: from the networks' outputs to the colour of a block under one light
-   ==== */
+/* ==== >>colour_kernel  eqs. 3, 8 and 13: a block's colour from the networks' outputs ==== */
 
 /* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
 SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
