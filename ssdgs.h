@@ -3019,6 +3019,62 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
     cache->light_count = frame->light_count;
 }
 
+/* ---- the light table: what kernels need of each light, made once a frame ---- */
+
+/* Raw weights of deferred lobes, within what neither over- nor underflows. */
+static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
+    return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
+}
+
+static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
+    const ssdgs_settings *s = &frame->settings;
+    const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+    ssdgs__lighting k;
+    memset(&k, 0, sizeof k);
+    for (int i = 0; i < 3; i++) {
+        k.light[i] = frame->lights[light].position[i];
+        k.intensity[i] = frame->lights[light].intensity[i] * s->light_scale;
+        k.eye[i] = frame->eye[i];
+    }
+    k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
+    k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
+    k.directional = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL;
+    k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
+    k.diffuse = (frame->terms & SSDGS_DIFFUSE_TERM) != 0;
+    k.specular = (frame->terms & SSDGS_SPECULAR_TERM) != 0;
+    k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
+    k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
+    k.residual_shadow = s->residual_shadow;
+    k.refined_shadow = s->shadow_layers > 0;
+    k.per_channel_optics = s->per_channel_optics;
+    k.shadow_on_scattering = s->shadow_on_scattering;
+    k.deferred = frame->layer_count > 0;
+    memcpy(k.view, frame->camera.view, sizeof k.view);
+    k.inverse_fx = 1 / frame->camera.fx;
+    k.inverse_fy = 1 / frame->camera.fy;
+    k.cx = frame->camera.cx;
+    k.cy = frame->camera.cy;
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+        const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
+        ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
+        ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
+        for (int i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
+        if (k.deferred) {
+            b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
+            b[9] = ssdgs__exp_scalar(sharpness[0]);
+            b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
+        } else {
+            for (int i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
+        }
+    }
+    return k;
+}
+
+static const ssdgs__lighting *ssdgs__lightings(const ssdgs_frame *frame) {
+    return (const ssdgs__lighting *)frame->memory->lightings.memory;
+}
+
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
                                        const ssdgs_light *lights, int light_count,
@@ -3141,6 +3197,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         SSDGS__RESERVE(m->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(m->global_gradient, frame->global_gradient, ssdgs_real, model->global_count);
     }
+    ssdgs__lighting *lightings;
+    SSDGS__RESERVE(m->lightings, lightings, ssdgs__lighting, frame->light_count + 1);
+    for (int i = 0; i < frame->light_count; i++) lightings[i] = ssdgs__lighting_of(frame, i);
     return SSDGS_OK;
 }
 
@@ -3917,64 +3976,6 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     return l;
 }
 
-/* Raw weights of deferred lobes, within what neither over- nor underflows. */
-static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
-    return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
-}
-
-static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
-    const ssdgs_settings *s = &frame->settings;
-    const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
-    ssdgs__lighting k;
-    memset(&k, 0, sizeof k);
-    for (int i = 0; i < 3; i++) {
-        k.light[i] = frame->lights[light].position[i];
-        k.intensity[i] = frame->lights[light].intensity[i] * s->light_scale;
-        k.eye[i] = frame->eye[i];
-    }
-    k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
-    k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
-    k.directional = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL;
-    k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
-    k.diffuse = (frame->terms & SSDGS_DIFFUSE_TERM) != 0;
-    k.specular = (frame->terms & SSDGS_SPECULAR_TERM) != 0;
-    k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
-    k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
-    k.residual_shadow = s->residual_shadow;
-    k.refined_shadow = s->shadow_layers > 0;
-    k.per_channel_optics = s->per_channel_optics;
-    k.shadow_on_scattering = s->shadow_on_scattering;
-    k.deferred = frame->layer_count > 0;
-    memcpy(k.view, frame->camera.view, sizeof k.view);
-    k.inverse_fx = 1 / frame->camera.fx;
-    k.inverse_fy = 1 / frame->camera.fy;
-    k.cx = frame->camera.cx;
-    k.cy = frame->camera.cy;
-    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
-        const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
-        ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
-        ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
-        for (int i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
-        if (k.deferred) {
-            b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
-            b[9] = ssdgs__exp_scalar(sharpness[0]);
-            b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
-            b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
-        } else {
-            for (int i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
-        }
-    }
-    return k;
-}
-
-static ssdgs_result ssdgs__lightings(const ssdgs_frame *frame, ssdgs__lighting **lightings) {
-    ssdgs_context *context = frame->context;
-    SSDGS__RESERVE(frame->memory->lightings, *lightings, ssdgs__lighting, frame->light_count + 1);
-    for (int light = 0; light < frame->light_count; light++)
-        (*lightings)[light] = ssdgs__lighting_of(frame, light);
-    return SSDGS_OK;
-}
-
 /* Sums over lanes of dL/d(basis rows) -> raw ASG parameters. */
 static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
@@ -4228,7 +4229,7 @@ typedef struct ssdgs__shade_job {
     ssdgs__block_layout layout;
     int blocks;
     size_t slot_stride, slot_shadow; /* slots: the scattering network's gradient, then the shadow network's */
-    ssdgs__lighting *lightings;      /* per light */
+    const ssdgs__lighting *lightings; /* per light */
     ssdgs_real *shadow_logit; /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
     uint64_t *counts;            /* per slot: multiplications done, those of all neurons, shadows kept */
@@ -4435,10 +4436,7 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     job->layout = ssdgs__layout(frame);
     job->blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     SSDGS__RESERVE(frame->memory->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
-    {
-        const ssdgs_result result = ssdgs__lightings(frame, &job->lightings);
-        if (result) return result;
-    }
+    job->lightings = ssdgs__lightings(frame);
     return SSDGS_OK;
 }
 
@@ -4701,8 +4699,8 @@ static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__til
 typedef struct ssdgs__composite_job {
     const ssdgs_frame *frame;
     const ssdgs_real *color;
-    ssdgs_real *planes[4];      /* colour, transmittance */
-    ssdgs__lighting *lightings; /* NULL: without the layers */
+    ssdgs_real *planes[4];            /* colour, transmittance */
+    const ssdgs__lighting *lightings; /* NULL: without the layers */
 } ssdgs__composite_job;
 
 /* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all
@@ -4830,7 +4828,7 @@ static void ssdgs__composite_task(void *data, int index) {
 
 /* Blends color, any triple per Gaussian; with lightings, the layers too and their highlights. */
 static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels,
-                                   ssdgs__lighting *lightings) {
+                                   const ssdgs__lighting *lightings) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
     ssdgs__composite_job job;
     job.frame = frame;
@@ -4843,15 +4841,14 @@ static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *c
 }
 
 static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
-    ssdgs__lighting *lightings = NULL;
-    const ssdgs_result result = frame->layer_count ? ssdgs__lightings(frame, &lightings) : SSDGS_OK;
-    if (!result) ssdgs__composite_tiles(frame, frame->color, frame->pixels, lightings);
-    return result;
+    ssdgs__composite_tiles(frame, frame->color, frame->pixels,
+                           frame->layer_count ? ssdgs__lightings(frame) : NULL);
+    return SSDGS_OK;
 }
 
 typedef struct ssdgs__uncomposite_job {
     ssdgs_frame *frame;
-    ssdgs__lighting *lightings;
+    const ssdgs__lighting *lightings;
     ssdgs_real *highlight_sums; /* (tiles, lights, SSDGS__HIGHLIGHT_SUMS) */
     size_t stride;              /* of tile_sums: 8 and 4 per layer */
 } ssdgs__uncomposite_job;
@@ -5000,8 +4997,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
     job.frame = frame;
     job.stride = 8 + 4 * (size_t)(1 + frame->layer_count);
     if (frame->layer_count) {
-        const ssdgs_result result = ssdgs__lightings(frame, &job.lightings);
-        if (result) return result;
+        job.lightings = ssdgs__lightings(frame);
         SSDGS__RESERVE(frame->memory->highlight_sums, job.highlight_sums, ssdgs_real, sums);
         memset(job.highlight_sums, 0, sums * sizeof *job.highlight_sums);
         memset(frame->layer_gradient, 0, n * 4 * (size_t)frame->layer_count * sizeof(ssdgs_real));
