@@ -27,6 +27,8 @@ static int locked_check(int ok, int line, const char *what) {
 #endif
 
 enum { PHOTOS = 6, SIDE = 24, LARGEST = SIDE * SIDE, TRUTH = 60 };
+/* an instruction set that every CPU has */
+enum { PLAIN = SSDGS__SCALAR ? SSDGS_ISA_SCALAR : SSDGS__NEON ? SSDGS_ISA_NEON : SSDGS_ISA_SSE2 };
 #ifdef __TINYC__
 enum { SLOW = 4 }; /* no optimiser: shorter runs */
 #else
@@ -141,7 +143,7 @@ static void make_photos(int side) {
     static ssdgs_real color[LARGEST * 3], alpha[LARGEST];
     const ssdgs_real target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     const ssdgs_render_options exact = ssdgs_render_options_exact();
-    ssdgs_context *context = new_context(SSDGS_ISA_SCALAR, 1, NULL, NULL);
+    ssdgs_context *context = new_context(PLAIN, 1, NULL, NULL);
     ssdgs_model *truth = new_truth(context);
     ssdgs_image image;
     memset(&image, 0, sizeof image);
@@ -991,7 +993,7 @@ static void row_68(void) {
         ssdgs_model *loaded = NULL;
         for (int i = 0; round && !comma && i < (int)(sizeof locales / sizeof *locales); i++)
             comma = setlocale(LC_ALL, locales[i]) && *localeconv()->decimal_point == ',';
-        training t = start(new_context(SSDGS_ISA_SCALAR, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
+        training t = start(new_context(PLAIN, 1, NULL, NULL), NULL, NULL, &o, PHOTOS);
         steps(&t, 5);
         CHECK(!ssdgs_model_save(t.model, paths[0]) && !ssdgs_trainer_save(t.trainer, paths[1]));
         steps(&t, 3);
