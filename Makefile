@@ -15,7 +15,7 @@ COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT)) -DSSDGS_SCALAR -DSSDGS_STAGES # te
 # The library is compiled once, and once in double: kernels.o has its kernels, ssdgs.o all else. Programs link both; those that reach
 # into the library (ssdgs__) compile what is not kernels as their own, the tests only what they call, and link the kernels.
 KERNELS = -DSSDGS_SELF='"tests/kernels.h"'
-INSIDE := $(shell grep -l ssdgs__ tests/*.c tests/fuzz/*.c examples/*.c)
+INSIDE := $(shell grep -li ssdgs__ tests/*.c tests/fuzz/*.c examples/*.c)
 OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
 PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)

@@ -50,7 +50,7 @@ for standard in c99 c11 c17; do
 done
 for standard in c++11 c++14 c++17 c++20; do
     row "g$standard" '' "$few" "g++ -std=$standard" -O1 g++
-    row "clang$standard" '' "$few" "clang++ -x c++ -std=$standard" -O1 clang++
+    row "clang$standard" '' "$few" "clang++ -Wno-deprecated -std=$standard" -O1 clang++
 done
 group=machines
 row tcc '' "$most" tcc ''
