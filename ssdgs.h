@@ -675,6 +675,15 @@ typedef struct ssdgs_record {
     ssdgs_real extent_x, extent_y; /* px: half the box that it touches */
 } ssdgs_record;
 
+/* A pixel of a light's map: where on its way the transmittance falls. Not set in tiles without a Gaussian. */
+typedef struct ssdgs_light_pixel {
+    ssdgs_real
+        distance[3]; /* at which it falls below 0.9, 0.5, 0.1, less the nearest Gaussian's; 1e30: nowhere */
+    ssdgs_real left[2];   /* what is left after the first two steps */
+    ssdgs_real before[2]; /* what there was before the last two */
+    ssdgs_real behind;    /* what is left behind all */
+} ssdgs_light_pixel;
+
 /* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
 typedef struct ssdgs_splat_view {
     int light;            /* -1: the camera */
@@ -707,11 +716,8 @@ typedef struct ssdgs_splat_view {
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
     ssdgs_real *tile_sums; /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
-    ssdgs_real
-        *light_map; /* (tiles, 4, 4, 4, 4, 8) a light's: tiles' micro-tiles, rows first, their pixels, of each
-                   the distances, less the nearest Gaussian's, at which transmittance falls below 0.9, 0.5,
-                   0.1, or 1e30; what is left after the first two falls, what there was before the last two,
-                   and what is left behind all. Not set in tiles without a Gaussian. NULL: nobody asks */
+    ssdgs_light_pixel
+        *light_map; /* a light's: (tiles, 16 micro-tiles, 16 pixels), rows first. NULL: not wanted */
 } ssdgs_splat_view;
 
 typedef struct ssdgs_frame {
@@ -958,6 +964,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
 #define SSDGS__LENGTHS 5    /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
 #define SSDGS__ALPHA_MAX 0.999
+#define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
 #define SSDGS__SHARE \
     ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04    /* Schlick */
@@ -970,14 +977,6 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__MOST_LIGHT 1e30    /* of light_scale */
 #define SSDGS__NEVER ((ssdgs_real)1e30)
 #define SSDGS__MAP_STEPS 3 /* levels of transmittance below which a light's map says where it falls */
-/* A map's pixel: distances of the steps, what is left after the first of them, what there was before the
-   others, and behind all */
-enum {
-    SSDGS__LEFT = SSDGS__MAP_STEPS,
-    SSDGS__BEFORE = 2 * SSDGS__MAP_STEPS - 1,
-    SSDGS__BEHIND = 3 * SSDGS__MAP_STEPS - 2,
-    SSDGS__MAP_VALUES
-};
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
 #define SSDGS__LAYERS \
@@ -1024,8 +1023,8 @@ typedef struct ssdgs__tile {
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
-    int cue, flux, orthographic; /* whether the light pass finds them */
-    ssdgs_real *light_map;       /* of the tile in a light's map, or NULL */
+    int cue, flux, orthographic;  /* whether the light pass finds them */
+    ssdgs_light_pixel *light_map; /* of the tile, or NULL */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -1202,12 +1201,12 @@ static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned b
                                   unsigned char *level) {
     for (; bits; bits &= bits - 1) {
         const int lane = ssdgs__lowest_bit(bits);
-        ssdgs_real *at = tile->light_map + (16 * micro + lane) * SSDGS__MAP_VALUES;
+        ssdgs_light_pixel *at = tile->light_map + 16 * micro + lane;
         int l = level[lane];
         for (; l < SSDGS__MAP_STEPS && left[lane] < ssdgs__map_level[l]; l++) {
-            at[l] = distance;
-            if (l < SSDGS__MAP_STEPS - 1) at[SSDGS__LEFT + l] = left[lane];
-            if (l) at[SSDGS__BEFORE + l - 1] = t[lane];
+            at->distance[l] = distance;
+            if (l < SSDGS__MAP_STEPS - 1) at->left[l] = left[lane];
+            if (l) at->before[l - 1] = t[lane];
         }
         level[lane] = (unsigned char)l;
         next[lane] = l < SSDGS__MAP_STEPS ? ssdgs__map_level[l] : -1;
@@ -1218,9 +1217,9 @@ static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned b
 static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *levels,
                                  const ssdgs_real *transmittance) {
     for (int i = 0; i < 256; i++) {
-        ssdgs_real *at = tile->light_map + i * SSDGS__MAP_VALUES;
-        for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) at[l] = SSDGS__NEVER;
-        at[SSDGS__BEHIND] = transmittance[i];
+        ssdgs_light_pixel *at = tile->light_map + i;
+        for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) at->distance[l] = SSDGS__NEVER;
+        at->behind = transmittance[i];
     }
 }
 
@@ -2307,11 +2306,13 @@ SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model) {
 /* ---- one Gaussian in physical units ---- */
 
 /* log(e^x - 1): what softplus makes x of; -20 for 0. */
-static double ssdgs__softplus_inverse(double x) { return x < 2.1e-9 ? -20 : x > 30 ? x : log(expm1(x)); }
+static double ssdgs__softplus_inverse(double x) {
+    return x < 2.1e-9 ? -SSDGS__MOST_RAW : x > 30 ? x : log(expm1(x));
+}
 
 static double ssdgs__logit(double x) {
     const double raw = log(x) - log1p(-x);
-    return raw < -20 ? -20 : raw > 20 ? 20 : raw;
+    return raw < -SSDGS__MOST_RAW ? -SSDGS__MOST_RAW : raw > SSDGS__MOST_RAW ? SSDGS__MOST_RAW : raw;
 }
 
 /* The unit quaternion that turns the z axis into a direction; the identity for 0 0 0. */
@@ -2726,7 +2727,7 @@ static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint,
         const ssdgs_real s = p[(size_t)j * g->stride];
         usable = usable && s < 20;
         largest = s > largest ? s : largest;
-        *log_scale += (double)(s > -20 ? s : -20) / 3;
+        *log_scale += (double)(s > -SSDGS__MOST_RAW ? s : -SSDGS__MOST_RAW) / 3;
     }
     if (!usable) return 0;
     const double reach = (double)(3 * ssdgs__exp_scalar(largest));
@@ -3003,7 +3004,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
             ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
             !(frame->terms & ~cache->terms &
-              (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for falls */
+              (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for light maps */
     for (int i = 0; known && i < frame->light_count; i++) {
         known = frame->lights[i].kind == lights[i].kind;
         for (int j = 0; j < 3; j++)
@@ -3522,7 +3523,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
-    t.light_map = v->light_map ? v->light_map + (size_t)index * 256 * SSDGS__MAP_VALUES : NULL;
+    t.light_map = v->light_map ? v->light_map + (size_t)index * 256 : NULL;
     return t;
 }
 
@@ -3602,8 +3603,8 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->light_map = NULL;
             if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
-                SSDGS__RESERVE(m->light_map, v->light_map, ssdgs_real,
-                               (size_t)(v->tiles_x * v->tiles_y) * 256 * SSDGS__MAP_VALUES);
+                SSDGS__RESERVE(m->light_map, v->light_map, ssdgs_light_pixel,
+                               (size_t)(v->tiles_x * v->tiles_y) * 256);
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
@@ -4709,19 +4710,19 @@ typedef struct ssdgs__composite_job {
 static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
                                               ssdgs_real thick) {
     const int tile = (y >> 4) * map->tiles_x + (x >> 4);
-    const ssdgs_real *steps = map->light_map + ((size_t)tile * 256 + (size_t)((y & 12) << 4 | (x & 12) << 2 |
-                                                                              (y & 3) << 2 | (x & 3))) *
-                                                   SSDGS__MAP_VALUES;
+    const ssdgs_light_pixel *at =
+        map->light_map + (size_t)tile * 256 + ((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3));
     int level = 0;
     if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
-    for (int i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > steps[i];
+    for (int i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > at->distance[i];
     if (!level) return 1;
-    if (level == SSDGS__MAP_STEPS) return steps[SSDGS__BEHIND];
-    const ssdgs_real left = steps[SSDGS__LEFT + level - 1];
-    const ssdgs_real begin =
-        steps[level] - thick > steps[level - 1] ? steps[level] - thick : steps[level - 1];
+    if (level == SSDGS__MAP_STEPS) return at->behind;
+    const ssdgs_real left = at->left[level - 1];
+    const ssdgs_real begin = at->distance[level] - thick > at->distance[level - 1]
+                                 ? at->distance[level] - thick
+                                 : at->distance[level - 1];
     if (distance <= begin) return left;
-    return left + (steps[SSDGS__BEFORE + level - 1] - left) * (distance - begin) / (steps[level] - begin);
+    return left + (at->before[level - 1] - left) * (distance - begin) / (at->distance[level] - begin);
 }
 
 /* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
@@ -6150,15 +6151,16 @@ static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
 /* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite,
    infinity, NaN. */
 static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
-    const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, twenty = 0x41a00000u, one = 0x3f800000u;
+    const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, most = 0x41a00000u /* SSDGS__MOST_RAW, 20 */,
+                   one = 0x3f800000u;
     for (int i = 0; i < planes; i++) {
         const int clamped =
             i >= SSDGS_LOG_SCALE && i <= SSDGS_OPACITY; /* scales and opacity may be infinite */
         if ((words[i] & ~sign) >= infinity + (uint32_t)clamped) return stats->dropped++, 0;
     }
     for (int i = SSDGS_LOG_SCALE; i <= SSDGS_OPACITY; i++) {
-        if ((words[i] & ~sign) <= twenty) continue;
-        words[i] = (words[i] & sign) | twenty;
+        if ((words[i] & ~sign) <= most) continue;
+        words[i] = (words[i] & sign) | most;
         ++*(i == SSDGS_OPACITY ? &stats->clamped_opacities : &stats->clamped_scales);
     }
     for (int i = SSDGS_ROTATION; i <= SSDGS_FRAME && i < planes; i += SSDGS_FRAME - SSDGS_ROTATION) {
@@ -8688,7 +8690,9 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     /* a light's map inside of the scene: the more Gaussians the smaller they are */
     double map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
     if (settings->light_map_size) map = settings->light_map_size;
-    if (layers > 1) fixed += 6 * SSDGS__MAP_VALUES * (size_t)(map * map) + 2 * (size_t)width * (size_t)height;
+    if (layers > 1)
+        fixed += 6 * (sizeof(ssdgs_light_pixel) / sizeof(ssdgs_real)) * (size_t)(map * map) +
+                 2 * (size_t)width * (size_t)height;
     if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
     fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
     return fixed + fixed / 8;
@@ -9522,7 +9526,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
         raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
     for (int i = 0; i < 3; i++) {
         V log_scale = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
-        p->s[i] = VEXP(VMAX(VSET(-20), VMIN(VSET(20), log_scale)));
+        p->s[i] = VEXP(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), log_scale)));
         p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]),
                              p->x[0], p->x[1], p->x[2]),
                        VSET(k->view[4 * i + 3]));
@@ -9558,7 +9562,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     }
     p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
     p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));
-    p->opacity = F(sigmoid)(VMAX(VSET(-20), VMIN(VSET(20), p->opacity)));
+    p->opacity = F(sigmoid)(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), p->opacity)));
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
@@ -9679,7 +9683,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                 dm1 = VADD(dm1, push1);
                 ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));
             }
-            VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(20)), ds, VSET(0))));
+            VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), ds, VSET(0))));
             dm0 = VMUL(dm0, p.s[j]);
             dm1 = VMUL(dm1, p.s[j]);
             for (int l = 0; l < 3; l++) {
@@ -9697,7 +9701,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
             R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
             V raw = VLOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
-            V logit = VSEL(VLT(VABS(raw), VSET(20)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
+            V logit =
+                VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
             VSTORE(d, VADD(VLOAD(d), logit));
         }
         V dt[3];
