@@ -112,17 +112,15 @@ FILES
   complete.
 
 OUTLINES
-  Photographs should be transparent where the object is not. They show outlines where more than a hundredth
-  of the picture, but not all, is wholly transparent; of eight or more those are left out that contradict
-  the others. prune_outside removes Gaussians outside of them. Where too few are transparent, borders
-  decide: of the colour of options.background they are empty, and Gaussians of that colour fade; else all
-  that is shown is opaque. A note says which.
+  Photographs should be transparent where the object is not. Where a hundredth of one, but not all, is wholly
+  transparent it shows an outline; of eight or more those that contradict the others are left out. Where too
+  few are transparent, borders decide: of the colour of options.background they are empty, and Gaussians of
+  that colour fade; else all that is shown is opaque. A note says which.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.001 dB against
-  photographs where it was measured, _fast() less than 0.1 dB. Left out without changing a bit: what no
-  pixel blends, neurons that are 0 for 64 neighbours, planes and terms nobody asked for, and what the last
-  frame found where model, camera or lights are the same. `make bench` measures all of it.
+  photographs where it was measured, _fast() less than 0.1 dB. Left out without changing a bit: what no pixel
+  blends, neurons that are 0 for 64 neighbours, terms nobody asked for, and what the last frame has.
 
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
@@ -598,7 +596,8 @@ extern "C" {
 /* The first plane of each of a Gaussian's raw parameters. */
 enum {
     SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11,
-    SSDGS_SPECULAR = 14, SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32, SSDGS_CHANNELS = 38
+    SSDGS_SPECULAR = 14, SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32,
+    SSDGS_CHANNELS = 38
 };
 /* clang-format on */
 
