@@ -1192,15 +1192,14 @@ static void look_at_machine(bench *b) {
 
 static const char *const help[] = {
     "usage: bench [OPTION...] [DATASET DEFAULT.ply PUBLISHED.ply]",
-    "Measures this machine: peak arithmetic, every stage and instruction set, frames of both models with "
-    "every",
-    "shortcut, scaling with pixels and Gaussians, training. Writes bench.json and bench.svg beside the "
-    "program.",
+    "Measures this machine: peak arithmetic, every stage and instruction set, frames of both models",
+    "with every shortcut, scaling with pixels and Gaussians, training. Writes bench.json and bench.svg",
+    "beside the program.",
     "",
     "  --quick       about a minute: fewer views, the best instruction set alone",
     "  --models DIR  where waxcow.ply and waxcow_published.ply are; build/demo",
-    "  DATASET ...   another dataset, with models of the default and the published networks; "
-    "examples/data/waxcow"};
+    "  DATASET ...   another dataset, with models of the default and the published networks;",
+    "                examples/data/waxcow"};
 
 int main(int argc, char **argv) {
     static bench b;

@@ -21,18 +21,19 @@ static const char *const option_names[OPTION_COUNT] = {"--split",    "--out",   
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
-    "Renders a model in the views and lights of a dataset's frames to PNG. Where frames have photographs, "
-    "prints how",
-    "near it comes to them and writes that to DIR/metrics.json. No file that is read is replaced.",
+    "Renders a model in the views and lights of a dataset's frames to PNG. Where frames have",
+    "photographs, prints how near it comes to them and writes that to DIR/metrics.json. No file that is",
+    "read is replaced.",
     "",
     "  --out DIR                where the images go",
     "  --split NAME             test (default), train or valid: the frames of transforms_NAME.json",
     "  --background COLOUR      black (default) or white",
     "  --components             also writes each term, shadow, normal, depth and alpha",
-    "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms, shadow, "
-    "normal",
+    "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
+    "                           shadow, normal",
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
-    "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped them",
+    "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped",
+    "                           them",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
     "  --isa NAME               scalar, sse2, avx2, avx512 or neon; the best that this machine has"};
 

@@ -48,16 +48,19 @@ static const char *const help[] = {
     "",
     "  -o MODEL.ply             the model",
     "  --iterations N           20000, published 60000; the schedule scales with it",
-    "  --background COLOUR      black (default) or white: behind transparent pixels, around opaque objects",
+    "  --background COLOUR      black (default) or white: behind transparent pixels, around opaque",
+    "                           objects",
     "  --preset NAME            default, or published: the paper's model, order of terms, density control",
-    "  --transfer NAME          srgb: shade in linear light (default); none: fit stored values (published)",
-    "  --schedule NAME          order of the terms: merged (default), progressive (published), joint, "
-    "swapped",
+    "  --transfer NAME          srgb: shade in linear light (default); none: fit stored values",
+    "                           (published)",
+    "  --schedule NAME          order of the terms: merged (default), progressive (published), joint,",
+    "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
     "  --refine                 also fits camera poses and light positions, into MODEL.ply.refined.json",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again",
-    "  --points N               random points at the start, of which those outside of the outlines go; 10000",
+    "  --points N               random points at the start, of which those outside of the outlines go;",
+    "                           10000",
     "  --max-gaussians N        at most so many Gaussians; 100000",
     "  --train-json FILE        another list of frames in DATASET; transforms_train.json",
     "  --seed N                 of the random numbers; 1",
@@ -66,27 +69,24 @@ static const char *const help[] = {
     "  --set bounds_min=X,Y,Z   the box that holds the object, in the dataset's units; -0.5,-0.5,-0.5",
     "  --set bounds_max=X,Y,Z   its other corner; 0.5,0.5,0.5",
     "  --set NAME=VALUE         a number of ssdgs_settings or ssdgs_train_options; may be repeated",
-    "  --set NAME=START,END     a learning rate's first and last value; the names, which ssdgs.h explains:"};
+    "  --set NAME=START,END     a learning rate's first and last value; the names, which ssdgs.h",
+    "                           explains:"};
 static const char *const help_end[] = {
     "",
-    "Photographs should be transparent where the object is not, by their alpha or a mask_path. Opaque ones "
-    "whose",
-    "borders have the colour of --background are taken to show it, and Gaussians of that colour fade",
-    "(--set prune_outside=0 keeps them); all that other opaque photographs show is taken for opaque. "
-    "Exposures",
-    "may differ where the lights' intensities tell it. What is clipped at full white may have been brighter.",
+    "Photographs should be transparent where the object is not, by their alpha or a mask_path. Opaque",
+    "ones whose borders have the colour of --background are taken to show it, and Gaussians of that",
+    "colour fade (--set prune_outside=0 keeps them); all that other opaque photographs show is taken",
+    "for opaque. Exposures may differ where the lights' intensities tell it. What is clipped at full",
+    "white may have been brighter.",
     "",
-    "Notes tell what cannot be right or cannot work: a camera whose axes, lens or pose is wrong, lights that "
-    "the",
-    "shading contradicts, cameras or lights that all stand in one place or move together, masks that "
-    "contradict",
-    "the others (they are left out), colours multiplied by alpha, an object that the box does not hold.",
+    "Notes tell what cannot be right or cannot work: a camera whose axes, lens or pose is wrong, lights",
+    "that the shading contradicts, cameras or lights that all stand in one place or move together,",
+    "masks that contradict the others (they are left out), colours multiplied by alpha, an object that",
+    "the box does not hold.",
     "",
-    "--refine tests with and without fitting the test views' poses and lights. Training anew with "
-    "--train-json and",
-    "the refined list, moved into DATASET, gains up to 0.4 dB. No file of the dataset is ever replaced, nor "
-    "is the",
-    "checkpoint of a run that is further than this one will get."};
+    "--refine tests with and without fitting the test views' poses and lights. Training anew with",
+    "--train-json and the refined list, moved into DATASET, gains up to 0.4 dB. No file of the dataset",
+    "is ever replaced, nor is the checkpoint of a run that is further than this one will get."};
 
 static int usage(const char *problem, const char *what) {
     fprintf(stderr, "train: %s %s\nusage: train DATASET -o MODEL.ply [OPTION...]; train --help lists them\n",
