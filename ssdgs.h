@@ -8683,9 +8683,9 @@ SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_
     const size_t per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) +
                                                       layout.size / SSDGS__BLOCK) +
                                 160;
-    size_t fixed =
-        SSDGS__SLOTS * (layout.scratch + 16 * (6 + 12 * SSDGS_ASG_COUNT) + 2 * first[SSDGS__GLOBAL_GROUPS]) +
-        6 * first[SSDGS__GLOBAL_GROUPS] + (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
+    size_t fixed = SSDGS__SLOTS * (layout.scratch + 16 * SSDGS__LANE_SUMS + 2 * first[SSDGS__GLOBAL_GROUPS]) +
+                   6 * first[SSDGS__GLOBAL_GROUPS] +
+                   (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
     /* a light's map inside of the scene: the more Gaussians the smaller they are */
     double map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
     if (settings->light_map_size) map = settings->light_map_size;
@@ -10505,7 +10505,7 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, cons
 }
 
 /* One basis at the local half vector h (eq. 12). b: x, y, z axes (9), lambda, mu. With dh NULL only the
-   value; else also the exponent's derivatives: to h (3), and to the basis row (11). */
+   value; else also the exponent's derivatives: to h (3), and to the x axis, the y axis, lambda and mu (8). */
 SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
     const V x = VDOT3(VSET(b[0]), VSET(b[1]), VSET(b[2]), h[0], h[1], h[2]);
     const V y = VDOT3(VSET(b[3]), VSET(b[4]), VSET(b[5]), h[0], h[1], h[2]);
@@ -10516,10 +10516,9 @@ SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
             dh[i] = VFMA(dx, VSET(b[i]), VMUL(dy, VSET(b[3 + i])));
             db[i] = VMUL(dx, h[i]);
             db[3 + i] = VMUL(dy, h[i]);
-            db[6 + i] = VSET(0);
         }
-        db[9] = VNEG(VMUL(x, x));
-        db[10] = VNEG(VMUL(y, y));
+        db[6] = VNEG(VMUL(x, x));
+        db[7] = VNEG(VMUL(y, y));
     }
     return value;
 }
@@ -10570,15 +10569,15 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         if (k->specular && !k->deferred)
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
-                  de[3], db[11];
+                  de[3], db[8];
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
                 const V lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
                 d = VFMA(weight, lobe, d);
                 VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
                 const V push = VMUL(VMUL(dlobe, weight), lobe);
                 for (int i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
-                for (int i = 0; i < 11; i++) {
-                    R *sum = lane_sums + (6 + 12 * j + i) * 16 + s % 16;
+                for (int i = 0; i < 8; i++) { /* the z axis, rows 6 to 8, has no part in it */
+                    R *sum = lane_sums + (6 + 12 * j + (i < 6 ? i : i + 3)) * 16 + s % 16;
                     VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
                 }
             }
