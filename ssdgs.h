@@ -274,20 +274,23 @@ typedef struct ssdgs_settings {
     int dipole;   /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
     int asg;      /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
     int per_channel_optics;   /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
-    int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies */
+    int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies; 0 */
     int transport;            /* 1: it also sees what true dipole transport brings from where light enters */
     int residual_shadow;      /* 1: the shadow network corrects the logit of eq. 7; 0: its output is S */
     int shadow_on_scattering; /* 1: eq. 14, the paper's ablation: S darkens scattering too */
-    int scattering_layers;    /* linear layers of the scattering network, 2 .. SSDGS_MAX_LAYERS */
-    int scattering_width;     /* neurons of its hidden layers, up to SSDGS_MAX_WIDTH */
-    int view_octaves;         /* 0 .. 8: of the sines of wo that it sees; many overfit */
-    int light_octaves;        /* 0 .. 8: of the sines of wi */
-    int shadow_layers;        /* linear layers of the shadow network; 0 = none: S is eq. 7's transmittance */
-    int shadow_width;         /* neurons of its hidden layers */
-    int light_blur;           /* ssdgs_blur of the light pass: 0.3 px^2 added, or a floor of 0.2 px^2 */
-    int light_map_size;       /* px a side; 0 = such that a typical Gaussian is one pixel wide */
-    ssdgs_real light_bias; /* length units: what is nearer to the light by less casts no shadow. Models made
-                              in code: three standard deviations of their Gaussians */
+    struct {
+        int layers; /* linear ones, 2 .. SSDGS_MAX_LAYERS; shadow 0 = none: S is eq. 7's transmittance */
+        int width;  /* neurons of the hidden layers, up to SSDGS_MAX_WIDTH */
+    } scattering, shadow; /* the two networks */
+    struct {
+        int view, light;
+    } octaves; /* 0 .. 8: of the sines of wo and wi that the scattering network sees; many overfit */
+    struct {
+        int blur;        /* ssdgs_blur: 0.3 px^2 added, or a floor of 0.2 px^2 */
+        int size;        /* px a side; 0 = such that a typical Gaussian is one pixel wide */
+        ssdgs_real bias; /* length units: what is nearer to the light by less casts no shadow. Models made in
+                            code: three standard deviations of their Gaussians */
+    } light_map;
     ssdgs_real pixel_variance; /* px^2, 0.01 .. 10: added to a splat's in the camera pass */
     ssdgs_real eta;            /* index of refraction, 1 .. 2.5 */
     ssdgs_real centre[3];      /* world: origin of the networks' positions */
@@ -397,8 +400,7 @@ typedef struct ssdgs_render_options {
     ssdgs_real background[3];   /* linear; settings.transfer none: as stored */
     ssdgs_real stop;            /* a pixel is done when its transmittance is below this; 0 = never */
     ssdgs_real alpha_threshold; /* a splat is not drawn at pixels where its alpha is below this */
-    ssdgs_real
-        max_error; /* skips shading Gaussians whose weights sum to less than this in every pixel; 0 = none */
+    ssdgs_real max_error;    /* Gaussians whose weights sum to less in every pixel are not shaded; 0 = none */
     ssdgs_real light_detail; /* resolution of the light maps; 1 = the model's choice */
 } ssdgs_render_options;
 
@@ -454,12 +456,11 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
 typedef enum ssdgs_pixels {
     SSDGS_PIXELS_RGBA8 = 0,
     SSDGS_PIXELS_RGBA16
-} ssdgs_pixels; /* native-endian 16 bit */
+} ssdgs_pixels; /* 16: native-endian */
 typedef struct ssdgs_photo {
     ssdgs_camera camera;
     ssdgs_light light;
-    const void *pixels; /* (h,w,4) tightly packed, straight alpha, stored values; the caller's, must outlive
-                           the trainer */
+    const void *pixels; /* (h,w,4) packed, straight alpha, stored values; must outlive the trainer */
     ssdgs_pixels format;
 } ssdgs_photo;
 
@@ -499,10 +500,9 @@ typedef struct ssdgs_train_options {
     int densify_until;       /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
     int refine;              /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
-    ssdgs_real background[3]; /* stored values: what opaque photographs show around the object; black */
-    ssdgs_real dssim;         /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
-    ssdgs_real
-        normal_weight; /* deferred: weight of the blended normals' distance to those of the depth; 0.05 */
+    ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
+    ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
+    ssdgs_real normal_weight;    /* deferred: weight of blended normals' distance to the depth's; 0.05 */
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* a Gaussian pulled harder is cloned or split, in half images; 4e-4 */
@@ -510,14 +510,13 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
     ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
                                   removed, see OUTLINES in the manual; 0.02 */
-    ssdgs_real
-        adam_epsilon; /* Adam's, relative to the gradient of a one-byte error in one pixel; 0.1; 0 = 1e-15 */
+    ssdgs_real adam_epsilon;   /* of the gradient of a one-byte error in one pixel; 0.1; 0 = 1e-15 */
     ssdgs_rates rates;
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
-SSDGS_API ssdgs_train_options
-ssdgs_train_options_published(void); /* the paper's order, density control and length */
+/* The paper's order, density control and length. */
+SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 
 typedef struct ssdgs_train_stats {
     int iteration; /* done so far */
@@ -547,10 +546,6 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
 /* Camera and light of photograph `index` as refined so far. */
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
                                              ssdgs_light *light);
-/* About how many bytes a run will hold at max_gaussians, photographs not counted; 0 for what would be
-   refused. */
-SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
-                                    int width, int height);
 
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
@@ -2020,7 +2015,7 @@ enum {
 
 /* Whether positions are in a length unit, which the paper's form does not have. */
 static int ssdgs__has_unit(const ssdgs_settings *s) {
-    return s->depth_cue || s->residual_shadow || s->transport || s->light_bias > 0;
+    return s->depth_cue || s->residual_shadow || s->transport || s->light_map.bias > 0;
 }
 
 /* A counter-based generator: the value depends on the key and the counter alone, never on the order of
@@ -2040,12 +2035,12 @@ static double ssdgs__uniform(uint64_t key, uint64_t counter) { /* [0, 1) */
 
 /* Layer sizes, inputs first; returns the number of linear layers. */
 static int ssdgs__network_sizes(const ssdgs_settings *settings, int shadow, int sizes[SSDGS_MAX_LAYERS + 1]) {
-    const int layers = shadow ? settings->shadow_layers : settings->scattering_layers;
+    const int layers = shadow ? settings->shadow.layers : settings->scattering.layers;
     sizes[0] = shadow ? 21 + 21 + 1 + SSDGS_MATERIAL_COUNT
-                      : 27 + 3 * (1 + 2 * settings->view_octaves) + 3 * (1 + 2 * settings->light_octaves) +
+                      : 27 + 3 * (1 + 2 * settings->octaves.view) + 3 * (1 + 2 * settings->octaves.light) +
                             3 + SSDGS_MATERIAL_COUNT + (settings->depth_cue ? 9 : 0) +
                             (settings->transport ? SSDGS__LENGTHS : 0);
-    for (int i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow_width : settings->scattering_width;
+    for (int i = 1; i < layers; i++) sizes[i] = shadow ? settings->shadow.width : settings->scattering.width;
     if (layers) sizes[layers] = shadow ? 1 : settings->per_channel_optics ? 7 : 3;
     return layers;
 }
@@ -2075,14 +2070,14 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.terms = SSDGS_ALL_TERMS;
     s.transfer = SSDGS_TRANSFER_SRGB;
     s.asg = SSDGS_ASG_DEFERRED;
-    s.per_channel_optics = s.depth_cue = s.transport = s.residual_shadow = 1;
-    s.scattering_layers = 3;
-    s.scattering_width = 64;
-    s.light_octaves = 1;
-    s.shadow_layers = 4;
-    s.shadow_width = 32;
-    s.light_blur = SSDGS_BLUR_FLOOR;
-    s.light_bias = (ssdgs_real)0.06;
+    s.per_channel_optics = s.transport = s.residual_shadow = 1;
+    s.scattering.layers = 3;
+    s.scattering.width = 64;
+    s.octaves.light = 1;
+    s.shadow.layers = 4;
+    s.shadow.width = 32;
+    s.light_map.blur = SSDGS_BLUR_FLOOR;
+    s.light_map.bias = (ssdgs_real)0.06;
     s.pixel_variance = (ssdgs_real)0.1;
     s.eta = (ssdgs_real)1.3;
     s.length_unit = (ssdgs_real)0.5;
@@ -2094,12 +2089,12 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     ssdgs_settings s = ssdgs_settings_default();
     s.transfer = SSDGS_TRANSFER_NONE;
     s.asg = SSDGS_ASG_GEOMETRIC;
-    s.per_channel_optics = s.depth_cue = s.transport = s.residual_shadow = 0;
-    s.scattering_layers = 6;
-    s.scattering_width = 256;
-    s.view_octaves = s.light_octaves = 4;
-    s.light_blur = SSDGS_BLUR_ADD;
-    s.light_bias = 0;
+    s.per_channel_optics = s.transport = s.residual_shadow = 0;
+    s.scattering.layers = 6;
+    s.scattering.width = 256;
+    s.octaves.view = s.octaves.light = 4;
+    s.light_map.blur = SSDGS_BLUR_ADD;
+    s.light_map.bias = 0;
     s.pixel_variance = (ssdgs_real)0.3;
     s.length_unit = 1;
     return s;
@@ -2131,15 +2126,15 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(transport, 0, 1);
     SSDGS__RANGE(residual_shadow, 0, 1);
     SSDGS__RANGE(shadow_on_scattering, 0, 1);
-    SSDGS__RANGE(scattering_layers, 2, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(scattering_width, 1, SSDGS_MAX_WIDTH);
-    SSDGS__RANGE(view_octaves, 0, 8);
-    SSDGS__RANGE(light_octaves, 0, 8);
-    SSDGS__RANGE(shadow_layers, 0, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(shadow_width, 1, SSDGS_MAX_WIDTH);
-    SSDGS__RANGE(light_blur, 0, SSDGS_BLUR_FLOOR);
-    SSDGS__RANGE(light_map_size, 0, 8192);
-    SSDGS__RANGE(light_bias, 0, (ssdgs_real)1e30);
+    SSDGS__RANGE(scattering.layers, 2, SSDGS_MAX_LAYERS);
+    SSDGS__RANGE(scattering.width, 1, SSDGS_MAX_WIDTH);
+    SSDGS__RANGE(octaves.view, 0, 8);
+    SSDGS__RANGE(octaves.light, 0, 8);
+    SSDGS__RANGE(shadow.layers, 0, SSDGS_MAX_LAYERS);
+    SSDGS__RANGE(shadow.width, 1, SSDGS_MAX_WIDTH);
+    SSDGS__RANGE(light_map.blur, 0, SSDGS_BLUR_FLOOR);
+    SSDGS__RANGE(light_map.size, 0, 8192);
+    SSDGS__RANGE(light_map.bias, 0, (ssdgs_real)1e30);
     SSDGS__RANGE(pixel_variance, (ssdgs_real)0.01, 10);
     SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
     SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
@@ -2843,7 +2838,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
     if (light->kind == SSDGS_LIGHT_DIRECTIONAL) distance = 1e30;
     const int faces = distance > 1.3 * radius ? 1 : 6;
     if (!views) return faces;
-    int map = settings->light_map_size;
+    int map = settings->light_map.size;
     if (!map) {
         const double size = 2 * radius / exp(b->log_scale);
         map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
@@ -2855,9 +2850,9 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         memset(v, 0, sizeof *v);
         v->light = index;
         v->width = v->height = map;
-        v->blur = settings->light_blur;
+        v->blur = settings->light_map.blur;
         v->variance = (ssdgs_real)(v->blur == SSDGS_BLUR_FLOOR ? 0.2 : 0.3);
-        v->compensate = settings->light_blur == SSDGS_BLUR_FLOOR;
+        v->compensate = settings->light_map.blur == SSDGS_BLUR_FLOOR;
         v->cx = v->cy = (ssdgs_real)map / 2;
         double direction[3], eye[3], f;
         if (faces == 6) {
@@ -3045,7 +3040,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
     k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
     k.residual_shadow = s->residual_shadow;
-    k.refined_shadow = s->shadow_layers > 0;
+    k.refined_shadow = s->shadow.layers > 0;
     k.per_channel_optics = s->per_channel_optics;
     k.shadow_on_scattering = s->shadow_on_scattering;
     k.deferred = frame->layer_count > 0;
@@ -3514,7 +3509,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.log2_threshold = ssdgs__log2_threshold(frame);
     t.stop = frame->options.stop;
     t.max_error = frame->options.max_error;
-    t.bias = frame->settings.light_bias * frame->settings.length_unit;
+    t.bias = frame->settings.light_map.bias * frame->settings.length_unit;
     t.depth_origin = ssdgs__nearest(v);
     t.cx = v->cx;
     t.cy = v->cy;
@@ -4156,7 +4151,8 @@ typedef struct ssdgs__input {
 static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
                          ssdgs__input inputs[7]) {
     const size_t b = SSDGS__BLOCK;
-    const int scaled = shadow ? frame->settings.residual_shadow : frame->settings.depth_cue;
+    const ssdgs_settings *s = &frame->settings;
+    const int scaled = shadow ? s->residual_shadow : s->depth_cue || s->transport;
     const ssdgs_real inverse_unit = 1 / frame->settings.length_unit;
     int n = 0, row = 0;
 #define SSDGS__INPUT(width, depth, factor, place, own) \
@@ -4167,8 +4163,8 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
         row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
     } while (0)
     SSDGS__INPUT(3, shadow ? 3 : 4, scaled ? inverse_unit : 1, b * SSDGS_POSITION, 1);
-    if (!shadow) SSDGS__INPUT(3, frame->settings.view_octaves, 1, b * SSDGS__WO, 0);
-    SSDGS__INPUT(3, shadow ? 3 : frame->settings.light_octaves, 1, b * SSDGS__WI, 0);
+    if (!shadow) SSDGS__INPUT(3, frame->settings.octaves.view, 1, b * SSDGS__WO, 0);
+    SSDGS__INPUT(3, shadow ? 3 : frame->settings.octaves.light, 1, b * SSDGS__WI, 0);
     if (shadow) SSDGS__INPUT(1, -1, 1, l->visibility, 0);
     else SSDGS__INPUT(3, -1, 1, b * SSDGS__NORMAL, 0);
     SSDGS__INPUT(SSDGS_MATERIAL_COUNT, -1, 1, b * SSDGS_MATERIAL, 1);
@@ -4758,7 +4754,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     const ssdgs__tile *tile, const ssdgs_real *layers,
                                     ssdgs_real *visibility) {
     const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
-    const ssdgs_real bias = (frame->settings.light_bias + rounding) * frame->settings.length_unit;
+    const ssdgs_real bias = (frame->settings.light_map.bias + rounding) * frame->settings.length_unit;
     int first = 1; /* views are in the order of lights */
     while (first < frame->view_count && frame->views[first].light < light) first++;
     for (int i = 0; i < 256; i++) {
@@ -5605,8 +5601,9 @@ typedef struct ssdgs__ply_field {
 
 #define SSDGS__V(stem, count, word) \
     { SSDGS__PLY_VERTEX, stem, count, word, 0 }
-#define SSDGS__I(member) \
-    { SSDGS__PLY_SETTINGS, #member, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1 }
+#define SSDGS__IN(stem, member) \
+    { SSDGS__PLY_SETTINGS, stem, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1 }
+#define SSDGS__I(member) SSDGS__IN(#member, member)
 #define SSDGS__R(stem, count, member) \
     { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0 }
 #define SSDGS__G(kind, stem, count, group) \
@@ -5643,15 +5640,15 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__I(transport),
     SSDGS__I(residual_shadow),
     SSDGS__I(shadow_on_scattering),
-    SSDGS__I(scattering_layers),
-    SSDGS__I(scattering_width),
-    SSDGS__I(view_octaves),
-    SSDGS__I(light_octaves),
-    SSDGS__I(shadow_layers),
-    SSDGS__I(shadow_width),
-    SSDGS__I(light_blur),
-    SSDGS__I(light_map_size),
-    SSDGS__R("light_bias", 0, light_bias),
+    SSDGS__IN("scattering_layers", scattering.layers),
+    SSDGS__IN("scattering_width", scattering.width),
+    SSDGS__IN("view_octaves", octaves.view),
+    SSDGS__IN("light_octaves", octaves.light),
+    SSDGS__IN("shadow_layers", shadow.layers),
+    SSDGS__IN("shadow_width", shadow.width),
+    SSDGS__IN("light_blur", light_map.blur),
+    SSDGS__IN("light_map_size", light_map.size),
+    SSDGS__R("light_bias", 0, light_map.bias),
     SSDGS__R("pixel_variance", 0, pixel_variance),
     SSDGS__R("eta", 0, eta),
     SSDGS__R("centre_", 3, centre),
@@ -5664,6 +5661,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET),
     SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)};
 #undef SSDGS__V
+#undef SSDGS__IN
 #undef SSDGS__I
 #undef SSDGS__R
 #undef SSDGS__G
@@ -6098,8 +6096,8 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
         double before;
     } added[ADDED] = {
         /* settings of later files, and what held before them */
-        {offsetof(ssdgs_settings, transport), 0, 0},     {offsetof(ssdgs_settings, view_octaves), 0, 4},
-        {offsetof(ssdgs_settings, light_octaves), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
+        {offsetof(ssdgs_settings, transport), 0, 0},     {offsetof(ssdgs_settings, octaves.view), 0, 4},
+        {offsetof(ssdgs_settings, octaves.light), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
         {offsetof(ssdgs_settings, origin), 0, 0},        {offsetof(ssdgs_settings, origin), 1, 0},
         {offsetof(ssdgs_settings, origin), 2, 0}};
     int next = 0;
@@ -8652,51 +8650,6 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
     return SSDGS_OK;
 }
 
-SSDGS_API size_t ssdgs_train_memory(const ssdgs_settings *settings, const ssdgs_train_options *options,
-                                    int width, int height) {
-    if (!settings || settings->baked || !options || width < 1 || height < 1 || width > SSDGS__MAX_SIDE ||
-        height > SSDGS__MAX_SIDE || ssdgs__settings_check(NULL, settings) ||
-        ssdgs__options_check(NULL, options))
-        return 0;
-    ssdgs_frame frame;
-    memset(&frame, 0, sizeof frame);
-    frame.settings = *settings;
-    frame.terms = settings->terms;
-    frame.training = frame.light_count = 1;
-    const size_t layers = settings->asg == SSDGS_ASG_DEFERRED ? SSDGS__LAYERS : 1;
-    ssdgs__block_layout layout = ssdgs__layout(&frame);
-    size_t first[SSDGS__GLOBAL_GROUPS + 1];
-    ssdgs__global_groups(settings, first);
-    const size_t n = (size_t)(options->max_gaussians > 1 ? options->max_gaussians : 1);
-    const size_t points = options->initial_points > 0 && (size_t)options->initial_points < n
-                              ? (size_t)options->initial_points
-                              : n;
-    /* tiles of random points, six standard deviations wide, where the bounds fill the image; later about
-       three */
-    const double across =
-        6 * 0.7181 * pow((double)points, -1.0 / 3) * (width > height ? width : height) / 16 + 1;
-    size_t instances = (size_t)((double)points * across * across);
-    instances = 2 * n + (instances > 3 * n ? instances : 3 * n);
-    const size_t per_instance = sizeof(ssdgs_real) * (8 + 4 * layers) + sizeof(ssdgs_tile_entry) + 12;
-    /* parameters and two moments with a quarter of slack, gradients, splat records of two views,
-       activations */
-    const size_t per_gaussian = sizeof(ssdgs_real) * (5 * SSDGS_CHANNELS + 2 * 9 + 24 + 8 * (layers - 1) +
-                                                      layout.size / SSDGS__BLOCK) +
-                                160;
-    size_t fixed = SSDGS__SLOTS * (layout.scratch + 16 * SSDGS__LANE_SUMS + 2 * first[SSDGS__GLOBAL_GROUPS]) +
-                   6 * first[SSDGS__GLOBAL_GROUPS] +
-                   (33 + 4 * layers) * ((size_t)width + 48) * ((size_t)height + 10);
-    /* a light's map inside of the scene: the more Gaussians the smaller they are */
-    double map = 24 * pow((double)n, 1.0 / 3) < 512 ? 24 * pow((double)n, 1.0 / 3) : 512;
-    if (settings->light_map_size) map = settings->light_map_size;
-    if (layers > 1)
-        fixed += 6 * (sizeof(ssdgs_light_pixel) / sizeof(ssdgs_real)) * (size_t)(map * map) +
-                 2 * (size_t)width * (size_t)height;
-    if (settings->transport) fixed += (SSDGS__LENGTHS + 2) * n + 4 * SSDGS__SOURCES * SSDGS__SLOTS;
-    fixed = fixed * sizeof(ssdgs_real) + per_gaussian * (n + SSDGS__BLOCK) + per_instance * instances;
-    return fixed + fixed / 8;
-}
-
 static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                     const ssdgs_real background[3], ssdgs_real *image,
                                     ssdgs_metrics *metrics) {
@@ -8828,8 +8781,7 @@ static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* F
 typedef struct ssdgs__checkpoint_head {
     char magic[8];
     uint32_t byte_order, version, real_size, fused; /* products and sums rounded once: FMA */
-    uint64_t
-        inputs; /* hash of options, settings' shape, photographs' cameras and lights: what must be the same */
+    uint64_t inputs; /* hash of options, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
     double start_size;
@@ -8870,11 +8822,16 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     return result;
 }
 
-#define SSDGS__SETTINGS_INTS \
-    (offsetof(ssdgs_settings, light_map_size) + sizeof(int) - offsetof(ssdgs_settings, terms))
+/* 1 where two, without the padding between their parts, differ in nothing but what training sets: centre,
+ * length_unit, light_scale, origin. */
+static int ssdgs__settings_alike(const ssdgs_settings *a, const ssdgs_settings *b) {
+    const size_t first =
+                     offsetof(ssdgs_settings, shadow) + sizeof a->shadow - offsetof(ssdgs_settings, terms),
+                 second = offsetof(ssdgs_settings, eta) + sizeof a->eta - offsetof(ssdgs_settings, light_map);
+    return !memcmp(&a->terms, &b->terms, first) && !memcmp(&a->light_map, &b->light_map, second);
+}
 
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
-    const ssdgs_settings *s = &trainer->model->settings;
     const ssdgs_train_options *o = &trainer->options;
     memset(head, 0, sizeof *head);
     memcpy(head->magic, SSDGS__CHECKPOINT_MAGIC, 8);
@@ -8887,9 +8844,6 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
         ssdgs__fold(UINT64_C(0xCBF29CE484222325), o, offsetof(ssdgs_train_options, refine) + sizeof(int));
     head->inputs =
         ssdgs__fold(head->inputs, o->background, sizeof *o - offsetof(ssdgs_train_options, background));
-    head->inputs = ssdgs__fold(head->inputs, &s->terms, SSDGS__SETTINGS_INTS);
-    head->inputs =
-        ssdgs__fold(head->inputs, &s->light_bias, 3 * sizeof s->light_bias); /* pixel_variance, eta */
     for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const ssdgs_camera *camera = &photo->camera;
@@ -8908,7 +8862,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->skipped = trainer->skipped;
     for (int i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
     head->start_size = trainer->start_size;
-    head->settings = *s;
+    head->settings = trainer->model->settings;
 }
 
 /* Copies what a checkpoint begins with; what is wrong, or NULL. */
@@ -9008,8 +8962,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     ssdgs__checkpoint_head head;
     reason = ssdgs__checkpoint_head_of(bytes, size, &head);
     if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
-                    head.inputs != own.inputs ||
-                    memcmp(&head.settings.terms, &own.settings.terms, SSDGS__SETTINGS_INTS)))
+                    head.inputs != own.inputs || !ssdgs__settings_alike(&head.settings, &own.settings)))
         reason = "it belongs to other options, settings or photographs";
     if (!reason &&
         (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||

@@ -949,7 +949,7 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
     session s;
     open_session(b, &s, b->best_isa, 1, 0, NULL);
     printf("\n%s: %d Gaussians, scattering network of %d layers, %d wide\n", path, s.model->count,
-           s.model->settings.scattering_layers, s.model->settings.scattering_width);
+           s.model->settings.scattering.layers, s.model->settings.scattering.width);
     add_facts(b, "gaussians", (double)s.model->count);
     close_session(&s);
     measure_layers(b);

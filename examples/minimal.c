@@ -54,8 +54,8 @@ int main(int argc, char **argv) {
     char error[512] = "";
 
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
-    settings.shadow_layers = 0; /* nothing here is trained */
-    settings.light_bias = 0.2f; /* discs as coarse as these must not shadow their neighbours */
+    settings.shadow.layers = 0;     /* nothing here is trained */
+    settings.light_map.bias = 0.2f; /* discs as coarse as these must not shadow their neighbours */
     memset(&image, 0, sizeof image);
     image.color = color;
 

@@ -107,32 +107,33 @@ typedef struct field {
     int reals, count;
     size_t at;
 } field;
-#define SETTING(reals, count, name) \
-    { #name, IN_SETTINGS, reals, count, offsetof(ssdgs_settings, name) }
+#define PART(reals, name, member) \
+    { #name, IN_SETTINGS, reals, 1, offsetof(ssdgs_settings, member) }
+#define SETTING(reals, name) PART(reals, name, name)
 #define OPTION(reals, count, name) \
     { #name, IN_OPTIONS, reals, count, offsetof(ssdgs_train_options, name) }
 #define RATE(name, member) \
     { #name, IN_OPTIONS, 1, 2, offsetof(ssdgs_train_options, member) }
 #define CORNER(name) \
     { #name, IN_CORNERS, 1, 3, offsetof(corners, name) }
-static const field fields[] = {SETTING(0, 1, dipole),
-                               SETTING(0, 1, asg),
-                               SETTING(0, 1, per_channel_optics),
-                               SETTING(0, 1, depth_cue),
-                               SETTING(0, 1, transport),
-                               SETTING(0, 1, residual_shadow),
-                               SETTING(0, 1, shadow_on_scattering),
-                               SETTING(0, 1, scattering_layers),
-                               SETTING(0, 1, scattering_width),
-                               SETTING(0, 1, view_octaves),
-                               SETTING(0, 1, light_octaves),
-                               SETTING(0, 1, shadow_layers),
-                               SETTING(0, 1, shadow_width),
-                               SETTING(0, 1, light_blur),
-                               SETTING(0, 1, light_map_size),
-                               SETTING(1, 1, light_bias),
-                               SETTING(1, 1, pixel_variance),
-                               SETTING(1, 1, eta),
+static const field fields[] = {SETTING(0, dipole),
+                               SETTING(0, asg),
+                               SETTING(0, per_channel_optics),
+                               SETTING(0, depth_cue),
+                               SETTING(0, transport),
+                               SETTING(0, residual_shadow),
+                               SETTING(0, shadow_on_scattering),
+                               PART(0, scattering_layers, scattering.layers),
+                               PART(0, scattering_width, scattering.width),
+                               PART(0, view_octaves, octaves.view),
+                               PART(0, light_octaves, octaves.light),
+                               PART(0, shadow_layers, shadow.layers),
+                               PART(0, shadow_width, shadow.width),
+                               PART(0, light_blur, light_map.blur),
+                               PART(0, light_map_size, light_map.size),
+                               PART(1, light_bias, light_map.bias),
+                               SETTING(1, pixel_variance),
+                               SETTING(1, eta),
                                OPTION(0, 1, random_background),
                                OPTION(0, 1, densify_every),
                                OPTION(0, 1, densify_from),
@@ -541,11 +542,8 @@ static int train(job *j) {
     if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
         ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
         return fail(ssdgs_error_message(j->context));
-    fprintf(stderr,
-            "%s: %d photographs of %dx%d; %d threads, %s; about %.0f MiB at most beside the photographs\n",
-            j->dataset, j->train_set.count, width, height, ssdgs_context_threads(j->context),
-            ssdgs_isa_string(ssdgs_context_isa(j->context)),
-            (double)ssdgs_train_memory(&j->settings, &j->options, width, height) / 1048576);
+    fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s\n", j->dataset, j->train_set.count, width,
+            height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)));
     if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint))
         return fail(ssdgs_error_message(j->context));
 

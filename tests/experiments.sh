@@ -185,7 +185,7 @@ changes() {
     row 'stored values instead of linear light' '' stored --transfer none
     row 'a specular term per Gaussian' '' geometric --set asg=0
     row "normals not drawn to the depth's" '' no_normals --set normal_weight=0
-    row 'no depth cue' '' no_cue --set depth_cue=0
+    row 'a depth cue' '' cue --set depth_cue=1
     row 'one optics for all channels' '' one_optics --set per_channel_optics=0
     row 'plain shadow network' '' plain_shadow --set residual_shadow=0
     row 'four octaves of wo and wi' '' octaves --set view_octaves=4 --set light_octaves=4

@@ -68,7 +68,8 @@ static void random_scene(uint64_t seed, int count, double from, double to) {
     memset(&s, 0, sizeof s);
     s.count = count;
     s.settings = ssdgs_settings_default();
-    s.settings.scattering_layers = 2, s.settings.scattering_width = 1, s.settings.shadow_layers = 0;
+    s.settings.depth_cue = 1;
+    s.settings.scattering.layers = 2, s.settings.scattering.width = 1, s.settings.shadow.layers = 0;
     s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
     s.options = ssdgs_render_options_exact();
     for (size_t i = 0; i < (size_t)count; i++) {
@@ -203,7 +204,7 @@ static lens light_lens(const ssdgs_splat_view *v) {
     l.width = v->width, l.height = v->height;
     l.orthographic = v->orthographic;
     l.by_distance = !v->orthographic; /* to a point light, distances of centres; to a far one, depths */
-    l.floor = l.compensate = s.settings.light_blur == SSDGS_BLUR_FLOOR;
+    l.floor = l.compensate = s.settings.light_map.blur == SSDGS_BLUR_FLOOR;
     l.variance = l.floor ? 0.2 : 0.3;
     return l;
 }
@@ -347,7 +348,7 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
    there was just before it. */
 static double passed(const splat *p, int n, int x, int y, double distance, double higher) {
     static const double level[3] = {0.9, 0.5, 0.1};
-    const double thick = ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
+    const double thick = ((double)s.settings.light_map.bias + 1e-5) * (double)s.settings.length_unit;
     double t = 1, fall[3], before[3], left[3];
     int falls = 0;
     for (int k = 0; k < n; k++) {
@@ -379,7 +380,7 @@ static int look(const double at[3], double *visibility) {
         if (!(t[2] > l->near_plane) || x < 0 || y < 0 || x > l->width || y > l->height) continue;
         const int n = project_all(l, p);
         const double distance = (l->by_distance ? sqrt(dot(t, t)) : t[2]) * (1 - 1e-6) -
-                                ((double)s.settings.light_bias + 1e-5) * (double)s.settings.length_unit;
+                                ((double)s.settings.light_map.bias + 1e-5) * (double)s.settings.length_unit;
         x = fmin(fmax(x - 0.5, 0), l->width - 1), y = fmin(fmax(y - 0.5, 0), l->height - 1);
         const int column = x < l->width - 1 ? (int)x : l->width - 2,
                   row = y < l->height - 1 ? (int)y : l->height - 2;
@@ -653,7 +654,7 @@ static void oracle_light(light_truth *out) {
     static splat p[MOST];
     static double raw[MOST], rho[MOST], v[MOST], cue[MOST];
     const double threshold = (double)s.options.alpha_threshold;
-    const double bias = (double)s.settings.light_bias * (double)s.settings.length_unit;
+    const double bias = (double)s.settings.light_map.bias * (double)s.settings.length_unit;
     memset(out, 0, sizeof *out);
     for (int g = 0; g < s.count; g++) rho[g] = v[g] = cue[g] = 0;
     for (int f = 0; f < face_count; f++) {
@@ -729,9 +730,9 @@ static void test_light(int rounds) {
         read_gaussians();
         random_light(s.lights, c->distance);
         s.lights[0].kind = (ssdgs_light_kind)c->kind;
-        s.settings.light_blur = index % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
-        s.settings.light_bias = (ssdgs_real)c->bias;
-        s.settings.light_map_size = c->map;
+        s.settings.light_map.blur = index % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
+        s.settings.light_map.bias = (ssdgs_real)c->bias;
+        s.settings.light_map.size = c->map;
         for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
             if (!contexts[isa][0]) continue;
             s.settings.terms = SSDGS_ALL_TERMS;
@@ -804,7 +805,7 @@ static void trace_visibility(const lens *light, double *v) {
     double eye[3];
     for (int i = 0; i < 3; i++) eye[i] = (double)s.lights[0].position[i];
     for (int g = 0; g < n; g++) {
-        const double bias = (double)s.settings.light_bias * (double)s.settings.length_unit;
+        const double bias = (double)s.settings.light_map.bias * (double)s.settings.length_unit;
         const double det = p[g].a * p[g].c - p[g].b * p[g].b, xx = p[g].c / det, xy = -p[g].b / det,
                      yy = p[g].a / det;
         const double lx = sqrt(xx), ly = xy / lx, lyy = sqrt(yy - ly * ly),
@@ -841,9 +842,9 @@ static double shadow_error(int range, int count, int blur, int map, double bias)
     read_gaussians();
     random_light(s.lights, 2.5);
     s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-    s.settings.light_bias = (ssdgs_real)bias;
-    s.settings.light_map_size = map;
-    s.settings.light_blur = blur;
+    s.settings.light_map.bias = (ssdgs_real)bias;
+    s.settings.light_map.size = map;
+    s.settings.light_map.blur = blur;
     ssdgs_model *model = make_model(best());
     ssdgs_frame frame = light_frame(model);
     lens light = light_lens(frame.views + 1);
@@ -859,7 +860,8 @@ static void test_shadow_error(int count) {
         0.012, 0.005, 0.0005}; /* what the affine projection leaves of the large ones stays */
     for (int range = 0; range < 3; range++) {
         const ssdgs_settings d = ssdgs_settings_default();
-        const double error = shadow_error(range, count, d.light_blur, d.light_map_size, (double)d.light_bias);
+        const double error =
+            shadow_error(range, count, d.light_map.blur, d.light_map.size, (double)d.light_map.bias);
         CHECK(error < default_most[range]);
         if (!DOUBLE) printf("figure shadow_mean_abs_default%s %.5f\n", names[range], error);
         double add[4], floored[4];
@@ -882,8 +884,8 @@ static void test_shadow_error(int count) {
 static void full_scene(uint64_t seed, int width, int height) {
     random_scene(seed, 200, 0.02, 0.1);
     s.settings = ssdgs_settings_default();
-    s.settings.scattering_width = 16;
-    s.settings.light_map_size = 64;
+    s.settings.scattering.width = 16;
+    s.settings.light_map.size = 64;
     s.options.background[1] = (ssdgs_real)0.4;
     s.camera.width = width, s.camera.height = height;
     s.camera.cx = (ssdgs_real)(0.5 * width), s.camera.cy = (ssdgs_real)(0.5 * height);
@@ -981,9 +983,9 @@ static void test_layers(void) {
                 const int met = layers - (bias ? layers < 2 ? layers : 2 : 0);
                 axis_scene(1 + layers, log(a / (1 - a)));
                 s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-                s.settings.light_blur = blur;
-                s.settings.light_bias = (ssdgs_real)(bias ? 0.5 : 0);
-                s.settings.light_map_size = 512;
+                s.settings.light_map.blur = blur;
+                s.settings.light_map.bias = (ssdgs_real)(bias ? 0.5 : 0);
+                s.settings.light_map.size = 512;
                 s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
                 s.lights[0].position[0] = s.lights[0].position[1] = 0, s.lights[0].position[2] = 1;
                 for (int i = 0; i <= layers; i++) {
@@ -1008,9 +1010,9 @@ static void test_occluder(void) {
     for (int trial = 0; trial < 40; trial++) {
         random_scene(3100000 + (uint64_t)trial, 60, 0.01, 0.1);
         s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-        s.settings.light_blur = trial % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
-        s.settings.light_bias = 0;
-        s.settings.light_map_size = 64;
+        s.settings.light_map.blur = trial % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
+        s.settings.light_map.bias = 0;
+        s.settings.light_map.size = 64;
         random_light(s.lights, trial % 4 < 2 ? 3 : 0.3);
         for (int i = 0; i < 3; i++)
             s.raw[SSDGS_POSITION + i][0] *= (ssdgs_real)0.5; /* does not stretch what the map must cover */
@@ -1038,7 +1040,7 @@ static void test_gap(void) {
     for (int dense = 1; dense >= 0; dense--) {
         axis_scene(3, dense ? 8 : 0);
         s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-        s.settings.light_bias = 0, s.settings.light_map_size = 64;
+        s.settings.light_map.bias = 0, s.settings.light_map.size = 64;
         s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
         for (int c = 0; c < 3; c++) s.lights[0].position[c] = c == 0;
         for (int i = 0; i < 3; i++) {
@@ -1072,7 +1074,7 @@ static void test_veil(void) {
     out.color = values;
     out.alpha = values + 3 * PX * PX;
     out.shadow = values + 4 * PX * PX;
-    settings.shadow_layers = 0;
+    settings.shadow.layers = 0;
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     if (!CHECK(!ssdgs_model_create(best(), &settings, FLOOR + 1, &model))) exit(1);
     for (int tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
@@ -1184,7 +1186,7 @@ static void test_similarity(void) {
         const double move[3] = {cases[n].move, -0.5 * cases[n].move, 0.25 * cases[n].move};
         full_scene(3000004 + n, 70, 50);
         s.options.alpha_threshold = s.options.stop = 0;
-        s.settings.light_map_size = 0;
+        s.settings.light_map.size = 0;
         s.light_count = 2;
         random_light(s.lights + 1, 1);
         s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;

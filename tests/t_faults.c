@@ -223,8 +223,8 @@ static void make_photos(void) {
 static ssdgs_settings small_settings(int width) {
     ssdgs_settings s = ssdgs_settings_default();
     s.transport = 1;
-    s.scattering_layers = s.shadow_layers = 2;
-    s.scattering_width = s.shadow_width = width;
+    s.scattering.layers = s.shadow.layers = 2;
+    s.scattering.width = s.shadow.width = width;
     return s;
 }
 
@@ -886,7 +886,7 @@ static void test_checkpoints(void) {
                     {"steps", offsetof(head, steps), WORD, (double)h.iteration + 1},
                     {"settings", offsetof(head, settings), WORD, 0},
                     {"terms", offsetof(head, settings.terms), WORD, 16},
-                    {"width", offsetof(head, settings.scattering_width), WORD, 1024},
+                    {"width", offsetof(head, settings.scattering.width), WORD, 1024},
                     {"eta", offsetof(head, settings.eta), REAL, 9},
                     {"eta", offsetof(head, settings.eta), REAL, nan_value},
                     {"unit", offsetof(head, settings.length_unit), REAL, 0},

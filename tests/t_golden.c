@@ -173,8 +173,8 @@ static void test_raster(void) {
 static void test_light_pass(const char *name) {
     ssdgs_settings settings = ssdgs_settings_default();
     if (!gold_open(&file, name)) return;
-    settings.light_bias = (ssdgs_real)gold(&file, "bias", NULL)[0] / settings.length_unit;
-    settings.light_blur = SSDGS_BLUR_ADD;
+    settings.light_map.bias = (ssdgs_real)gold(&file, "bias", NULL)[0] / settings.length_unit;
+    settings.light_map.blur = SSDGS_BLUR_ADD;
     ssdgs_model *model = gold_geometry(&settings);
     ssdgs_camera camera = gold_camera();
     const double *at = gold(&file, "light", NULL);
@@ -337,11 +337,12 @@ static void test_network(const char *name, int shadow, int residual, int default
     ssdgs_settings settings = defaults ? ssdgs_settings_default() : ssdgs_settings_published();
     const char *prefix = shadow && residual ? "res_" : "";
     if (!gold_open(&file, name)) return;
-    settings.view_octaves = settings.light_octaves = 4;
+    settings.octaves.view = settings.octaves.light = 4;
     settings.transport = 0;
+    settings.depth_cue = defaults;
     settings.residual_shadow = residual;
-    settings.shadow_width = 32;
-    settings.shadow_layers = 4;
+    settings.shadow.width = 32;
+    settings.shadow.layers = 4;
     ssdgs_frame frame;
     memset(&frame, 0, sizeof frame);
     frame.context = context;
@@ -637,7 +638,8 @@ static void test_full(const char *name, int defaults) {
     settings.asg = SSDGS_ASG_GEOMETRIC;
     settings.transport = 0;
     settings.pixel_variance = (ssdgs_real)0.3;
-    settings.view_octaves = settings.light_octaves = 4;
+    settings.depth_cue = defaults;
+    settings.octaves.view = settings.octaves.light = 4;
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
     ssdgs_model *model = gold_geometry(&settings);
     ssdgs_model_view view = ssdgs_model_arrays(model);

@@ -268,8 +268,8 @@ static void test_shared_sums(void) {
     ssdgs_light light;
     double difference = 0, norm = 0;
     memset(&light, 0, sizeof light);
-    settings.scattering_width = 16;
-    settings.light_map_size = 64;
+    settings.scattering.width = 16;
+    settings.light_map.size = 64;
     for (int c = 0; c < 3; c++) light.position[c] = light.intensity[c] = 1 + c;
     if (!CHECK(!ssdgs_model_create(context, &settings, MANY, &model))) exit(1);
     double *sum = (double *)calloc(model->global_count, sizeof *sum);
@@ -492,12 +492,12 @@ static void test_octaves(void) {
     frame.context = context;
     frame.settings = ssdgs_settings_default();
     frame.settings.length_unit = 1;
-    frame.settings.view_octaves = 2;
-    frame.settings.light_octaves = 1;
+    frame.settings.octaves.view = 2;
+    frame.settings.octaves.light = 1;
     frame.terms = SSDGS_SCATTERING_TERM;
     frame.light_count = 1;
     ssdgs__block_layout l = ssdgs__layout(&frame);
-    CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + 9 + SSDGS__LENGTHS);
+    CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + SSDGS__LENGTHS);
     ssdgs_real *gauss =
         (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
     ssdgs_real *part = gauss + l.lights;
@@ -540,12 +540,13 @@ int main(void) {
     if (!CHECK(!ssdgs_context_create(&desc, &context))) return 1;
     scene base;
     memset(&base, 0, sizeof base);
-    base.name = "default without transport";
+    base.name = "depth cue without transport";
     base.settings = ssdgs_settings_default();
+    base.settings.depth_cue = 1;
     base.settings.transport = 0; /* whose distances are held fixed: positions could not be compared */
-    base.settings.scattering_width = 16;
-    base.settings.shadow_width = 8;
-    base.settings.light_map_size = 32;
+    base.settings.scattering.width = 16;
+    base.settings.shadow.width = 8;
+    base.settings.light_map.size = 32;
     base.options = ssdgs_render_options_default();
     base.options.stop = 0;
     base.options.background[0] = 0.3;
@@ -559,7 +560,7 @@ int main(void) {
     }
     run(&base);
     scene s = base;
-    s.name = "default", s.settings.transport = 1;
+    s.name = "default", s.settings.transport = 1, s.settings.depth_cue = 0;
     run(&s);
     s = base, s.name = "antialias, two lights", s.options.antialias = 1, s.light_count = 2;
     run(&s);
@@ -575,9 +576,9 @@ int main(void) {
     s.settings.shadow_on_scattering = 1;
     run(&s);
     s = base, s.name = "shadow on scattering, no shadow network, a wall", s.wall = 1;
-    s.settings.shadow_on_scattering = 1, s.settings.shadow_layers = 0;
+    s.settings.shadow_on_scattering = 1, s.settings.shadow.layers = 0;
     run(&s);
-    s = base, s.name = "shadow network of one layer", s.settings.shadow_layers = 1;
+    s = base, s.name = "shadow network of one layer", s.settings.shadow.layers = 1;
     run(&s);
     s = base, s.name = "lights at the back",
     s.lights[0].position[1] = 1.3; /* where Fresnel's term is steep */

@@ -55,10 +55,10 @@ static ssdgs_real uniform(double low, double high) { /* a float in every build *
 static ssdgs_model *make_model(int count) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
-    settings.scattering_layers = settings.shadow_layers = 2;
-    settings.scattering_width = 2;
-    settings.shadow_width = 3;
-    settings.view_octaves = settings.light_octaves = 4; /* as before there were such settings */
+    settings.scattering.layers = settings.shadow.layers = 2;
+    settings.scattering.width = 2;
+    settings.shadow.width = 3;
+    settings.octaves.view = settings.octaves.light = 4; /* as before there were such settings */
     settings.dipole = SSDGS_DIPOLE_PRINTED;
     settings.centre[1] = (ssdgs_real)(float)-0.3;
     settings.eta = (ssdgs_real)(float)1.3;

@@ -56,9 +56,9 @@ static double bits_number(uint32_t bits) {
 static ssdgs_settings full(
     void) { /* every term, small networks, a map whose size does not depend on the scene */
     ssdgs_settings s = ssdgs_settings_default();
-    s.scattering_layers = s.shadow_layers = 2;
-    s.scattering_width = s.shadow_width = 8;
-    s.light_map_size = 64;
+    s.scattering.layers = s.shadow.layers = 2;
+    s.scattering.width = s.shadow.width = 8;
+    s.light_map.size = 64;
     s.centre[2] = (ssdgs_real)centre[2];
     return s;
 }
@@ -68,9 +68,9 @@ static ssdgs_settings lambert(ssdgs_asg asg, double bias,
     ssdgs_settings s = full();
     s.asg = (int)asg;
     s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-    s.shadow_layers = 0;
-    s.light_bias = (ssdgs_real)bias;
-    s.light_map_size = map;
+    s.shadow.layers = 0;
+    s.light_map.bias = (ssdgs_real)bias;
+    s.light_map.size = map;
     return s;
 }
 
@@ -1095,7 +1095,7 @@ static void row_36(
     const ssdgs_camera camera = ahead();
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_settings settings = full();
-    settings.light_map_size = 16;
+    settings.light_map.size = 16;
     ssdgs_model *model = cloud(settings, 100);
     show(model, &camera, NULL, 0, &options, &a);
     CHECK(peak(&a) <= 0 && a.alpha[CENTRE] > 0);
@@ -1206,7 +1206,7 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
         for (int blur = SSDGS_BLUR_FLOOR; blur >= SSDGS_BLUR_ADD; blur--)
             for (int step = FINEST; step >= -1; step--) { /* 512 .. 16, then 1, which is rounded up to 16 */
                 ssdgs_settings settings = lambert((ssdgs_asg)asg, 0, step < 0 ? 1 : 16 << step);
-                settings.light_blur = blur;
+                settings.light_map.blur = blur;
                 ssdgs_model *model = cloud(settings, 300);
                 for (int i = 0; sub % 2 && i < 300; i++)
                     set(model, i, SSDGS_LOG_SCALE, 3, -6); /* 0.06 px at 32^2 */
@@ -1287,10 +1287,10 @@ static void row_48(
     ssdgs_settings settings = lambert(SSDGS_ASG_GEOMETRIC, -0.001, 64);
     ssdgs_model *model = NULL;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
-    CHECK(strstr(ssdgs_error_message(context), "light_bias = -0.001"));
-    settings.light_bias = (ssdgs_real)NOT_A_NUMBER;
+    CHECK(strstr(ssdgs_error_message(context), "light_map.bias = -0.001"));
+    settings.light_map.bias = (ssdgs_real)NOT_A_NUMBER;
     CHECK(ssdgs_model_create(context, &settings, 2, &model) == SSDGS_ERR_ARGUMENT && !model);
-    CHECK(strstr(ssdgs_error_message(context), "light_bias = NaN"));
+    CHECK(strstr(ssdgs_error_message(context), "light_map.bias = NaN"));
     for (int i = 0; i < 8; i++) {
         model = make(lambert(i % 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC, biases[i / 2], 256), 2);
         put(model, 0, 0, 0, 2, -1, 0); /* alpha 1/2 wide, in front of a small one */
@@ -1312,8 +1312,8 @@ static void row_49(void) { /* a term left out is a term of weight 0 */
     ssdgs_render_options options = ssdgs_render_options_exact();
     for (int t = 0; t < 3; t++) {
         ssdgs_settings settings = full();
-        settings.shadow_layers = 0;
-        settings.light_bias = (ssdgs_real)(t == 2 ? 1e30 : 0.06); /* S = 1 */
+        settings.shadow.layers = 0;
+        settings.light_map.bias = (ssdgs_real)(t == 2 ? 1e30 : 0.06); /* S = 1 */
         settings.depth_cue = settings.transport =
             t != 2; /* which need the light pass, too, for the scattering */
         ssdgs_model *model = cloud(settings, 300);

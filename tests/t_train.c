@@ -233,7 +233,7 @@ static void test_resume(void) {
             memcpy(copy, bytes, size);
             ssdgs__checkpoint_head head;
             memcpy(&head, copy, sizeof head);
-            if (i == 0) head.settings.scattering_width = 1024;
+            if (i == 0) head.settings.scattering.width = 1024;
             if (i == 1) head.steps[3] = -2;
             if (i == 2) head.count = 0x0FFFFFFF;
             if (i == 4) head.start_size = -1;
@@ -264,7 +264,7 @@ static void test_resume(void) {
             ssdgs_photo shots[PHOTOS];
             static unsigned char wide[SIDE * SIDE * 8];
             memcpy(shots, photos, sizeof shots);
-            if (i == 0) changed.light_bias = (ssdgs_real)0.05;
+            if (i == 0) changed.light_map.bias = (ssdgs_real)0.05;
             if (i == 1) changed.pixel_variance = (ssdgs_real)0.2;
             if (i == 2) changed.eta = (ssdgs_real)1.4;
             if (i == 3) shots[2].camera.near_plane = (ssdgs_real)0.02;
@@ -1145,7 +1145,7 @@ static void test_blur(void) {
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
         settings.pixel_variance = (ssdgs_real)(i ? 0.7 : 0.1);
-        settings.light_blur = i ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
+        settings.light_map.blur = i ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 1, &model));
         for (int pass = 0; pass < 3; pass++)
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);

@@ -28,7 +28,7 @@ static ssdgs_model *make_model(int count, double size) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
     settings.transport = 1;
-    settings.scattering_width = 16;
+    settings.scattering.width = 16;
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
     for (int i = 0; i < count; i++)
         for (int c = 0; c < 3; c++)
