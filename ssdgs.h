@@ -957,6 +957,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BAND 16      /* image rows of a task */
 #define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
 #define SSDGS__LENGTHS 5    /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
+#define SSDGS__SERIES 10    /* factors of a series to second order in x, y, z */
+#define SSDGS__SOURCES 512  /* of light, gathered for a kernel */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
 #define SSDGS__SHARE \
@@ -1017,8 +1019,9 @@ typedef struct ssdgs__tile {
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
-    int cue, flux, orthographic;  /* whether the light pass finds them */
-    ssdgs_light_pixel *light_map; /* of the tile, or NULL */
+    int cue, flux, orthographic;        /* whether the light pass finds them */
+    ssdgs_light_pixel *light_map;       /* of the tile, or NULL */
+    const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -1108,6 +1111,10 @@ typedef struct ssdgs__kernels {
     void (*lobe_backward)(const ssdgs_real *gauss, const ssdgs_real *drows, ssdgs_real *dgauss);
     void (*transport)(const ssdgs_real *sources, int count, const ssdgs_real *x, const ssdgs_real *scale,
                       ssdgs_real *sums);
+    void (*expand)(const ssdgs_real *sources, int count, const ssdgs_real *middle, const ssdgs_real *scale,
+                   ssdgs_real *series);
+    void (*series)(const ssdgs_real *series, const ssdgs_real *middle, const ssdgs_real *x, int lanes,
+                   ssdgs_real *sums);
     void (*dense)(const ssdgs__product *product);
     int (*live_rows)(const ssdgs_real *rows, int count, uint16_t *list);
     void (*transpose)(const ssdgs_real *rows, int count, size_t padded, size_t stride, ssdgs_real *out);
@@ -1188,19 +1195,25 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 
 /* ---- a light's map of where transmittance falls ---- */
 
-/* At a distance, the transmittances of the lanes in `bits` have steps below their next level or several,
-   from t to `left`. */
-static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned bits, const ssdgs_real *t,
-                                  const ssdgs_real *left, ssdgs_real distance, ssdgs_real *next,
+/* Notes where these pixels of a micro-tile fell below levels of transmittance. after: (., 16) transmittances,
+   first before the entries applied, then after each at its index + 1. */
+static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned pixels, uint64_t entries,
+                                  ssdgs_real (*after)[16], const ssdgs_real *distance, ssdgs_real *next,
                                   unsigned char *level) {
-    for (; bits; bits &= bits - 1) {
-        const int lane = ssdgs__lowest_bit(bits);
+    for (; pixels; pixels &= pixels - 1) {
+        const int lane = ssdgs__lowest_bit(pixels);
         ssdgs_light_pixel *at = tile->light_map + 16 * micro + lane;
+        ssdgs_real before = after[0][lane];
         int l = level[lane];
-        for (; l < SSDGS__MAP_STEPS && left[lane] < ssdgs__map_level[l]; l++) {
-            at->distance[l] = distance;
-            if (l < SSDGS__MAP_STEPS - 1) at->left[l] = left[lane];
-            if (l) at->before[l - 1] = t[lane];
+        for (uint64_t left = entries; left && l < SSDGS__MAP_STEPS; left &= left - 1) {
+            const int index = ssdgs__lowest_bit(left);
+            const ssdgs_real t = after[index + 1][lane];
+            for (; l < SSDGS__MAP_STEPS && t < ssdgs__map_level[l]; l++) {
+                at->distance[l] = distance[index];
+                if (l < SSDGS__MAP_STEPS - 1) at->left[l] = t;
+                if (l) at->before[l - 1] = before;
+            }
+            before = t;
         }
         level[lane] = (unsigned char)l;
         next[lane] = l < SSDGS__MAP_STEPS ? ssdgs__map_level[l] : -1;
@@ -2604,7 +2617,8 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels,
         transmittance;
-    ssdgs__buffer flux, nodes, sources, lightings, activations, scratch, slots, lane_slots, view_slots;
+    ssdgs__buffer flux, nodes, points, sources, lightings, activations, scratch, slots, lane_slots,
+        view_slots;
     ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
     ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
     ssdgs__buffer bounds, image, target, normals, cached_lights, shadow_logit, shadow_known, transport,
@@ -2995,6 +3009,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
                           !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
                           !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
     known = known && cache->lights_ready && frame->light_count == cache->light_count &&
+            !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
             ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
             !(frame->terms & ~cache->terms &
@@ -3518,6 +3533,10 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
     t.light_map = v->light_map ? v->light_map + (size_t)index * 256 : NULL;
+    const int shared =
+        v->light >= 0 &&
+        (v[-1].light == v->light || (v + 1 < frame->views + frame->view_count && v[1].light == v->light));
+    t.of_gaussian = shared ? NULL : v->of_gaussian;
     return t;
 }
 
@@ -3625,22 +3644,30 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
    they are compact. */
 
 typedef struct ssdgs__node {
-    ssdgs_real x[3], flux, radius;
+    ssdgs_real x[3], flux;     /* the mean, and how much enters */
+    ssdgs_real radius, spread; /* how far from the mean its sources lie at most, and the mean square */
+    int points;                /* of a lowest node: what receivers nearby see of it */
 } ssdgs__node;
 
 #define SSDGS__LEVELS 12
-#define SSDGS__SOURCES 512
-#define SSDGS__NEAR \
-    256 /* lowest nodes near a block that its 16s tell apart; further ones are gathered for all of it */
-#define SSDGS__SOFT 0.02           /* in length units; distances are sqrt(r^2 + soft^2) */
-#define SSDGS__FAR ((ssdgs_real)2) /* nodes further away than this many of their radii are points */
+#define SSDGS__LEAF 8    /* Gaussians of a lowest node, and parts of a higher one */
+#define SSDGS__NEAR 256  /* lowest nodes near a block, between two looks of its 16s at them */
+#define SSDGS__SOFT 0.02 /* in length units; distances are sqrt(r^2 + soft^2) */
+/* A node is one point from so many of its radii away, and joins a series around receivers from so many of
+   their reaches. */
+#define SSDGS__FAR ((ssdgs_real)1.75)
+#define SSDGS__WIDE ((ssdgs_real)3)
+/* Gaussians with less than this part of the mean flux are one point for all, in a node with a radius below
+   that, in length units. */
+#define SSDGS__DIM ((ssdgs_real)0.15)
+#define SSDGS__COMPACT ((ssdgs_real)0.08)
 
 /* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
 static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
     int levels = 0;
     first[0] = 0;
     do {
-        n = (n + 7) / 8;
+        n = (n + SSDGS__LEAF - 1) / SSDGS__LEAF;
         first[levels + 1] = first[levels] + n;
     } while (++levels < SSDGS__LEVELS && n > 1);
     return levels;
@@ -3648,77 +3675,133 @@ static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
 
 typedef struct ssdgs__node_job {
     const ssdgs_frame *frame;
-    ssdgs__node *nodes;
-    size_t count;
+    ssdgs__node *nodes; /* (lights, count) */
+    ssdgs_real *points; /* (lights, leaves, SSDGS__LEAF, 4) x, y, z, flux */
+    size_t count, leaves;
 } ssdgs__node_job;
 
+/* A Gaussian as a node of its own. */
+static ssdgs__node ssdgs__node_of(const ssdgs_frame *frame, int light, size_t i) {
+    const ssdgs_model_view *g = &frame->gaussians;
+    const ssdgs_real *x = g->gaussians + (size_t)SSDGS_POSITION * g->stride + i;
+    const ssdgs__node node = {
+        {x[0], x[g->stride], x[2 * g->stride]}, frame->flux[(size_t)g->count * (size_t)light + i], 0, 0, 1};
+    return node;
+}
+
 /* Grows a node by one of its parts, whose flux is not 0. */
-static void ssdgs__node_add(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real flux) {
-    node->flux += flux;
-    for (int c = 0; c < 3; c++) node->x[c] += (x[c] - node->x[c]) * (flux / node->flux);
+static void ssdgs__node_add(ssdgs__node *node, const ssdgs__node *part) {
+    node->flux += part->flux;
+    for (int c = 0; c < 3; c++) node->x[c] += (part->x[c] - node->x[c]) * (part->flux / node->flux);
 }
 
-static void ssdgs__node_reach(ssdgs__node *node, const ssdgs_real x[3], ssdgs_real radius) {
+/* Its radius and spread by one of its parts, once all are in. */
+static void ssdgs__node_reach(ssdgs__node *node, const ssdgs__node *part) {
     ssdgs_real distance2 = 0;
-    for (int c = 0; c < 3; c++) distance2 += (x[c] - node->x[c]) * (x[c] - node->x[c]);
-    radius += SSDGS__SQRT(distance2);
+    for (int c = 0; c < 3; c++) distance2 += (part->x[c] - node->x[c]) * (part->x[c] - node->x[c]);
+    const ssdgs_real radius = part->radius + SSDGS__SQRT(distance2);
     node->radius = radius > node->radius ? radius : node->radius;
+    node->spread += (part->spread + distance2) * (part->flux / node->flux);
 }
 
-/* The lowest nodes of a chunk of Gaussians, all lights. */
-static void ssdgs__node_task(void *data, int chunk) {
+/* A node of up to SSDGS__LEAF parts. */
+static ssdgs__node ssdgs__node_join(const ssdgs__node *parts, size_t count) {
+    ssdgs__node node;
+    memset(&node, 0, sizeof node);
+    for (size_t i = 0; i < count; i++)
+        if (parts[i].flux > 0) ssdgs__node_add(&node, parts + i);
+    for (size_t i = 0; i < count; i++)
+        if (parts[i].flux > 0) ssdgs__node_reach(&node, parts + i);
+    return node;
+}
+
+/* The Gaussians of a lowest node; returns how many. */
+static size_t ssdgs__leaf_parts(const ssdgs_frame *frame, int light, size_t leaf, ssdgs__node *parts) {
+    const size_t n = (size_t)frame->gaussians.count, first = SSDGS__LEAF * leaf;
+    const size_t count = n - first < SSDGS__LEAF ? n - first : SSDGS__LEAF;
+    for (size_t i = 0; i < count; i++) parts[i] = ssdgs__node_of(frame, light, first + i);
+    return count;
+}
+
+/* The lowest nodes of a chunk, all lights. */
+static void ssdgs__leaf_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
-    const ssdgs_model_view *g = &job->frame->gaussians;
-    const size_t n = (size_t)g->count, begin = (size_t)chunk * SSDGS__CHUNK;
-    const size_t end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
-    const ssdgs_real *plane = g->gaussians + (size_t)SSDGS_POSITION * g->stride;
+    const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
+                 end = begin + SSDGS__CHUNK / SSDGS__LEAF;
     for (int light = 0; light < job->frame->light_count; light++)
-        for (size_t at = begin / 8; 8 * at < end; at++) {
-            ssdgs__node *node = job->nodes + job->count * (size_t)light + at;
-            memset(node, 0, sizeof *node);
-            for (int pass = 0; pass < 2; pass++)
-                for (size_t i = 8 * at; i < 8 * at + 8 && i < end; i++) {
-                    const ssdgs_real x[3] = {plane[i], plane[g->stride + i], plane[2 * g->stride + i]};
-                    const ssdgs_real flux = job->frame->flux[n * (size_t)light + i];
-                    if (!(flux > 0)) continue;
-                    if (pass) ssdgs__node_reach(node, x, 0);
-                    else ssdgs__node_add(node, x, flux);
-                }
+        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
+            ssdgs__node parts[SSDGS__LEAF];
+            job->nodes[job->count * (size_t)light + leaf] =
+                ssdgs__node_join(parts, ssdgs__leaf_parts(job->frame, light, leaf, parts));
         }
 }
 
-static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, const ssdgs__node **nodes, size_t *count) {
+static void ssdgs__point_put(ssdgs_real *points, ssdgs__node *leaf, const ssdgs__node *part) {
+    ssdgs_real *const point = points + 4 * leaf->points++;
+    memcpy(point, part->x, sizeof part->x);
+    point[3] = part->flux;
+}
+
+/* What receivers nearby see of these: Gaussians of much flux, and the others as one point. */
+static void ssdgs__points_task(void *data, int chunk) {
+    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
+    const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
+                 end = begin + SSDGS__CHUNK / SSDGS__LEAF;
+    const ssdgs_real compact = SSDGS__COMPACT * job->frame->settings.length_unit;
+    for (int light = 0; light < job->frame->light_count; light++) {
+        ssdgs__node *nodes = job->nodes + job->count * (size_t)light;
+        const ssdgs_real mean = nodes[job->count - 1].flux / (ssdgs_real)job->frame->gaussians.count;
+        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
+            ssdgs_real *points = job->points + (job->leaves * (size_t)light + leaf) * SSDGS__LEAF * 4;
+            ssdgs__node parts[SSDGS__LEAF], others;
+            const size_t count = ssdgs__leaf_parts(job->frame, light, leaf, parts);
+            const ssdgs_real dim = nodes[leaf].radius < compact ? SSDGS__DIM * mean : 0;
+            memset(&others, 0, sizeof others);
+            for (size_t i = 0; i < count; i++) {
+                if (parts[i].flux > dim) ssdgs__point_put(points, nodes + leaf, parts + i);
+                else if (parts[i].flux > 0) ssdgs__node_add(&others, parts + i);
+            }
+            if (others.flux > 0) ssdgs__point_put(points, nodes + leaf, &others);
+        }
+    }
+}
+
+static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, ssdgs__node_job *job) {
     ssdgs_context *context = frame->context;
     size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
-    *count = first[levels];
-    ssdgs__node_job job;
-    SSDGS__RESERVE(frame->memory->nodes, job.nodes, ssdgs__node, *count * (size_t)frame->light_count + 1);
-    job.frame = frame;
-    job.count = *count;
-    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__node_task, &job);
-    for (int light = 0; light < frame->light_count; light++)
+    const size_t lights = (size_t)frame->light_count;
+    job->frame = frame;
+    job->count = first[levels];
+    job->leaves = first[1];
+    SSDGS__RESERVE(frame->memory->nodes, job->nodes, ssdgs__node, job->count * lights + 1);
+    SSDGS__RESERVE(frame->memory->points, job->points, ssdgs_real,
+                   job->leaves * SSDGS__LEAF * 4 * lights + 1);
+    if (frame->memory->cache.transport_ready) return SSDGS_OK;
+    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__leaf_task, job);
+    for (size_t light = 0; light < lights; light++)
         for (int level = 1; level < levels; level++) {
-            ssdgs__node *below = job.nodes + *count * (size_t)light + first[level - 1];
-            ssdgs__node *const end = below + (first[level] - first[level - 1]), *node = end;
-            for (; below < end; node++) {
-                memset(node, 0, sizeof *node);
-                for (int pass = 0; pass < 2; pass++)
-                    for (size_t i = 0; i < 8 && below + i < end; i++) {
-                        if (!(below[i].flux > 0)) continue;
-                        if (pass) ssdgs__node_reach(node, below[i].x, below[i].radius);
-                        else ssdgs__node_add(node, below[i].x, below[i].flux);
-                    }
-                below += below + 8 < end ? 8 : end - below;
-            }
+            ssdgs__node *const nodes = job->nodes + job->count * light, *const to = nodes + first[level];
+            const size_t below = first[level] - first[level - 1];
+            for (size_t i = 0; i < below; i += SSDGS__LEAF)
+                to[i / SSDGS__LEAF] = ssdgs__node_join(nodes + first[level - 1] + i,
+                                                       below - i < SSDGS__LEAF ? below - i : SSDGS__LEAF);
         }
-    *nodes = job.nodes;
+    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__points_task, job);
     return SSDGS_OK;
 }
 
-/* The middle of some lanes' positions (3, BLOCK) and how far they reach from it. */
-static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle[3]) {
+/* Gaussians that receive light, and what far sources bring around their middle, to second order: for each
+   length the factors of 1, x, y, z, xx, xy, xz, yy, yz, zz. */
+typedef struct ssdgs__receivers {
+    ssdgs_real middle[3], reach, series[SSDGS__LENGTHS * SSDGS__SERIES];
+} ssdgs__receivers;
+
+/* Around some lanes' positions (3, BLOCK). */
+static ssdgs__receivers ssdgs__receivers_at(const ssdgs_real *x, int lanes) {
+    ssdgs__receivers to;
     ssdgs_real reach2 = 0;
+    memset(&to, 0, sizeof to);
     for (int c = 0; c < 3; c++) {
         ssdgs_real low = x[c * SSDGS__BLOCK], high = low;
         for (int s = 1; s < lanes; s++) {
@@ -3726,120 +3809,156 @@ static ssdgs_real ssdgs__reach(const ssdgs_real *x, int lanes, ssdgs_real middle
             low = at < low ? at : low;
             high = at > high ? at : high;
         }
-        middle[c] = (low + high) / 2;
+        to.middle[c] = (low + high) / 2;
     }
     for (int s = 0; s < lanes; s++) {
         ssdgs_real distance2 = 0;
         for (int c = 0; c < 3; c++)
-            distance2 += (x[c * SSDGS__BLOCK + s] - middle[c]) * (x[c * SSDGS__BLOCK + s] - middle[c]);
+            distance2 += (x[c * SSDGS__BLOCK + s] - to.middle[c]) * (x[c * SSDGS__BLOCK + s] - to.middle[c]);
         reach2 = distance2 > reach2 ? distance2 : reach2;
     }
-    return SSDGS__SQRT(reach2);
+    to.reach = SSDGS__SQRT(reach2);
+    return to;
 }
 
-/* Whether a node is a point for what reaches so far from a middle. */
-static int ssdgs__is_far(const ssdgs__node *node, const ssdgs_real middle[3], ssdgs_real reach) {
-    const ssdgs_real room = node->radius * SSDGS__FAR + reach;
-    ssdgs_real distance2 = 0;
-    for (int c = 0; c < 3; c++) distance2 += (node->x[c] - middle[c]) * (node->x[c] - middle[c]);
-    return distance2 > room * room;
+/* What a node is for receivers: several points, one, or part of a series. */
+enum { SSDGS__AS_POINTS, SSDGS__AS_POINT, SSDGS__AS_SERIES, SSDGS__WAYS };
+
+static SSDGS__INLINE int ssdgs__way_of(const ssdgs__node *node, const ssdgs__receivers *to) {
+    const ssdgs_real point = node->radius * SSDGS__FAR + to->reach, series = to->reach * SSDGS__WIDE;
+    const ssdgs_real x = node->x[0] - to->middle[0], y = node->x[1] - to->middle[1],
+                     z = node->x[2] - to->middle[2], distance2 = x * x + y * y + z * z;
+    const int point_like = distance2 > point * point;
+    return point_like +
+           (point_like & (distance2 > series * series)); /* without a branch: nobody could foretell it */
 }
 
-/* What transport has gathered from so far for some of a block's groups of 16 Gaussians, a mask. */
-typedef struct ssdgs__gather {
-    const ssdgs_frame *frame;
-    const ssdgs_real *flux, *x;
-    ssdgs_real *sources, *sums, scale[2];
-    int count, groups;
-} ssdgs__gather;
+/* A block of receivers at work. */
+typedef struct ssdgs__transport_state {
+    const ssdgs__kernels *k;
+    const ssdgs__node *nodes;    /* the light's */
+    const ssdgs_real *points;    /* of its lowest nodes */
+    const ssdgs_real *x;         /* (3, BLOCK) the receivers */
+    ssdgs_real *sums;            /* (SSDGS__LENGTHS, BLOCK) */
+    ssdgs_real *remote, *nearby; /* (5, SSDGS__SOURCES) and (SSDGS__SOURCES, 4), for a kernel */
+    ssdgs_real scale[2];
+    int remote_count, nearby_count, leaf_count;
+    int groups; /* of 16 receivers: a mask of those asked for */
+    ssdgs__receivers block, group[SSDGS__BLOCK / 16];
+    uint32_t leaves[SSDGS__NEAR]; /* lowest nodes near the block */
+} ssdgs__transport_state;
 
-static void ssdgs__gather_flush(ssdgs__gather *g) {
-    for (int s = 0; s < SSDGS__BLOCK; s += 16)
-        if (g->groups >> s / 16 & 1)
-            g->frame->context->k->transport(g->sources, g->count, g->x + s, g->scale, g->sums + s);
-    g->count = 0;
+static void ssdgs__remote_flush(ssdgs__transport_state *t, ssdgs__receivers *to) {
+    for (; t->remote_count % 16; t->remote_count++)
+        for (int c = 0; c < 5; c++) t->remote[c * SSDGS__SOURCES + t->remote_count] = 0;
+    t->k->expand(t->remote, t->remote_count, to->middle, t->scale, to->series);
+    t->remote_count = 0;
 }
 
-static void ssdgs__gather_point(ssdgs__gather *g, ssdgs_real x, ssdgs_real y, ssdgs_real z, ssdgs_real flux) {
-    ssdgs_real *source = g->sources + 4 * g->count++;
-    source[0] = x, source[1] = y, source[2] = z, source[3] = flux;
-    if (g->count == SSDGS__SOURCES) ssdgs__gather_flush(g);
+static void ssdgs__remote_add(ssdgs__transport_state *t, ssdgs__receivers *to, const ssdgs__node *node) {
+    ssdgs_real *const at = t->remote + t->remote_count++;
+    for (int c = 0; c < 3; c++) at[c * SSDGS__SOURCES] = node->x[c];
+    at[3 * SSDGS__SOURCES] = node->flux;
+    at[4 * SSDGS__SOURCES] = node->spread;
+    if (t->remote_count == SSDGS__SOURCES) ssdgs__remote_flush(t, to);
 }
 
-/* The Gaussians of a lowest node, one by one. */
-static void ssdgs__gather_leaf(ssdgs__gather *g, size_t leaf) {
-    const size_t n = (size_t)g->frame->gaussians.count, stride = g->frame->gaussians.stride;
-    const ssdgs_real *x = g->frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
-    for (size_t i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++)
-        if (g->flux[i] > 0) ssdgs__gather_point(g, x[i], x[stride + i], x[2 * stride + i], g->flux[i]);
+static void ssdgs__nearby_flush(ssdgs__transport_state *t, int group) {
+    t->k->transport(t->nearby, t->nearby_count, t->x + 16 * group, t->scale, t->sums + 16 * group);
+    t->nearby_count = 0;
+}
+
+/* The nodes near the block, as each of its 16s sees them. */
+static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
+    for (int group = 0; group < SSDGS__BLOCK / 16; group++) {
+        ssdgs__receivers *to = t->group + group;
+        uint32_t list[SSDGS__WAYS][SSDGS__NEAR];
+        int count[SSDGS__WAYS] = {0, 0, 0};
+        if (!(t->groups >> group & 1)) continue;
+        for (int i = 0; i < t->leaf_count; i++) {
+            const int way = ssdgs__way_of(t->nodes + t->leaves[i], to);
+            list[way][count[way]++] = t->leaves[i];
+        }
+        for (int i = 0; i < count[SSDGS__AS_SERIES]; i++)
+            ssdgs__remote_add(t, to, t->nodes + list[SSDGS__AS_SERIES][i]);
+        ssdgs__remote_flush(t, to);
+        for (int i = 0; i < count[SSDGS__AS_POINT]; i++) {
+            const ssdgs__node *node = t->nodes + list[SSDGS__AS_POINT][i];
+            ssdgs_real *const at = t->nearby + 4 * t->nearby_count++;
+            memcpy(at, node->x, sizeof node->x);
+            at[3] = node->flux;
+        }
+        for (int i = 0; i < count[SSDGS__AS_POINTS]; i++) {
+            const uint32_t leaf = list[SSDGS__AS_POINTS][i];
+            if (t->nearby_count > SSDGS__SOURCES - SSDGS__LEAF) ssdgs__nearby_flush(t, group);
+            memcpy(t->nearby + 4 * t->nearby_count, t->points + (size_t)leaf * 4 * SSDGS__LEAF,
+                   4 * SSDGS__LEAF * sizeof *t->nearby);
+            t->nearby_count += t->nodes[leaf].points;
+        }
+        ssdgs__nearby_flush(t, group);
+    }
+    t->leaf_count = 0;
 }
 
 typedef struct ssdgs__transport_job {
-    const ssdgs_frame *frame;
-    const ssdgs__node *nodes; /* (lights, node_count) where the light enters */
-    size_t node_count;
+    ssdgs__node_job tree; /* where the light enters */
     int blocks; /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
-    ssdgs_real *sources; /* (slots, SSDGS__SOURCES, 4) */
+    ssdgs_real *sources; /* (slots, 9, SSDGS__SOURCES) */
     ssdgs_real *sums;    /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
     unsigned char
         *known; /* (lights, blocks) masks of groups of 16 whose sums are there: for as long as lights rest */
 } ssdgs__transport_job;
 
-/* True dipole transport to the groups of a block: sum_k = sum over h of flux_h exp(-r / l_k) / (2 pi l_k r),
-   r their distance. The profiles integrate to 1 over a plane. What is far, or small, counts as one point, for
-   all of the block or for a group. */
+/* True dipole transport to some groups of a block, a mask: sum_k = sum over h of flux_h exp(-r / l_k) /
+   (2 pi l_k r), r their distance. The profiles integrate to 1 over a plane. What is far from the block is
+   one series around it. Each group of 16 takes the rest so, or point by point. */
 static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x,
                                    int groups, ssdgs_real *sums) {
-    const ssdgs_frame *frame = job->frame;
-    const size_t n = (size_t)frame->gaussians.count;
-    const ssdgs__node *nodes = job->nodes + job->node_count * (size_t)light;
+    const ssdgs_frame *frame = job->tree.frame;
     const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
-    ssdgs_real middle[3], reach = ssdgs__reach(x, SSDGS__BLOCK, middle);
-    size_t first[SSDGS__LEVELS + 1];
-    const int levels = ssdgs__levels(n, first);
-    int depth = 0, leaf_count = 0;
-    ssdgs__gather g;
-    g.frame = frame;
-    g.flux = frame->flux + n * (size_t)light;
-    g.sources = job->sources + (size_t)slot * SSDGS__SOURCES * 4;
-    g.count = 0;
-    g.x = x;
-    g.sums = sums;
-    g.groups = groups;
-    g.scale[0] = soft * soft;
-    g.scale[1] =
+    size_t first[SSDGS__LEVELS + 1], stack[SSDGS__LEAF * SSDGS__LEVELS];
+    int level_of[SSDGS__LEAF * SSDGS__LEVELS], depth = 0;
+    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
+    ssdgs__transport_state t;
+    t.k = frame->context->k;
+    t.nodes = job->tree.nodes + job->tree.count * (size_t)light;
+    t.points = job->tree.points + job->tree.leaves * (size_t)light * SSDGS__LEAF * 4;
+    t.x = x;
+    t.sums = sums;
+    t.remote = job->sources + (size_t)slot * 9 * SSDGS__SOURCES;
+    t.nearby = t.remote + 5 * SSDGS__SOURCES;
+    t.scale[0] = soft * soft;
+    t.scale[1] =
         (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    t.remote_count = t.nearby_count = t.leaf_count = 0;
+    t.groups = groups;
+    t.block = ssdgs__receivers_at(x, SSDGS__BLOCK);
+    for (int i = 0; i < SSDGS__BLOCK / 16; i++) t.group[i] = ssdgs__receivers_at(x + 16 * i, 16);
     memset(sums, 0, SSDGS__LENGTHS * SSDGS__BLOCK * sizeof *sums);
-    size_t stack[8 * SSDGS__LEVELS], leaves[SSDGS__NEAR];
-    int level_of[8 * SSDGS__LEVELS];
     for (stack[depth] = 0, level_of[depth++] = levels - 1; depth;) {
         const size_t at = stack[--depth];
         const int level = level_of[depth];
-        const ssdgs__node *node = nodes + first[level] + at;
+        const ssdgs__node *node = t.nodes + first[level] + at;
         if (!(node->flux > 0)) continue;
-        if (ssdgs__is_far(node, middle, reach))
-            ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
+        if (ssdgs__way_of(node, &t.block) == SSDGS__AS_SERIES) ssdgs__remote_add(&t, &t.block, node);
         else if (level) {
-            for (size_t part = 8 * at; part < 8 * at + 8 && first[level - 1] + part < first[level]; part++) {
+            const size_t end = SSDGS__LEAF * (at + 1), parts = first[level] - first[level - 1];
+            for (size_t part = SSDGS__LEAF * at; part < end && part < parts; part++) {
                 stack[depth] = part;
                 level_of[depth++] = level - 1;
             }
-        } else if (leaf_count < SSDGS__NEAR) leaves[leaf_count++] = at;
-        else ssdgs__gather_leaf(&g, at);
-    }
-    ssdgs__gather_flush(&g);
-    for (int s = 0; s < SSDGS__BLOCK; s += 16) {
-        g.groups = groups & 1 << s / 16;
-        if (!g.groups) continue;
-        reach = ssdgs__reach(x + s, 16, middle);
-        for (int i = 0; i < leaf_count; i++) {
-            const ssdgs__node *node = nodes + leaves[i];
-            if (ssdgs__is_far(node, middle, reach))
-                ssdgs__gather_point(&g, node->x[0], node->x[1], node->x[2], node->flux);
-            else ssdgs__gather_leaf(&g, leaves[i]);
+        } else {
+            t.leaves[t.leaf_count++] = (uint32_t)at;
+            if (t.leaf_count < SSDGS__NEAR) continue;
+            ssdgs__remote_flush(&t, &t.block);
+            ssdgs__transport_leaves(&t);
         }
-        ssdgs__gather_flush(&g);
     }
+    ssdgs__remote_flush(&t, &t.block);
+    ssdgs__transport_leaves(&t);
+    t.k->series(t.block.series, t.block.middle, x, SSDGS__BLOCK, sums);
+    for (int i = 0; i < SSDGS__BLOCK / 16; i++)
+        t.k->series(t.group[i].series, t.group[i].middle, x + 16 * i, 16, sums + 16 * i);
     for (int k = 0; k < SSDGS__LENGTHS; k++) {
         const ssdgs_real scale =
             (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
@@ -3853,7 +3972,7 @@ static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)block
 /* Groups with a Gaussian to be shaded, where they are not known. */
 static void ssdgs__transport_task(void *data, int slot) {
     const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
-    const ssdgs_frame *frame = job->frame;
+    const ssdgs_frame *frame = job->tree.frame;
     const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
     const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
     ssdgs_real x[3 * SSDGS__BLOCK];
@@ -3888,22 +4007,16 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     ssdgs_context *context = frame->context;
     ssdgs__cache *cache = &frame->memory->cache;
     ssdgs__transport_job job;
-    job.frame = frame;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
     SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real,
-                   (size_t)SSDGS__SOURCES * 4 * SSDGS__SLOTS);
+                   (size_t)SSDGS__SOURCES * 9 * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
                    blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
-    job.nodes = (const ssdgs__node *)frame->memory->nodes.memory;
-    size_t first[SSDGS__LEVELS + 1];
-    job.node_count = first[ssdgs__levels((size_t)frame->gaussians.count, first)];
-    if (!cache->transport_ready) {
-        const ssdgs_result result = ssdgs__nodes(frame, &job.nodes, &job.node_count);
-        if (result) return result;
-        memset(job.known, 0, blocks);
-    }
+    const ssdgs_result result = ssdgs__nodes(frame, &job.tree);
+    if (result) return result;
+    if (!cache->transport_ready) memset(job.known, 0, blocks);
     cache->transport_ready = 1;
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
@@ -9777,6 +9890,8 @@ SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
 SSDGS__FI void F(batch_add)(F(batch) * batch, int index, const ssdgs__tile *tile, uint32_t place,
                             unsigned mask) {
     SSDGS_ASSERT(index < SSDGS__BATCH && place < tile->count);
+    if (place + SSDGS__AHEAD < tile->count)
+        SSDGS__PREFETCH(tile->record + tile->list[place + SSDGS__AHEAD].gaussian);
     batch->place[index] = place;
     batch->mask[index] = (uint16_t)mask;
     batch->record[index] = tile->record[tile->list[place].gaussian];
@@ -9882,15 +9997,18 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
     }
 }
 
-/* Light walk, eqs. 6, 7, the depth cue if asked for, and the flux: per entry, sums (n, 4) of rho v, rho, rho
+/* Light walk, eqs. 6, 7, the depth cue and the flux if asked for: per entry, sums (n, 4) of rho v, rho, rho
    x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
    in the transmittance, and takes part in it once its own distance is reached: two batches run along the
-   list, the nearer one leaves what it has met after each of its entries for the other to pick from. */
+   list, the nearer one leaves what it has met after each of its entries for the other to pick from.
+   Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. What lies in
+   the dark alone is not sampled either, where no other tile has a say. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
-    const int all = tile->flux || tile->light_map, cue = tile->cue || tile->flux;
+    const int all = tile->flux || tile->light_map, cue = tile->cue, flux = tile->flux;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
+    unsigned lit = 0xFFFF; /* micro-tiles that are not dark */
     for (int v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
     R transmittance[16][16], met[16][16],
         next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
@@ -9914,16 +10032,22 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             const uint32_t place = sample ? sampling : applying;
             const int n = sample ? samples : applies;
             if (n == (sample ? SSDGS__BATCH : SSDGS__BATCH - 1)) break;
-            F(batch_add)(batch, n, tile, place, tile->list[place].mask);
-            batch->distance[n] = tile->depth[tile->list[place].gaussian] - tile->depth_origin;
-            if (sample) {
-                nearer[n] = ((uint64_t)1 << applies) - 1;
-                memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
-            }
-            samples += sample;
-            applies += !sample;
+            const uint32_t gaussian = tile->list[place].gaussian;
+            const unsigned mask = tile->list[place].mask;
+            int taken = (mask & lit) != 0;
             sampling += (uint32_t)sample;
             applying += (uint32_t)!sample;
+            if (sample) {
+                memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
+                taken |= !tile->of_gaussian || tile->of_gaussian[gaussian].count > 1;
+                sums[(size_t)place * 4 + 1] = taken ? 0 : 1; /* else v = 0 / 1 */
+            }
+            if (!taken) continue;
+            F(batch_add)(batch, n, tile, place, sample ? mask : mask & lit);
+            batch->distance[n] = tile->depth[gaussian] - tile->depth_origin;
+            if (sample) nearer[n] = ((uint64_t)1 << applies) - 1;
+            samples += sample;
+            applies += !sample;
         }
         F(batch_transpose)(&applied, applies);
         F(batch_transpose)(&sampled, samples);
@@ -9931,7 +10055,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         for (int i = 0; i < samples; i++)
             for (int v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
         V energy[SSDGS__BATCH][SSDGS__NV];
-        for (int i = 0; cue && i < applies; i++)
+        for (int i = 0; flux && i < applies; i++)
             for (int v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
         R history[2][SSDGS__BATCH]
                  [16]; /* transmittance and met, before the first applied and after each; 63 at most */
@@ -9942,7 +10066,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             F(pixel_centres)(tile, micro, px, py);
             V t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                if (cue) {
+                if (flux) {
                     V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal));
                     const V w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
                     const V cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
@@ -9966,22 +10090,19 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                         F(alpha)(applied.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
                     t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
-                    const unsigned fell = (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW)))
-                                          << v * SSDGS__VW;
-                    if (fell) {
-                        R from[16];
-                        VSTORE(from + v * SSDGS__VW, before);
-                        ssdgs__light_map_note(tile, micro, fell, from, history[0][index + 1],
-                                              applied.distance[index], next[micro], steps[micro]);
-                    }
+                    if (flux) energy[index][v] = VFMA(omega[v], VMUL(alpha, before), energy[index][v]);
                     if (cue) {
-                        const V w = VMUL(alpha, before);
-                        energy[index][v] = VFMA(omega[v], w, energy[index][v]);
-                        b[v] = VFMA(w, distance, b[v]);
+                        b[v] = VFMA(VMUL(alpha, before), distance, b[v]);
                         VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
                     }
                 }
             }
+            unsigned fell = 0;
+            for (int v = 0; v < SSDGS__NV; v++)
+                fell |= (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
+            if (fell)
+                ssdgs__light_map_note(tile, micro, fell, entries, history[0], applied.distance, next[micro],
+                                      steps[micro]);
             for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
@@ -10003,15 +10124,18 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                             sum[2][v]);
                 }
             }
+            int alive = 0;
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(transmittance[micro] + v * SSDGS__VW,
                        VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
                 if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
+                alive |= VBITS(VGE(t[v], VSET(tile->stop)));
             }
+            if (!alive) lit &= ~(1u << micro);
         }
         for (int i = 0; i < samples; i++)
             F(sum4)(sums + (size_t)sampled.place[i] * 4, lanes[i][0], lanes[i][1], lanes[i][2], nothing);
-        for (int i = 0; cue && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
+        for (int i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
@@ -10234,6 +10358,80 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
             }
         }
         VUNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
+    }
+}
+
+/* sources (5, SSDGS__SOURCES): x, y, z, flux, mean square radius of count, a multiple of 16. Adds their light
+   around middle, to second order, to series (SSDGS__LENGTHS, SSDGS__SERIES). With u the direction from a
+   source, p = exp(-r / l) / r and a = 1 / l + 1 / r, the slope of p is -a p u and its second derivatives are
+   (a^2 p + (a p + p / r) / r) u u' - a p / r. The light of a ball is a point's times 1 + radius^2 / (6 l^2),
+   as p solves l^2 laplace(p) = p. */
+SSDGS__FN void F(expand)(const R *sources, int count, const R *middle, const R *scale, R *series) {
+    R ux[SSDGS__SOURCES], uy[SSDGS__SOURCES], uz[SSDGS__SOURCES], by_r[SSDGS__SOURCES],
+        weight[SSDGS__SOURCES], decay[SSDGS__SOURCES], lanes[SSDGS__SERIES][16];
+    R by_l = (R)-0.6931471805599453 * scale[1];
+    for (int i = 0; i < count; i += SSDGS__VW) {
+        const V dx = VSUB(VSET(middle[0]), VLOAD(sources + i)),
+                dy = VSUB(VSET(middle[1]), VLOAD(sources + SSDGS__SOURCES + i)),
+                dz = VSUB(VSET(middle[2]), VLOAD(sources + 2 * SSDGS__SOURCES + i));
+        const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, VSET(scale[0]))))),
+                inverse = VDIV(VSET(1), r);
+        VSTORE(ux + i, VMUL(dx, inverse));
+        VSTORE(uy + i, VMUL(dy, inverse));
+        VSTORE(uz + i, VMUL(dz, inverse));
+        VSTORE(by_r + i, inverse);
+        VSTORE(weight + i, VMUL(VLOAD(sources + 3 * SSDGS__SOURCES + i), inverse));
+        VSTORE(decay + i, F(exp2)(VMUL(r, VSET(scale[1]))));
+    }
+    for (int k = SSDGS__LENGTHS - 1; k >= 0; k--, by_l += by_l) {
+        const V ball = VSET(by_l * by_l * (R)(1.0 / 6));
+        for (int s = 0; s < 16; s += SSDGS__VW) {
+            V sum[SSDGS__SERIES], round = VSET(0);
+            VUNROLL for (int j = 0; j < SSDGS__SERIES; j++) sum[j] = VSET(0);
+            for (int i = s; i < count; i += 16) {
+                const V x = VLOAD(ux + i), y = VLOAD(uy + i), z = VLOAD(uz + i), inverse = VLOAD(by_r + i);
+                const V e = VLOAD(decay + i),
+                        more = VFMA(VLOAD(sources + 4 * SSDGS__SOURCES + i), ball, VSET(1)),
+                        p = VMUL(VMUL(VLOAD(weight + i), more), e), a = VADD(inverse, VSET(by_l)),
+                        ap = VMUL(a, p), b = VFMA(a, ap, VMUL(inverse, VFMA(inverse, p, ap)));
+                const V bx = VMUL(b, x), by = VMUL(b, y), bz = VMUL(b, z);
+                VSTORE(decay + i, VMUL(e, e));
+                sum[0] = VADD(sum[0], p);
+                sum[1] = VFNMA(ap, x, sum[1]);
+                sum[2] = VFNMA(ap, y, sum[2]);
+                sum[3] = VFNMA(ap, z, sum[3]);
+                sum[4] = VFMA(bx, x, sum[4]);
+                sum[5] = VFMA(bx, y, sum[5]);
+                sum[6] = VFMA(bx, z, sum[6]);
+                sum[7] = VFMA(by, y, sum[7]);
+                sum[8] = VFMA(by, z, sum[8]);
+                sum[9] = VFMA(bz, z, sum[9]);
+                round = VFMA(ap, inverse, round);
+            }
+            sum[4] = VMUL(VSET((R)0.5), VSUB(sum[4], round));
+            sum[7] = VMUL(VSET((R)0.5), VSUB(sum[7], round));
+            sum[9] = VMUL(VSET((R)0.5), VSUB(sum[9], round));
+            VUNROLL for (int j = 0; j < SSDGS__SERIES; j++) VSTORE(lanes[j] + s, sum[j]);
+        }
+        for (int j = 0; j < SSDGS__SERIES; j++)
+            for (int s = 0; s < 16; s++) series[k * SSDGS__SERIES + j] += lanes[j][s];
+    }
+}
+
+/* Adds a series' values at x (3, BLOCK), of which so many lanes, to sums (SSDGS__LENGTHS, BLOCK). */
+SSDGS__FN void F(series)(const R *series, const R *middle, const R *x, int lanes, R *sums) {
+    for (int s = 0; s < lanes; s += SSDGS__VW) {
+        const V dx = VSUB(VLOAD(x + s), VSET(middle[0])),
+                dy = VSUB(VLOAD(x + SSDGS__BLOCK + s), VSET(middle[1])),
+                dz = VSUB(VLOAD(x + 2 * SSDGS__BLOCK + s), VSET(middle[2]));
+        for (int k = 0; k < SSDGS__LENGTHS; k++) {
+            const R *of = series + k * SSDGS__SERIES;
+            const V x1 = VFMA(dz, VSET(of[6]), VFMA(dy, VSET(of[5]), VFMA(dx, VSET(of[4]), VSET(of[1])))),
+                    y1 = VFMA(dz, VSET(of[8]), VFMA(dy, VSET(of[7]), VSET(of[2]))),
+                    z1 = VFMA(dz, VSET(of[9]), VSET(of[3]));
+            const V value = VFMA(dx, x1, VFMA(dy, y1, VFMA(dz, z1, VSET(of[0]))));
+            VSTORE(sums + k * SSDGS__BLOCK + s, VADD(value, VLOAD(sums + k * SSDGS__BLOCK + s)));
+        }
     }
 }
 
@@ -11325,6 +11523,8 @@ static const ssdgs__kernels F(kernels) = {F(project),
                                           F(lobe),
                                           SSDGS__TRAINS(F(lobe_backward)),
                                           F(transport),
+                                          F(expand),
+                                          F(series),
                                           F(dense),
                                           F(live_rows),
                                           SSDGS__TRAINS(F(transpose)),

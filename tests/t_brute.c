@@ -778,6 +778,51 @@ static void test_light(int rounds) {
     if (!DOUBLE) printf("figure visibility_max_abs %.3g\nfigure flux_max_rel %.3g\n", v.most, flux.most);
 }
 
+/* Deep in an opaque heap the walk ends: visibility and flux are off by what the stop leaves, at most. */
+static void test_dark(void) {
+    static const double stops[3] = {0, 1e-4, 0.3};
+    static light_truth truth;
+    double lost[3] = {0, 0, 0};
+    int dark[3] = {0, 0, 0}, off = 0, faint = 0;
+    for (int index = 0; index < 12; index++) {
+        const light_case *c = light_cases + (index % 2 ? 4 : 1);
+        random_scene(2000000 + (uint64_t)index, MOST, 0.1, 0.2);
+        for (int i = 0; i < s.count; i++) s.raw[SSDGS_OPACITY][i] += 5;
+        read_gaussians();
+        random_light(s.lights, c->distance);
+        s.settings.light_map.bias = (ssdgs_real)c->bias;
+        s.settings.light_map.size = c->map;
+        s.settings.terms = SSDGS_ALL_TERMS;
+        s.settings.transport = 1;
+        for (int k = 0; k < 3; k++) {
+            s.options.stop = (ssdgs_real)stops[k];
+            ssdgs_model *model = make_model(best());
+            ssdgs_frame frame = light_frame(model);
+            if (!k) {
+                face_count = c->faces;
+                for (int i = 0; i < c->faces; i++) faces[i] = light_lens(frame.views + 1 + i);
+                oracle_light(&truth);
+            }
+            double flux = 0, all_flux = 0;
+            for (int i = 0; i < s.count; i++) {
+                if (truth.doubt[i]) continue;
+                const double v = (double)frame.visibility[i] - truth.v[i];
+                off += !(fabs(v) < stops[k] + 1e-5);
+                faint += truth.flux[i] > 0 && truth.v[i] < 1e-6;
+                dark[k] += truth.flux[i] > 0 && !(frame.flux[i] > 0);
+                flux += truth.flux[i] - (double)frame.flux[i];
+                all_flux += truth.flux[i];
+            }
+            lost[k] = flux / all_flux > lost[k] ? flux / all_flux : lost[k];
+            ssdgs_model_destroy(model);
+        }
+    }
+    printf("in the dark: %d of %d and %d not walked, %.2g, %.2g, %.2g of the flux lost\n", dark[1], faint / 3,
+           dark[2], lost[0], lost[1], lost[2]);
+    CHECK(!off && !dark[0] && dark[1] > faint / 12 && dark[2] > dark[1]);
+    CHECK(lost[0] < 1e-5 && lost[1] < 1e-4 + 1e-5 && lost[2] > 1e-3 && lost[2] < 0.3);
+}
+
 /* Largest response of g along the ray from `eye`. */
 static double ray_response(const gaussian *g, const double eye[3], const double direction[3],
                            double farthest) {
@@ -1467,6 +1512,7 @@ int main(int argc, char **argv) {
     make_contexts();
     TEST_ROW("30", "every pixel against every Gaussian", test_camera(full ? 10000 : 1000));
     test_light(full ? 40 : 4);
+    test_dark();
     test_shadow_error(200);
     TEST_ROW("24", "weights add up to one", test_unity());
     TEST_ROW("23", "order of the Gaussians", test_permutation());

@@ -175,6 +175,7 @@ static void test_light_pass(const char *name) {
     if (!gold_open(&file, name)) return;
     settings.light_map.bias = (ssdgs_real)gold(&file, "bias", NULL)[0] / settings.length_unit;
     settings.light_map.blur = SSDGS_BLUR_ADD;
+    settings.depth_cue = 1;
     ssdgs_model *model = gold_geometry(&settings);
     ssdgs_camera camera = gold_camera();
     const double *at = gold(&file, "light", NULL);

@@ -51,9 +51,9 @@ static void on_sphere(ssdgs_model *model, int count) {
 static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_real *sums) {
     ssdgs__transport_job job;
     memset(&job, 0, sizeof job);
-    job.frame = frame;
-    CHECK(!ssdgs__nodes(frame, &job.nodes, &job.node_count));
-    job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 4 * sizeof *job.sources);
+    frame->memory->cache.transport_ready = 0;
+    CHECK(!ssdgs__nodes(frame, &job.tree));
+    job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 9 * sizeof *job.sources);
     ssdgs__transport_block(&job, light, 0, x, 15, sums);
     free(job.sources);
 }
@@ -215,12 +215,11 @@ static void test_flux(void) {
         if (part == 1) expected /= height * height;
         printf("flux %g of %g\n", sum, expected);
         CHECK(fabs(sum / expected - 1) < 0.06);
-        const ssdgs__node *nodes;
-        size_t node_count;
-        CHECK(!ssdgs__nodes(&frame, &nodes, &node_count));
-        CHECK(fabs((double)nodes[node_count - 1].flux / sum - 1) < 1e-4);
+        ssdgs__node_job tree;
+        CHECK(!ssdgs__nodes(&frame, &tree));
+        const ssdgs__node *root = tree.nodes + tree.count - 1;
+        CHECK(fabs((double)root->flux / sum - 1) < 1e-4);
         for (int i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
-            const ssdgs__node *root = nodes + node_count - 1;
             const double dx = (double)(model->gaussians[i] - root->x[0]),
                          dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
             CHECK(sqrt(dx * dx + dy * dy) <= (double)root->radius * 1.0001);
