@@ -83,7 +83,7 @@ CONVENTIONS
 
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
-  A frame's buffers belong to the context and only grow: a second frame of the same size allocates nothing.
+  A frame's buffers belong to its model and only grow: a second frame of the same size allocates nothing.
   Pixels, planes and paths stay the caller's. Contexts, models and trainers may be destroyed in any order.
 
 THREADS
@@ -419,7 +419,7 @@ typedef struct ssdgs_render_stats {
     int blackened;       /* drawn black: the colour is not finite */
     int light_views;     /* light maps in use */
     int camera_cached;   /* 1: projection, order and tiles are the last frame's */
-    int lights_cached;   /* 1: so are the light maps */
+    int lights_cached;   /* lights whose maps are, too */
     int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done */
     size_t instances;    /* (tile, splat) pairs of the camera */
@@ -1395,7 +1395,6 @@ struct ssdgs_context {
     ssdgs_gpu_hook gpu;
     const ssdgs__kernels *k;
     struct ssdgs__pool *pool;
-    struct ssdgs__frame_memory *frame; /* reused by every render on this context */
     int isa, threads;
     int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
                           frees it */
@@ -1957,7 +1956,6 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
 static void ssdgs__context_drop(ssdgs_context *context) {
     const ssdgs_allocator allocator = context->allocator;
     if (--context->references) return;
-    ssdgs__frame_memory_destroy(context, context->frame);
     ssdgs__release_to(&allocator, context);
 }
 
@@ -2001,7 +1999,8 @@ struct ssdgs_model {
     size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
     size_t global_count;
-    ssdgs_real *globals; /* the groups of ssdgs__global_groups, in order */
+    ssdgs_real *globals;               /* the groups of ssdgs__global_groups, in order */
+    struct ssdgs__frame_memory *frame; /* of its frames: what the last one found is there for the next */
 };
 
 /* Parameters that learn together: planes of every Gaussian, then what all share */
@@ -2211,6 +2210,7 @@ static void ssdgs__model_drop(ssdgs_model *model) {
     ssdgs_context *context = model->context;
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
+    ssdgs__frame_memory_destroy(context, model->frame);
     ssdgs__release(context, model);
     ssdgs__context_drop(context);
 }
@@ -2605,9 +2605,15 @@ typedef struct ssdgs__cache {
     ssdgs_camera camera;
     ssdgs_render_options options;
     int terms, light_count;
-    int camera_ready, lights_ready, shadows_ready, transport_ready, bounds_ready;
+    int camera_ready, lights_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
 } ssdgs__cache;
+
+/* A light of the last frame; kept: this frame's is the same, and its views are the last one's. */
+typedef struct ssdgs__cached_light {
+    ssdgs_light light;
+    int views, kept, shadows_ready, transport_ready;
+} ssdgs__cached_light;
 
 typedef struct ssdgs__bounds { /* what the light's map must cover, and how finely */
     double low[3], high[3], log_scale;
@@ -2990,12 +2996,16 @@ static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
            ((terms & SSDGS_SCATTERING_TERM) && (frame->settings.depth_cue || frame->settings.transport));
 }
 
+static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
+    return (ssdgs__cached_light *)frame->memory->cached_lights.memory;
+}
+
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
    time, and what hooks leave is theirs. */
 static void ssdgs__compare_cache(ssdgs_frame *frame) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
-    const ssdgs_light *lights = (const ssdgs_light *)frame->memory->cached_lights.memory;
+    ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
     const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
     int known = !frame->training && cache->revision == frame->model->revision;
     for (int i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
@@ -3003,26 +3013,24 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
     cache->bounds_ready = cache->bounds_ready && known;
+    known = known && !memcmp(&now->stop, &old->stop, sizeof now->stop);
     cache->camera_ready = cache->camera_ready && known && a->width == b->width && a->height == b->height &&
                           now->antialias == old->antialias &&
-                          !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
                           !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
                           !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
     known = known && cache->lights_ready && frame->light_count == cache->light_count &&
-            !memcmp(&now->stop, &old->stop, sizeof now->stop) &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
             ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
             !(frame->terms & ~cache->terms &
               (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for light maps */
-    for (int i = 0; known && i < frame->light_count; i++) {
-        known = frame->lights[i].kind == lights[i].kind;
+    for (int i = 0; i < frame->light_count; i++) {
+        const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
+        lights[i].kept = known && light->kind == last->kind;
         for (int j = 0; j < 3; j++)
-            known =
-                known && !memcmp(frame->lights[i].position + j, lights[i].position + j, sizeof(ssdgs_real));
+            lights[i].kept =
+                lights[i].kept && !memcmp(light->position + j, last->position + j, sizeof(ssdgs_real));
+        lights[i].light = *light;
     }
-    cache->lights_ready = known;
-    cache->shadows_ready = cache->shadows_ready && known;
-    cache->transport_ready = cache->transport_ready && known;
     cache->camera = *a;
     cache->options = *now;
     cache->terms = frame->terms;
@@ -3092,9 +3100,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
-    if (!context->frame) context->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
-    if (!context->frame) return SSDGS_ERR_MEMORY;
-    m = context->frame;
+    if (!model->frame) model->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
+    if (!model->frame) return SSDGS_ERR_MEMORY;
+    m = model->frame;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
     ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
@@ -3123,6 +3131,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
     const int needs_light = ssdgs__needs_light(frame, frame->terms);
+    ssdgs__cached_light *cached;
+    SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
     ssdgs__compare_cache(frame);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
@@ -3132,15 +3142,21 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
             if (result) return result;
             m->cache.bounds_ready = m->cache.revision != 0;
         }
-        for (int i = 0; i < frame->light_count; i++)
-            frame->view_count += ssdgs__light_views(&frame->settings, &m->scene, lights + i,
-                                                    (double)frame->options.light_detail, i, NULL);
+        for (int i = 0, moved = 0; i < frame->light_count; i++) { /* after another number, views move */
+            const int views = ssdgs__light_views(&frame->settings, &m->scene, lights + i,
+                                                 (double)frame->options.light_detail, i, NULL);
+            cached[i].kept = cached[i].kept && !moved;
+            moved |= views != cached[i].views;
+            cached[i].views = views;
+            frame->view_count += views;
+        }
     }
     result = ssdgs__views_reserve(context, m, frame->view_count);
     if (result) return result;
-    if (m->views.bytes <
-        (size_t)frame->view_count * sizeof *frame->views) /* they move, perhaps to the same address */
-        m->cache.camera_ready = m->cache.lights_ready = m->cache.shadows_ready = m->cache.transport_ready = 0;
+    if (m->views.bytes < (size_t)frame->view_count * sizeof *frame->views) { /* they are new memory */
+        m->cache.camera_ready = 0;
+        for (int i = 0; i < frame->light_count; i++) cached[i].kept = 0;
+    }
     SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
     if (!m->cache.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
@@ -3159,15 +3175,17 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
-    for (int i = 0, j = 1; needs_light && i < frame->light_count && !m->cache.lights_ready; i++)
-        j += ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
-                                i, frame->views + j);
     frame->views[0].cached = m->cache.camera_ready;
-    for (int i = 1; i < frame->view_count; i++) frame->views[i].cached = m->cache.lights_ready;
+    for (int i = 0, j = 1; i < frame->light_count; i++) {
+        cached[i].shadows_ready = cached[i].kept && cached[i].shadows_ready;
+        cached[i].transport_ready = cached[i].kept && cached[i].transport_ready;
+        if (!needs_light) continue;
+        if (!cached[i].kept)
+            ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
+                               i, frame->views + j);
+        for (const int end = j + cached[i].views; j < end; j++) frame->views[j].cached = cached[i].kept;
+    }
     m->cache.camera_ready = m->cache.lights_ready = 0; /* again once the walks are done */
-    ssdgs_light *cached_lights;
-    SSDGS__RESERVE(m->cached_lights, cached_lights, ssdgs_light, frame->light_count + 1);
-    for (int i = 0; i < frame->light_count; i++) cached_lights[i] = lights[i];
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -3625,13 +3643,12 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs__gather_job job;
     job.frame = frame;
     job.end_view = 1;
-    for (job.light = 0; job.light < frame->light_count && job.end_view < frame->view_count &&
-                        !frame->views[job.end_view].cached;
-         job.light++) {
+    for (job.light = 0; job.end_view < frame->view_count; job.light++) {
         job.first_view = job.end_view;
         while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light)
             job.end_view++;
-        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
+        if (!frame->views[job.first_view].cached)
+            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
     }
     frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
     return SSDGS_OK;
@@ -3678,6 +3695,7 @@ typedef struct ssdgs__node_job {
     ssdgs__node *nodes; /* (lights, count) */
     ssdgs_real *points; /* (lights, leaves, SSDGS__LEAF, 4) x, y, z, flux */
     size_t count, leaves;
+    const ssdgs__cached_light *lights; /* of those whose transport is ready nothing changes */
 } ssdgs__node_job;
 
 /* A Gaussian as a node of its own. */
@@ -3729,7 +3747,8 @@ static void ssdgs__leaf_task(void *data, int chunk) {
     const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
                  end = begin + SSDGS__CHUNK / SSDGS__LEAF;
     for (int light = 0; light < job->frame->light_count; light++)
-        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
+        for (size_t leaf = job->lights[light].transport_ready ? end : begin; leaf < end && leaf < job->leaves;
+             leaf++) {
             ssdgs__node parts[SSDGS__LEAF];
             job->nodes[job->count * (size_t)light + leaf] =
                 ssdgs__node_join(parts, ssdgs__leaf_parts(job->frame, light, leaf, parts));
@@ -3749,6 +3768,7 @@ static void ssdgs__points_task(void *data, int chunk) {
                  end = begin + SSDGS__CHUNK / SSDGS__LEAF;
     const ssdgs_real compact = SSDGS__COMPACT * job->frame->settings.length_unit;
     for (int light = 0; light < job->frame->light_count; light++) {
+        if (job->lights[light].transport_ready) continue;
         ssdgs__node *nodes = job->nodes + job->count * (size_t)light;
         const ssdgs_real mean = nodes[job->count - 1].flux / (ssdgs_real)job->frame->gaussians.count;
         for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
@@ -3777,10 +3797,10 @@ static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, ssdgs__node_job *job) {
     SSDGS__RESERVE(frame->memory->nodes, job->nodes, ssdgs__node, job->count * lights + 1);
     SSDGS__RESERVE(frame->memory->points, job->points, ssdgs_real,
                    job->leaves * SSDGS__LEAF * 4 * lights + 1);
-    if (frame->memory->cache.transport_ready) return SSDGS_OK;
+    job->lights = ssdgs__cached_lights(frame);
     ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__leaf_task, job);
     for (size_t light = 0; light < lights; light++)
-        for (int level = 1; level < levels; level++) {
+        for (int level = job->lights[light].transport_ready ? levels : 1; level < levels; level++) {
             ssdgs__node *const nodes = job->nodes + job->count * light, *const to = nodes + first[level];
             const size_t below = first[level] - first[level - 1];
             for (size_t i = 0; i < below; i += SSDGS__LEAF)
@@ -4005,7 +4025,7 @@ static void ssdgs__transport_task(void *data, int slot) {
 /* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
 static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
     ssdgs_context *context = frame->context;
-    ssdgs__cache *cache = &frame->memory->cache;
+    ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
     ssdgs__transport_job job;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
@@ -4016,8 +4036,11 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
     const ssdgs_result result = ssdgs__nodes(frame, &job.tree);
     if (result) return result;
-    if (!cache->transport_ready) memset(job.known, 0, blocks);
-    cache->transport_ready = 1;
+    for (int i = 0; i < frame->light_count; i++) {
+        if (!lights[i].transport_ready)
+            memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
+        lights[i].transport_ready = 1;
+    }
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
     return SSDGS_OK;
@@ -4357,7 +4380,7 @@ static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
 static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                 ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
-    if (!job->shadow_known) return 0;
+    if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return 0;
     for (int s = 0; s < SSDGS__BLOCK; s++)
         if (!job->shadow_known[first + at[s]]) return 0;
     for (int s = 0; s < SSDGS__BLOCK; s++) shadow[s] = job->shadow_logit[first + at[s]];
@@ -4367,7 +4390,8 @@ static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const si
 static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                const ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
-    for (int s = 0; job->shadow_known && s < SSDGS__BLOCK; s++) {
+    if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return;
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
         job->shadow_known[first + at[s]] = 1;
         job->shadow_logit[first + at[s]] = shadow[s];
     }
@@ -4551,7 +4575,6 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
 
 static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    ssdgs__cache *cache = &frame->memory->cache;
     int skips = 0;
     frame->shaded_count = 0;
     for (int i = 0; i < frame->gaussians.count; i++) {
@@ -4571,15 +4594,16 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
                    job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
     if (job.layout.shadow_layers &&
         !frame->training) { /* room from the first frame on, use from the second */
-        const size_t pairs = (size_t)frame->gaussians.count * (size_t)frame->light_count;
-        const int lights_cached = frame->view_count > 1 && frame->views[1].cached;
+        const size_t n = (size_t)frame->gaussians.count, pairs = n * (size_t)frame->light_count;
+        ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
         SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
         SSDGS__RESERVE(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
-        if (lights_cached && !cache->shadows_ready) memset(job.shadow_known, 0, pairs);
-        if (!lights_cached) job.shadow_known = NULL;
-        cache->shadows_ready = lights_cached;
+        for (int i = 0; i < frame->light_count; i++) {
+            if (lights[i].kept && !lights[i].shadows_ready) memset(job.shadow_known + n * (size_t)i, 0, n);
+            lights[i].shadows_ready = lights[i].kept;
+        }
     }
-    job.counts = cache->counts;
+    job.counts = frame->memory->cache.counts;
     if (frame->flux && frame->settings.transport && frame->light_count) {
         result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
@@ -5301,7 +5325,8 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
         stats->shaded = frame.shaded_count;
         stats->light_views = frame.view_count - 1;
         stats->camera_cached = frame.views[0].cached;
-        stats->lights_cached = frame.view_count > 1 && frame.views[1].cached;
+        for (int l = 0; frame.view_count > 1 && l < frame.light_count; l++)
+            stats->lights_cached += ssdgs__cached_lights(&frame)[l].kept;
         for (i = 0; i < (size_t)model->count; i++) stats->skipped += frame.seen[i] == SSDGS_SKIPPED;
         for (int c = 0; c < SSDGS__SLOTS; c++) {
             const uint64_t *counts = frame.memory->cache.counts + 3 * c;

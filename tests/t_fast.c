@@ -89,31 +89,31 @@ static void test_kept(void) {
     lights[1] = light_at(4);
 #define FIRST() render(model, &a, lights, 2, &options, image[0], NULL)
     FIRST();
-    check_same(model, &a, lights, 2, &options, 1, 1, "nothing moved");
+    check_same(model, &a, lights, 2, &options, 1, 2, "nothing moved");
     FIRST();
-    check_same(model, &b, lights, 2, &options, 0, 1, "the camera moved");
+    check_same(model, &b, lights, 2, &options, 0, 2, "the camera moved");
     FIRST();
     check_same(model, &a, &moved, 1, &options, 1, 0, "another light");
     FIRST();
     moved = lights[0], lights[0] = light_at(3);
-    check_same(model, &a, lights, 2, &options, 1, 0, "a light moved");
+    check_same(model, &a, lights, 2, &options, 1, 1, "a light moved");
     lights[0] = moved;
     FIRST();
     moved = lights[0], lights[0].intensity[1] *= 2;
-    check_same(model, &a, lights, 2, &options, 1, 1, "a brighter light");
+    check_same(model, &a, lights, 2, &options, 1, 2, "a brighter light");
     lights[0] = moved;
     lights[1].kind = SSDGS_LIGHT_DIRECTIONAL, lights[1].position[0] = lights[1].position[1] = 0;
-    check_same(model, &a, lights, 2, &options, 1, 0, "another kind of light");
+    check_same(model, &a, lights, 2, &options, 1, 1, "another kind of light");
     FIRST();
     FIRST(); /* the shadow network's outputs are kept from here on */
     render(model, &b, lights, 2, &options, image[0], NULL);
     ssdgs_render_stats stats;
     render(model, &b, lights, 2, &options, image[0], &stats);
     CHECK(stats.shadows_cached >= 2 * stats.shaded); /* whole blocks */
-    check_same(model, &a, lights, 2, &options, 0, 1, "kept shadows, back again");
+    check_same(model, &a, lights, 2, &options, 0, 2, "kept shadows, back again");
     FIRST();
     options.max_error = 0;
-    check_same(model, &a, lights, 2, &options, 0, 1, "another max_error");
+    check_same(model, &a, lights, 2, &options, 0, 2, "another max_error");
     FIRST();
     options.light_detail = (ssdgs_real)0.5;
     check_same(model, &a, lights, 2, &options, 1, 0, "another light_detail");
@@ -130,7 +130,7 @@ static void test_kept(void) {
     options.terms = SSDGS_ALL_TERMS;
     FIRST();
     render(other, &a, lights, 2, &options, image[1], NULL);
-    check_same(model, &a, lights, 2, &options, 0, 0, "another model between");
+    check_same(model, &a, lights, 2, &options, 1, 2, "another model between");
     FIRST();
     ssdgs_model_view view = ssdgs_model_arrays(model);
     view.gaussians[SSDGS_POSITION * view.stride] += (ssdgs_real)0.2;
@@ -192,7 +192,8 @@ static void test_walk(void) {
     static unsigned char photograph[PIXELS * 4];
     ssdgs_context *context[2] = {NULL, NULL};
     ssdgs_render_options options = ssdgs_render_options_default();
-    int which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_cached = 0, failures = 0;
+    int which = 0, view = 0, light_count = 1, wanted = 0, cameras_kept = 0, lights_cached = 0, some_kept = 0,
+        failures = 0;
     uint64_t at = 7000000;
 #define PICK(n) ((int)(draw(at++) * (n)))
     ssdgs_context_desc desc;
@@ -270,19 +271,23 @@ static void test_walk(void) {
             for (int i = 0; i < PLANE_COUNT; i++)
                 if (!i || (wanted >> (i - 1) & 1 && !(i == PLANE_COUNT - 1 && out.scattering)))
                     *plane[i] = planes[k] + PIXELS * first[i];
-            if (k && context[k]->frame) memset(&context[k]->frame->cache, 0, sizeof context[k]->frame->cache);
+            ssdgs__frame_memory *memory = models[k][which]->frame;
+            if (k && memory) memset(&memory->cache, 0, sizeof memory->cache);
             CHECK(!ssdgs_render_ex(models[k][which], cameras + view, lights, light_count, &options, &out,
                                    stats + k));
         }
         cameras_kept += stats[0].camera_cached;
-        lights_cached += stats[0].lights_cached;
+        lights_cached += stats[0].lights_cached > 0;
+        some_kept += stats[0].lights_cached > 0 && stats[0].lights_cached < light_count;
         CHECK(!stats[1].camera_cached && !stats[1].lights_cached);
         CHECK(stats[0].shaded == stats[1].shaded && stats[0].skipped == stats[1].skipped &&
               stats[0].instances == stats[1].instances && stats[0].light_views == stats[1].light_views);
         if (!CHECK(!memcmp(planes[0], planes[1], sizeof planes[0]))) printf("    frame %d\n", frame);
     }
 #undef PICK
-    CHECK(failures > 5 && cameras_kept > FRAMES / 4 && lights_cached > FRAMES / 16);
+    printf("lights kept in %d of %d frames, some of them in %d\n", lights_cached, FRAMES, some_kept);
+    CHECK(failures > 5 && some_kept > FRAMES / 64 && cameras_kept > FRAMES / 4 &&
+          lights_cached > FRAMES / 16);
     for (int k = 0; k < 2; k++) {
         for (int i = 0; i < MODELS; i++) ssdgs_model_destroy(models[k][i]);
         ssdgs_context_destroy(context[k]);

@@ -51,11 +51,61 @@ static void on_sphere(ssdgs_model *model, int count) {
 static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_real *sums) {
     ssdgs__transport_job job;
     memset(&job, 0, sizeof job);
-    frame->memory->cache.transport_ready = 0;
+    for (int i = 0; i < frame->light_count; i++) ssdgs__cached_lights(frame)[i].transport_ready = 0;
     CHECK(!ssdgs__nodes(frame, &job.tree));
     job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 9 * sizeof *job.sources);
     ssdgs__transport_block(&job, light, 0, x, 15, sums);
     free(job.sources);
+}
+
+/* A series around a middle against the sum itself, off by a third-order term; that of balls, by their radii.
+ */
+static void test_series(void) {
+    enum { COUNT = 32 };
+    static ssdgs_real sources[5 * SSDGS__SOURCES], sums[SSDGS__LENGTHS * SSDGS__BLOCK], x[3 * SSDGS__BLOCK];
+    ssdgs_real series[SSDGS__LENGTHS * SSDGS__SERIES];
+    const ssdgs_real middle[3] = {(ssdgs_real)0.1, (ssdgs_real)-0.2, (ssdgs_real)0.3};
+    const double soft = 0.01, longest = 0.32, spread = 1e-4;
+    const ssdgs_real scale[2] = {(ssdgs_real)(soft * soft), (ssdgs_real)(-1.4426950408889634 / longest)};
+    double worst = 0;
+    for (int ball = 0; ball < 2; ball++) {
+        for (uint64_t i = 0; i < COUNT; i++) {
+            double d[3], r = 0;
+            for (uint64_t c = 0; c < 3; c++) d[c] = draw(700 + 3 * i + c) - 0.5, r += d[c] * d[c];
+            for (int c = 0; c < 3; c++)
+                sources[c * SSDGS__SOURCES + (int)i] =
+                    middle[c] + (ssdgs_real)(d[c] / sqrt(r) * (0.2 + 0.3 * draw(900 + i)));
+            sources[3 * SSDGS__SOURCES + i] = (ssdgs_real)(i < 19 ? draw(1000 + i) : 0);
+            sources[4 * SSDGS__SOURCES + i] = (ssdgs_real)(ball ? spread : 0);
+        }
+        for (int i = 0; i < 3 * SSDGS__BLOCK; i++)
+            x[i] = middle[i / SSDGS__BLOCK] + (ssdgs_real)(0.012 * (draw(1100 + (uint64_t)i) - 0.5));
+        memset(series, 0, sizeof series);
+        memset(sums, 0, sizeof sums);
+        context->k->expand(sources, COUNT, middle, scale, series);
+        context->k->series(series, middle, x, SSDGS__BLOCK, sums);
+        for (int k = 0; k < SSDGS__LENGTHS; k++)
+            for (int s = 0; s < SSDGS__BLOCK; s++) {
+                const double l = longest / (1 << (SSDGS__LENGTHS - 1 - k));
+                double sum = 0, bound = 0;
+                for (int i = 0; i < COUNT; i++) {
+                    double r = soft * soft, away = 0;
+                    for (int c = 0; c < 3; c++) {
+                        const double at = (double)x[c * SSDGS__BLOCK + s];
+                        r += pow(at - (double)sources[c * SSDGS__SOURCES + i], 2);
+                        away += pow(at - (double)middle[c], 2);
+                    }
+                    r = sqrt(r);
+                    const double light = (double)sources[3 * SSDGS__SOURCES + i] * exp(-r / l) / r;
+                    sum += light * (1 + (ball ? spread / (6 * l * l) : 0));
+                    bound += light * pow(sqrt(away) * (1 / l + 1 / r), 3) / 3;
+                }
+                const double error = fabs((double)sums[k * SSDGS__BLOCK + s] - sum) / (bound + 2e-6 * sum);
+                worst = error > worst ? error : worst;
+            }
+    }
+    printf("series: at most %.2g of a third-order term\n", worst);
+    CHECK(worst < 1 && worst > 0.01);
 }
 
 /* 3,000 Gaussians on a sphere, as training orders them or without order, some dark, two lights: against the
@@ -219,6 +269,13 @@ static void test_flux(void) {
         CHECK(!ssdgs__nodes(&frame, &tree));
         const ssdgs__node *root = tree.nodes + tree.count - 1;
         CHECK(fabs((double)root->flux / sum - 1) < 1e-4);
+        double square = 0;
+        for (int i = 0; i < COUNT; i++) {
+            const double dx = (double)(model->gaussians[i] - root->x[0]),
+                         dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
+            square += (double)frame.flux[i] * (dx * dx + dy * dy);
+        }
+        CHECK(fabs((double)root->spread / (square / sum) - 1) < 1e-4);
         for (int i = 0; i < COUNT; i += ROW - 1) { /* and nobody is outside it */
             const double dx = (double)(model->gaussians[i] - root->x[0]),
                          dy = (double)(model->gaussians[model->capacity + (size_t)i] - root->x[1]);
@@ -285,6 +342,7 @@ static void test_bits(void) {
 
 int main(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
+    test_series();
     test_pairs(1);
     test_pairs(0);
     test_plane();
