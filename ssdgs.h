@@ -118,7 +118,7 @@ OUTLINES
   that colour fade; else all that is shown is opaque. A note says which.
 
 SPEED
-  ssdgs_render_options_exact() is the method as written. _default() loses less than 0.001 dB against
+  ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB. Left out without changing a bit: what no pixel
   blends, neurons that are 0 for 64 neighbours, terms nobody asked for, and what the last frame has.
 
@@ -397,15 +397,17 @@ typedef struct ssdgs_render_options {
     int version;   /* set by the functions below */
     int terms;     /* SSDGS_*_TERM mask: of the model's, those to render */
     int antialias; /* 1: opacity makes up for pixel_variance, so far Gaussians do not grow (Mip-Splatting) */
-    ssdgs_real background[3];   /* linear; settings.transfer none: as stored */
-    ssdgs_real stop;            /* a pixel is done when its transmittance is below this; 0 = never */
+    ssdgs_real background[3]; /* linear; settings.transfer none: as stored */
+    ssdgs_real stop; /* pixels, a light map's too, are done when their transmittance is less; 0 = never */
     ssdgs_real alpha_threshold; /* a splat is not drawn at pixels where its alpha is below this */
     ssdgs_real max_error;    /* Gaussians whose weights sum to less in every pixel are not shaded; 0 = none */
     ssdgs_real light_detail; /* resolution of the light maps; 1 = the model's choice */
+    ssdgs_real transport_detail; /* of true dipole transport; 1 = sums within about a hundredth */
 } ssdgs_render_options;
 
-/* For games (max_error 1/16), the method as written, and for speed (max_error 1/8, light_detail 0.6,
-   alpha_threshold 1/200). SPEED in the manual says what they lose. */
+/* For games (max_error 1/16, stop 1/1024, transport_detail 0.7), the method as written, and for speed
+   (max_error 1/4, stop 1/256, light_detail 0.7, transport_detail 0.6). SPEED in the manual says what they
+   lose. */
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
@@ -2961,21 +2963,24 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void) {
     o.terms = SSDGS_ALL_TERMS;
     o.stop = (ssdgs_real)1e-4;
     o.alpha_threshold = (ssdgs_real)(1.0 / 255);
-    o.light_detail = 1;
+    o.light_detail = o.transport_detail = 1;
     return o;
 }
 
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
     ssdgs_render_options o = ssdgs_render_options_exact();
     o.max_error = (ssdgs_real)(1.0 / 16);
+    o.stop = (ssdgs_real)(1.0 / 1024);
+    o.transport_detail = (ssdgs_real)0.7;
     return o;
 }
 
 SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
     ssdgs_render_options o = ssdgs_render_options_default();
-    o.max_error = (ssdgs_real)(1.0 / 8);
-    o.light_detail = (ssdgs_real)0.6;
-    o.alpha_threshold = (ssdgs_real)(1.0 / 200);
+    o.max_error = (ssdgs_real)(1.0 / 4);
+    o.stop = (ssdgs_real)(1.0 / 256);
+    o.light_detail = (ssdgs_real)0.7;
+    o.transport_detail = (ssdgs_real)0.6;
     return o;
 }
 
@@ -2987,6 +2992,7 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     SSDGS__RANGE_OF("render options", o, alpha_threshold, 0, 1);
     SSDGS__RANGE_OF("render options", o, max_error, 0, 1);
     SSDGS__RANGE_OF("render options", o, light_detail, (ssdgs_real)0.01, 8);
+    SSDGS__RANGE_OF("render options", o, transport_detail, (ssdgs_real)0.1, 8);
     return SSDGS_OK;
 }
 
@@ -3029,6 +3035,9 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
         for (int j = 0; j < 3; j++)
             lights[i].kept =
                 lights[i].kept && !memcmp(light->position + j, last->position + j, sizeof(ssdgs_real));
+        lights[i].transport_ready =
+            lights[i].kept && lights[i].transport_ready &&
+            !memcmp(&now->transport_detail, &old->transport_detail, sizeof now->transport_detail);
         lights[i].light = *light;
     }
     cache->camera = *a;
@@ -3672,11 +3681,11 @@ typedef struct ssdgs__node {
 #define SSDGS__SOFT 0.02 /* in length units; distances are sqrt(r^2 + soft^2) */
 /* A node is one point from so many of its radii away, and joins a series around receivers from so many of
    their reaches. */
-#define SSDGS__FAR ((ssdgs_real)1.75)
+#define SSDGS__FAR ((ssdgs_real)2)
 #define SSDGS__WIDE ((ssdgs_real)3)
 /* Gaussians with less than this part of the mean flux are one point for all, in a node with a radius below
    that, in length units. */
-#define SSDGS__DIM ((ssdgs_real)0.15)
+#define SSDGS__DIM ((ssdgs_real)0.05)
 #define SSDGS__COMPACT ((ssdgs_real)0.08)
 
 /* How many levels n Gaussians have; where each begins, and after the last one how many nodes there are. */
@@ -3841,32 +3850,33 @@ static ssdgs__receivers ssdgs__receivers_at(const ssdgs_real *x, int lanes) {
     return to;
 }
 
+/* A block of receivers at work. */
+typedef struct ssdgs__transport_state {
+    const ssdgs__kernels *k;
+    const ssdgs__node *nodes;            /* the light's */
+    const ssdgs_real *points;            /* of its lowest nodes */
+    const ssdgs_real *x;                 /* (3, BLOCK) the receivers */
+    ssdgs_real *sums;                    /* (SSDGS__LENGTHS, BLOCK) */
+    ssdgs_real *remote, *nearby;         /* (5, SSDGS__SOURCES) and (SSDGS__SOURCES, 4), for a kernel */
+    ssdgs_real scale[2], radii, reaches; /* SSDGS__FAR and SSDGS__WIDE, in this detail */
+    int remote_count, nearby_count, leaf_count;
+    int groups; /* of 16 receivers: a mask of those asked for */
+    ssdgs__receivers block, group[SSDGS__BLOCK / 16];
+    uint32_t leaves[SSDGS__NEAR]; /* lowest nodes near the block */
+} ssdgs__transport_state;
+
 /* What a node is for receivers: several points, one, or part of a series. */
 enum { SSDGS__AS_POINTS, SSDGS__AS_POINT, SSDGS__AS_SERIES, SSDGS__WAYS };
 
-static SSDGS__INLINE int ssdgs__way_of(const ssdgs__node *node, const ssdgs__receivers *to) {
-    const ssdgs_real point = node->radius * SSDGS__FAR + to->reach, series = to->reach * SSDGS__WIDE;
+static SSDGS__INLINE int ssdgs__way_of(const ssdgs__transport_state *t, const ssdgs__node *node,
+                                       const ssdgs__receivers *to) {
+    const ssdgs_real point = node->radius * t->radii + to->reach, series = to->reach * t->reaches;
     const ssdgs_real x = node->x[0] - to->middle[0], y = node->x[1] - to->middle[1],
                      z = node->x[2] - to->middle[2], distance2 = x * x + y * y + z * z;
     const int point_like = distance2 > point * point;
     return point_like +
            (point_like & (distance2 > series * series)); /* without a branch: nobody could foretell it */
 }
-
-/* A block of receivers at work. */
-typedef struct ssdgs__transport_state {
-    const ssdgs__kernels *k;
-    const ssdgs__node *nodes;    /* the light's */
-    const ssdgs_real *points;    /* of its lowest nodes */
-    const ssdgs_real *x;         /* (3, BLOCK) the receivers */
-    ssdgs_real *sums;            /* (SSDGS__LENGTHS, BLOCK) */
-    ssdgs_real *remote, *nearby; /* (5, SSDGS__SOURCES) and (SSDGS__SOURCES, 4), for a kernel */
-    ssdgs_real scale[2];
-    int remote_count, nearby_count, leaf_count;
-    int groups; /* of 16 receivers: a mask of those asked for */
-    ssdgs__receivers block, group[SSDGS__BLOCK / 16];
-    uint32_t leaves[SSDGS__NEAR]; /* lowest nodes near the block */
-} ssdgs__transport_state;
 
 static void ssdgs__remote_flush(ssdgs__transport_state *t, ssdgs__receivers *to) {
     for (; t->remote_count % 16; t->remote_count++)
@@ -3896,7 +3906,7 @@ static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
         int count[SSDGS__WAYS] = {0, 0, 0};
         if (!(t->groups >> group & 1)) continue;
         for (int i = 0; i < t->leaf_count; i++) {
-            const int way = ssdgs__way_of(t->nodes + t->leaves[i], to);
+            const int way = ssdgs__way_of(t, t->nodes + t->leaves[i], to);
             list[way][count[way]++] = t->leaves[i];
         }
         for (int i = 0; i < count[SSDGS__AS_SERIES]; i++)
@@ -3950,6 +3960,8 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     t.scale[0] = soft * soft;
     t.scale[1] =
         (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    t.radii = SSDGS__FAR * frame->options.transport_detail;
+    t.reaches = SSDGS__WIDE * frame->options.transport_detail;
     t.remote_count = t.nearby_count = t.leaf_count = 0;
     t.groups = groups;
     t.block = ssdgs__receivers_at(x, SSDGS__BLOCK);
@@ -3960,7 +3972,7 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
         const int level = level_of[depth];
         const ssdgs__node *node = t.nodes + first[level] + at;
         if (!(node->flux > 0)) continue;
-        if (ssdgs__way_of(node, &t.block) == SSDGS__AS_SERIES) ssdgs__remote_add(&t, &t.block, node);
+        if (ssdgs__way_of(&t, node, &t.block) == SSDGS__AS_SERIES) ssdgs__remote_add(&t, &t.block, node);
         else if (level) {
             const size_t end = SSDGS__LEAF * (at + 1), parts = first[level] - first[level - 1];
             for (size_t part = SSDGS__LEAF * at; part < end && part < parts; part++) {

@@ -352,10 +352,11 @@ static void time_kernels(kernel *kernels, int count, double seconds) {
 
 /* ---- frames and training steps, timed stage by stage where hooks are set ---- */
 
+enum { TRANSPORT = SSDGS_STAGE_COUNT, TIMES }; /* of SHADE's, beside the stages */
 typedef struct session {
     ssdgs_context *context;
     ssdgs_model *model;
-    double stage[SSDGS_STAGE_COUNT]; /* seconds since they were last zeroed */
+    double stage[TIMES]; /* seconds since they were last zeroed */
 } session;
 
 static void check(ssdgs_context *context, ssdgs_result result) {
@@ -364,8 +365,15 @@ static void check(ssdgs_context *context, ssdgs_result result) {
 
 static ssdgs_result time_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
     const double start = now();
-    const ssdgs_result result = ssdgs_stage_cpu(frame, stage);
-    ((session *)user)->stage[stage] += now() - start;
+    session *s = (session *)user;
+    ssdgs_result result = SSDGS_OK;
+    if (stage == SSDGS_STAGE_SHADE && frame->flux) { /* shading finds it done */
+        const ssdgs_real *sums;
+        result = ssdgs__transport(frame, &sums);
+        s->stage[TRANSPORT] += now() - start;
+    }
+    if (!result) result = ssdgs_stage_cpu(frame, stage);
+    s->stage[stage] += now() - start;
     return result;
 }
 
@@ -411,8 +419,8 @@ typedef struct job {
                       begins */
     ssdgs_render_options options;
     int width, height, views, fixed_light, fixed_camera, turned_away;
-    double ms, stage_ms[SSDGS_STAGE_COUNT]; /* means over the views of each one's best */
-    double shaded;                          /* fraction of the Gaussians */
+    double ms, stage_ms[TIMES]; /* means over the views of each one's best */
+    double shaded;              /* fraction of the Gaussians */
 } job;
 
 static job make_job(const bench *b, session *s, ssdgs_render_options options) {
@@ -455,7 +463,7 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
 
 /* Jobs in turn, for at least two passes; the first also warms up. */
 static void time_jobs(bench *b, job *jobs, int count, double seconds) {
-    static double best[MAX_JOBS][MAX_PHOTOS][SSDGS_STAGE_COUNT + 1];
+    static double best[MAX_JOBS][MAX_PHOTOS][TIMES + 1];
     const double end = now() + seconds * (b->quick ? 0.2 : 1);
     if (count > MAX_JOBS) die("jobs", "too many");
     for (int round = 0; round < 2 || (round < 40 && now() < end); round++)
@@ -467,20 +475,20 @@ static void time_jobs(bench *b, job *jobs, int count, double seconds) {
                 memset(j->s->stage, 0, sizeof j->s->stage);
                 const double start = now();
                 run(b, j, v, round ? NULL : &stats);
-                double took[SSDGS_STAGE_COUNT + 1];
-                took[SSDGS_STAGE_COUNT] = now() - start;
+                double took[TIMES + 1];
+                took[TIMES] = now() - start;
                 if (!round && stats.gaussians) j->shaded += (double)stats.shaded / stats.gaussians / j->views;
                 memcpy(took, j->s->stage, sizeof j->s->stage);
-                for (int stage = 0; stage <= SSDGS_STAGE_COUNT; stage++)
+                for (int stage = 0; stage <= TIMES; stage++)
                     if (!round || took[stage] < best[i][v][stage]) best[i][v][stage] = took[stage];
             }
         }
     for (int i = 0; i < count; i++) {
         job *j = jobs + i;
         for (int v = 0; v < j->views; v++) {
-            for (int stage = 0; stage < SSDGS_STAGE_COUNT; stage++)
+            for (int stage = 0; stage < TIMES; stage++)
                 j->stage_ms[stage] += 1e3 * best[i][v][stage] / j->views;
-            j->ms += 1e3 * best[i][v][SSDGS_STAGE_COUNT] / j->views;
+            j->ms += 1e3 * best[i][v][TIMES] / j->views;
         }
     }
 }
@@ -661,6 +669,9 @@ static void measure_stages(bench *b) {
             v[stages] = v[stages + 1] = jobs[k].ms;
             for (int stage = 0; stage < stages; stage++) v[stages] -= v[stage] = jobs[k].stage_ms[stage];
         }
+        if (b->isas[i / b->thread_count] == b->best_isa && i % b->thread_count == 0) /* on one thread */
+            add_facts(b, "walk_fraction transport_fraction", jobs[0].stage_ms[SSDGS_STAGE_WALK] / jobs[0].ms,
+                      jobs[0].stage_ms[TRANSPORT] / jobs[0].ms);
         ssdgs_trainer_destroy(jobs[1].trainer);
         close_session(&s);
     }
@@ -708,6 +719,7 @@ static const struct {
 } knobs[] = {{"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}},
              {"light_detail", {0.8, 0.6, 0.5, 0.35}},
              {"stop", {1e-3, 4e-3, 0.01, 0.03}},
+             {"transport_detail", {0.7, 0.5, 0.35}},
              {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}};
 enum { KNOBS = sizeof knobs / sizeof *knobs };
 
@@ -724,7 +736,7 @@ static void measure_sweep(bench *b) {
         for (int i = 0; knobs[k].values[i] > 0; i++, count++) {
             ssdgs_render_options *o = options + count;
             ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, &o->stop,
-                                               &o->alpha_threshold};
+                                               &o->transport_detail, &o->alpha_threshold};
             *o = preset(EXACT);
             *fields[k] = (ssdgs_real)knobs[k].values[i];
             snprintf(names[count], sizeof *names, "%s %g", knobs[k].name, knobs[k].values[i]);
@@ -969,6 +981,7 @@ static const struct {
                   {"#d1495b", "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"},
                   {"#3d85c6", "m-3.5 -3.5h7v7h-7z"},
                   {"#2a9d6f", "m0 -5l5 9h-10z"},
+                  {"#8e5bb5", "m0 -5l5 5l-5 5l-5 -5z"},
                   {"#d98a1f", "m0 5l5 -9h-10z"}};
 enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };
 static const double least_error = 1e-5,

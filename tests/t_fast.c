@@ -216,7 +216,7 @@ static void test_walk(void) {
         ssdgs_metrics metrics;
         ssdgs_light other;
         for (int change = 0; change < changes; change++) {
-            const int kind = PICK(19), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
+            const int kind = PICK(20), channel = PICK(2) ? PICK(3) : PICK(SSDGS_CHANNELS),
                       gaussian = PICK(FEWER), light = PICK(LIGHTS);
             const ssdgs_real value = (ssdgs_real)draw(at++);
             switch (kind) {
@@ -241,6 +241,7 @@ static void test_walk(void) {
             case 16:
                 for (int k = 0; k < 2; k++) CHECK(!ssdgs_model_sort(models[k][which]));
                 break;
+            case 18: options.transport_detail = PICK(2) ? 1 : (ssdgs_real)0.3 + value; break;
             case 17: /* the model's own, in both contexts */
                 for (int k = 0; k < 2; k++) {
                     const ssdgs_model_view v = ssdgs_model_arrays(models[k][which]);

@@ -49,7 +49,8 @@ static const field settings_fields[] = {
 };
 static const field render_fields[] = {
 #define R(name, low, high) REAL(ssdgs_render_options, name, low, high)
-    R(stop, 0, 1), R(alpha_threshold, 0, 1), R(max_error, 0, 1), R(light_detail, 0.01, 8)
+    R(stop, 0, 1), R(alpha_threshold, 0, 1), R(max_error, 0, 1), R(light_detail, 0.01, 8),
+    R(transport_detail, 0.1, 8)
 #undef R
 };
 static const field train_fields[] = {

@@ -402,6 +402,7 @@ static void row_04(
 
 static void row_05(void) { /* drawn where z > near and z is finite, else as if it were not there */
     const float near_plane = 0.5f;
+    const ssdgs_render_options exact = ssdgs_render_options_exact();
     uint32_t bits;
     ssdgs_camera camera = ahead();
     memcpy(&bits, &near_plane, 4);
@@ -415,13 +416,13 @@ static void row_05(void) { /* drawn where z > near and z is finite, else as if i
     depths[11] = 1e29, depths[12] = 1e38;
     camera.near_plane = (ssdgs_real)0.5;
     ssdgs_model *model = cloud(plain(), GOOD);
-    show(model, &camera, NULL, 0, NULL, &a);
+    show(model, &camera, NULL, 0, &exact, &a);
     ssdgs_model_destroy(model);
     model = cloud(plain(), GOOD + 1);
     for (int i = 0; i < 13; i++) {
         const int drawn = depths[i] > 0.5 && depths[i] < 1e30; /* NaN fails both */
         put(model, GOOD, 0, 0, depths[i], -5, 2);
-        show(model, &camera, NULL, 0, NULL, &b);
+        show(model, &camera, NULL, 0, &exact, &b);
         CHECK(b.stats.visible == GOOD + drawn && b.stats.rejected == !test_finite((double)(float)depths[i]));
         if (!CHECK(same(&a, &b) == !drawn)) printf("    z = %g\n", depths[i]);
     }
