@@ -38,8 +38,10 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
 	  --out $(DEMO) --sheet $(DEMO)/sheet.png
 
-bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts (BENCH=--quick: a minute)
+bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
+bench-quick: ## the same, coarser: a minute or two
+	$(MAKE) bench BENCH=--quick
 
 experiments: $(BUILD)/train $(BUILD)/relight $(BUILD)/show ## the paper's experiments on SCENES in DATA (hours; PARTS="components ..." alone) into tests/EXPERIMENTS.md
 	@[ -d "$(DATA)" ] || { echo "no folder $(DATA): make experiments DATA=FOLDER, where FOLDER/$(firstword $(subst :, ,$(SCENES))) and the other SCENES lie"; exit 1; }
@@ -161,5 +163,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo bench size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help
