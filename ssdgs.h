@@ -83,8 +83,9 @@ CONVENTIONS
 
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
-  A frame's buffers belong to its model and only grow: a second frame of the same size allocates nothing.
-  Pixels, planes and paths stay the caller's. Contexts, models and trainers may be destroyed in any order.
+  Buffers only grow: a second frame of the same size allocates nothing. What a frame keeps for the next
+  belongs to its model, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models
+  and trainers may be destroyed in any order.
 
 THREADS
   A context serves one thread at a time, with its models and trainers; contexts share nothing. Hooks,
@@ -769,6 +770,7 @@ typedef struct ssdgs_frame {
     ssdgs_real light_gradient[3]; /* position of light 0 */
     ssdgs_real view_gradient[12]; /* camera.view */
     struct ssdgs__frame_memory *memory;
+    struct ssdgs__scratch *scratch;
 } ssdgs_frame;
 
 /* Runs the CPU's version of a stage: what a hook calls for stages that it does not replace. */
@@ -1397,6 +1399,7 @@ struct ssdgs_context {
     ssdgs_gpu_hook gpu;
     const ssdgs__kernels *k;
     struct ssdgs__pool *pool;
+    struct ssdgs__scratch *scratch; /* reused by every frame on this context */
     int isa, threads;
     int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
                           frees it */
@@ -1903,6 +1906,7 @@ SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
 }
 
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, struct ssdgs__frame_memory *memory);
+static void ssdgs__scratch_destroy(ssdgs_context *context, struct ssdgs__scratch *scratch);
 
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out) {
     if (!out) return SSDGS_ERR_ARGUMENT;
@@ -1958,6 +1962,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
 static void ssdgs__context_drop(ssdgs_context *context) {
     const ssdgs_allocator allocator = context->allocator;
     if (--context->references) return;
+    ssdgs__scratch_destroy(context, context->scratch);
     ssdgs__release_to(&allocator, context);
 }
 
@@ -2622,29 +2627,40 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
     int count;
 } ssdgs__bounds;
 
+/* Of a model, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
-    ssdgs__buffer views, view_memory, seen, visibility, cue, shaded, color, component[5], pixels,
-        transmittance;
-    ssdgs__buffer flux, nodes, points, sources, lightings, activations, scratch, slots, lane_slots,
-        view_slots;
-    ssdgs__buffer layers, layer_pixels, layer_gradient, highlight_sums, pixel_visibility, pixel_shadow;
-    ssdgs__buffer pixel_gradient, splat_gradient, color_gradient, gradient, global_gradient, loss;
-    ssdgs__buffer bounds, image, target, normals, cached_lights, shadow_logit, shadow_known, transport,
-        transport_known;
+    ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
+        shadow_known, transport, transport_known;
     int view_room;
     ssdgs__cache cache;
     ssdgs__bounds scene;
 } ssdgs__frame_memory;
 
+/* Of a context: every frame writes it anew. */
+typedef struct ssdgs__scratch {
+    ssdgs__buffer shaded, color, component[5], pixels, transmittance, layers, layer_pixels, pixel_visibility,
+        pixel_shadow, bounds, image, sources, lightings, activations, scratch;
+    ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
+        splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals;
+} ssdgs__scratch;
+
+static void ssdgs__buffers_release(ssdgs_context *context, void *buffers, size_t bytes) {
+    for (size_t i = 0; i < bytes / sizeof(ssdgs__buffer); i++)
+        ssdgs__release(context, ((ssdgs__buffer *)buffers + i)->memory);
+}
+
+static void ssdgs__scratch_destroy(ssdgs_context *context, ssdgs__scratch *scratch) {
+    if (!scratch) return;
+    ssdgs__buffers_release(context, scratch, sizeof *scratch);
+    ssdgs__release(context, scratch);
+}
+
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
     if (!m) return;
-    for (int v = 0; v < m->view_room; v++) {
-        ssdgs__buffer *b = (ssdgs__buffer *)((ssdgs__view_memory *)m->view_memory.memory + v);
-        for (size_t i = 0; i < offsetof(ssdgs__view_memory, chunk_room) / sizeof *b; i++)
-            ssdgs__release(context, b[i].memory);
-    }
-    for (size_t i = 0; i < offsetof(ssdgs__frame_memory, view_room) / sizeof(ssdgs__buffer); i++)
-        ssdgs__release(context, ((ssdgs__buffer *)m + i)->memory);
+    for (int v = 0; v < m->view_room; v++)
+        ssdgs__buffers_release(context, (ssdgs__view_memory *)m->view_memory.memory + v,
+                               offsetof(ssdgs__view_memory, chunk_room));
+    ssdgs__buffers_release(context, m, offsetof(ssdgs__frame_memory, view_room));
     ssdgs__release(context, m);
 }
 
@@ -2816,12 +2832,11 @@ static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs
 }
 
 /* Of the Gaussians that alpha_threshold lets draw anything. */
-static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__frame_memory *m,
-                                        const ssdgs_model_view *g, ssdgs_real alpha_threshold,
-                                        ssdgs__bounds *total) {
+static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__scratch *w, const ssdgs_model_view *g,
+                                        ssdgs_real alpha_threshold, ssdgs__bounds *total) {
     const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
     ssdgs__bounds_job job;
-    SSDGS__RESERVE(m->bounds, job.chunk, ssdgs__bounds, chunks + 1);
+    SSDGS__RESERVE(w->bounds, job.chunk, ssdgs__bounds, chunks + 1);
     job.g = g;
     job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold)
                                                    : -21; /* below the logit, by little */
@@ -3099,7 +3114,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
 }
 
 static const ssdgs__lighting *ssdgs__lightings(const ssdgs_frame *frame) {
-    return (const ssdgs__lighting *)frame->memory->lightings.memory;
+    return (const ssdgs__lighting *)frame->scratch->lightings.memory;
 }
 
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
@@ -3108,10 +3123,13 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
                                        const ssdgs_render_options *options, int components, int training) {
     ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
+    ssdgs__scratch *w;
     const size_t n = (size_t)model->count + SSDGS__BLOCK;
     if (!model->frame) model->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
-    if (!model->frame) return SSDGS_ERR_MEMORY;
+    if (!context->scratch) context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *w);
+    if (!model->frame || !context->scratch) return SSDGS_ERR_MEMORY;
     m = model->frame;
+    w = context->scratch;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
     ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
@@ -3128,6 +3146,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->context = context;
     frame->model = model;
     frame->memory = m;
+    frame->scratch = w;
     frame->settings = model->settings;
     frame->gaussians = ssdgs__model_view(model);
     frame->camera = *camera;
@@ -3147,7 +3166,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     if (needs_light && frame->light_count) {
         if (!m->cache.bounds_ready) {
             result =
-                ssdgs__scene_bounds(context, m, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
+                ssdgs__scene_bounds(context, w, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
             if (result) return result;
             m->cache.bounds_ready = m->cache.revision != 0;
         }
@@ -3201,41 +3220,41 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
     if (frame->settings.transport && (frame->terms & SSDGS_SCATTERING_TERM))
         SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    SSDGS__RESERVE(m->shaded, frame->shaded, uint32_t, n);
-    SSDGS__RESERVE(m->color, frame->color, ssdgs_real, n * 4);
+    SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
+    SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
     if (frame->settings.asg == SSDGS_ASG_DEFERRED && frame->light_count) {
         frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
-        SSDGS__RESERVE(m->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
+        SSDGS__RESERVE(w->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
         if (components || training) {
-            SSDGS__RESERVE(m->layer_pixels, frame->layer_pixels, ssdgs_real,
+            SSDGS__RESERVE(w->layer_pixels, frame->layer_pixels, ssdgs_real,
                            pixels * 3 * (size_t)(frame->layer_count + 1));
-            SSDGS__RESERVE(m->pixel_visibility, frame->pixel_visibility, ssdgs_real,
+            SSDGS__RESERVE(w->pixel_visibility, frame->pixel_visibility, ssdgs_real,
                            pixels * (size_t)frame->light_count);
-            SSDGS__RESERVE(m->pixel_shadow, frame->pixel_shadow, ssdgs_real,
+            SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real,
                            pixels * (size_t)frame->light_count);
         }
         if (training)
-            SSDGS__RESERVE(m->layer_gradient, frame->layer_gradient, ssdgs_real,
+            SSDGS__RESERVE(w->layer_gradient, frame->layer_gradient, ssdgs_real,
                            n * 4 * (size_t)frame->layer_count);
     }
     if (components && !frame->layer_count) {
-        SSDGS__RESERVE(m->component[0], frame->diffuse, ssdgs_real, n * 4);
-        SSDGS__RESERVE(m->component[1], frame->specular, ssdgs_real, n * 4);
-        SSDGS__RESERVE(m->component[2], frame->scattering, ssdgs_real, n * 4);
-        SSDGS__RESERVE(m->component[3], frame->normal, ssdgs_real, n * 4);
-        SSDGS__RESERVE(m->component[4], frame->shadow, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->component[0], frame->diffuse, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->component[1], frame->specular, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->component[2], frame->scattering, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->component[3], frame->normal, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->component[4], frame->shadow, ssdgs_real, n * 4);
     }
-    SSDGS__RESERVE(m->pixels, frame->pixels, ssdgs_real, pixels * 3);
-    SSDGS__RESERVE(m->transmittance, frame->transmittance, ssdgs_real, pixels);
+    SSDGS__RESERVE(w->pixels, frame->pixels, ssdgs_real, pixels * 3);
+    SSDGS__RESERVE(w->transmittance, frame->transmittance, ssdgs_real, pixels);
     if (training) {
-        SSDGS__RESERVE(m->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 4);
-        SSDGS__RESERVE(m->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
-        SSDGS__RESERVE(m->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
-        SSDGS__RESERVE(m->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
-        SSDGS__RESERVE(m->global_gradient, frame->global_gradient, ssdgs_real, model->global_count);
+        SSDGS__RESERVE(w->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 4);
+        SSDGS__RESERVE(w->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
+        SSDGS__RESERVE(w->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
+        SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
+        SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, model->global_count);
     }
     ssdgs__lighting *lightings;
-    SSDGS__RESERVE(m->lightings, lightings, ssdgs__lighting, frame->light_count + 1);
+    SSDGS__RESERVE(w->lightings, lightings, ssdgs__lighting, frame->light_count + 1);
     for (int i = 0; i < frame->light_count; i++) lightings[i] = ssdgs__lighting_of(frame, i);
     return SSDGS_OK;
 }
@@ -4041,7 +4060,7 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     ssdgs__transport_job job;
     job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
-    SSDGS__RESERVE(frame->memory->sources, job.sources, ssdgs_real,
+    SSDGS__RESERVE(frame->scratch->sources, job.sources, ssdgs_real,
                    (size_t)SSDGS__SOURCES * 9 * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
                    blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
@@ -4580,7 +4599,7 @@ static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job
     job->frame = frame;
     job->layout = ssdgs__layout(frame);
     job->blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
-    SSDGS__RESERVE(frame->memory->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
+    SSDGS__RESERVE(frame->scratch->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
     job->lightings = ssdgs__lightings(frame);
     return SSDGS_OK;
 }
@@ -4602,7 +4621,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs__shade_job job;
     ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
-    SSDGS__RESERVE(frame->memory->activations, job.activations, ssdgs_real,
+    SSDGS__RESERVE(frame->scratch->activations, job.activations, ssdgs_real,
                    job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
     if (job.layout.shadow_layers &&
         !frame->training) { /* room from the first frame on, use from the second */
@@ -4766,9 +4785,9 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
     job.slot_stride =
         job.slot_shadow + ssdgs__slot_gradient_size(job.layout.shadow, job.layout.shadow_layers);
-    job.activations = (ssdgs_real *)frame->memory->activations.memory;
-    SSDGS__RESERVE(frame->memory->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
-    SSDGS__RESERVE(frame->memory->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
+    job.activations = (ssdgs_real *)frame->scratch->activations.memory;
+    SSDGS__RESERVE(frame->scratch->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
+    SSDGS__RESERVE(frame->scratch->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
     memset(frame->gradient, 0, n * sizeof(ssdgs_real));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_backward_task, &job);
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__sum_slots_task, &job);
@@ -5143,7 +5162,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
     job.stride = 8 + 4 * (size_t)(1 + frame->layer_count);
     if (frame->layer_count) {
         job.lightings = ssdgs__lightings(frame);
-        SSDGS__RESERVE(frame->memory->highlight_sums, job.highlight_sums, ssdgs_real, sums);
+        SSDGS__RESERVE(frame->scratch->highlight_sums, job.highlight_sums, ssdgs_real, sums);
         memset(job.highlight_sums, 0, sums * sizeof *job.highlight_sums);
         memset(frame->layer_gradient, 0, n * 4 * (size_t)frame->layer_count * sizeof(ssdgs_real));
     }
@@ -5165,7 +5184,7 @@ static void ssdgs__project_backward_task(void *data, int chunk) {
     const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
                  end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     const ssdgs__project_gradient d = {frame->splat_gradient, frame->gradient, frame->gaussians.stride,
-                                       (ssdgs_real *)frame->memory->view_slots.memory + 12 * (size_t)chunk};
+                                       (ssdgs_real *)frame->scratch->view_slots.memory + 12 * (size_t)chunk};
     frame->context->k->project_backward(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end,
                                         &d);
 }
@@ -5174,7 +5193,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) 
     ssdgs_context *context = frame->context;
     const int chunks = ssdgs__chunks(frame);
     ssdgs_real *slots;
-    SSDGS__RESERVE(frame->memory->view_slots, slots, ssdgs_real, 12 * (size_t)chunks + 12);
+    SSDGS__RESERVE(frame->scratch->view_slots, slots, ssdgs_real, 12 * (size_t)chunks + 12);
     ssdgs__parallel(context, chunks, ssdgs__project_backward_task, frame);
     for (int i = 0; i < chunks; i++)
         for (int j = 0; j < 12; j++) frame->view_gradient[j] += slots[12 * i + j];
@@ -5316,7 +5335,7 @@ static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera
             for (int x = 0; x < camera->width; x++, i++)
                 image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
     ssdgs_real *planes;
-    SSDGS__RESERVE(frame.memory->image, planes, ssdgs_real, pixels * 3);
+    SSDGS__RESERVE(frame.scratch->image, planes, ssdgs_real, pixels * 3);
     for (int c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
         const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
@@ -7173,7 +7192,7 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     job.frame = frame;
     job.weight = weight / (ssdgs_real)pixels;
     job.stride = ssdgs__padded_stride(frame->camera.width);
-    SSDGS__RESERVE(frame->memory->normals, frame->normal_gradient, ssdgs_real,
+    SSDGS__RESERVE(frame->scratch->normals, frame->normal_gradient, ssdgs_real,
                    4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * job.stride);
     job.scratch = frame->normal_gradient + 4 * pixels;
     ssdgs__parallel(context, bands, ssdgs__normals_task, &job);
@@ -7203,8 +7222,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     ssdgs__exposure_job job;
-    SSDGS__RESERVE(frame->memory->image, job.image, ssdgs_real, pixels * 9);
-    SSDGS__RESERVE(frame->memory->target, job.target, ssdgs_real, pixels * 3);
+    SSDGS__RESERVE(frame->scratch->image, job.image, ssdgs_real, pixels * 9);
+    SSDGS__RESERVE(frame->scratch->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
     job.photo = shot->photo;
     job.background = shot->background;
@@ -7212,7 +7231,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
-    result = ssdgs__loss(context, &frame->memory->loss, &images, shot->dssim, frame->pixel_gradient, values);
+    result = ssdgs__loss(context, &frame->scratch->loss, &images, shot->dssim, frame->pixel_gradient, values);
     if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
     result = ssdgs__normals_loss(frame, shot->normal_weight);

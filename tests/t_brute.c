@@ -1472,10 +1472,7 @@ static void test_normals(void) {
                 ssdgs_frame frame;
                 memset(&frame, 0, sizeof frame);
                 frame.context = contexts[isa][threads];
-                ssdgs__frame_memory *memory =
-                    (ssdgs__frame_memory *)ssdgs__allocate(frame.context, sizeof *memory);
-                if (!CHECK(memory != NULL)) return;
-                frame.memory = memory;
+                frame.scratch = frame.context->scratch;
                 frame.camera = s.camera;
                 frame.layer_count = 5;
                 frame.layer_pixels = layers;
@@ -1504,7 +1501,6 @@ static void test_normals(void) {
                             most = fmax(most, fabs((double)got[c * SIZE] / weight + world));
                         }
                     }
-                ssdgs__frame_memory_destroy(frame.context, memory);
             }
     }
     CHECK(flat > 10000 && told - flat > 10000);

@@ -205,7 +205,7 @@ static void test_inputs(void) {
     begin_as(&frame, model, lights, 2, 1);
     if (!CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_SHADE))) exit(1);
     ssdgs__block_layout l = ssdgs__layout(&frame);
-    const ssdgs_real *activations = (const ssdgs_real *)frame.memory->activations.memory;
+    const ssdgs_real *activations = (const ssdgs_real *)frame.scratch->activations.memory;
     CHECK(frame.shaded_count > COUNT / 4 && frame.shaded_count < COUNT);
     for (int j = 0; j < frame.shaded_count; j += 7)
         for (int light = 0; light < 2; light++)
