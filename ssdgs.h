@@ -121,7 +121,7 @@ OUTLINES
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB. Left out without changing a bit: what no pixel
-  blends, neurons that are 0 for 64 neighbours, terms nobody asked for, and what the last frame has.
+  blends, neurons that are 0 for 64 neighbours, terms nobody asked for, and what the last frame found.
 
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
@@ -275,7 +275,7 @@ typedef struct ssdgs_settings {
     int dipole;   /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
     int asg;      /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
     int per_channel_optics;   /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
-    int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies; 0 */
+    int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies */
     int transport;            /* 1: it also sees what true dipole transport brings from where light enters */
     int residual_shadow;      /* 1: the shadow network corrects the logit of eq. 7; 0: its output is S */
     int shadow_on_scattering; /* 1: eq. 14, the paper's ablation: S darkens scattering too */
@@ -403,7 +403,7 @@ typedef struct ssdgs_render_options {
     ssdgs_real alpha_threshold; /* a splat is not drawn at pixels where its alpha is below this */
     ssdgs_real max_error;    /* Gaussians whose weights sum to less in every pixel are not shaded; 0 = none */
     ssdgs_real light_detail; /* resolution of the light maps; 1 = the model's choice */
-    ssdgs_real transport_detail; /* of true dipole transport; 1 = sums within about a hundredth */
+    ssdgs_real transport_detail; /* accuracy of true dipole transport; 1 = off by about 1 % at most */
 } ssdgs_render_options;
 
 /* For games (max_error 1/16, stop 1/1024, transport_detail 0.7), the method as written, and for speed
@@ -422,7 +422,7 @@ typedef struct ssdgs_render_stats {
     int blackened;       /* drawn black: the colour is not finite */
     int light_views;     /* light maps in use */
     int camera_cached;   /* 1: projection, order and tiles are the last frame's */
-    int lights_cached;   /* lights whose maps are, too */
+    int lights_cached;   /* lights whose maps are the last frame's */
     int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done */
     size_t instances;    /* (tile, splat) pairs of the camera */
@@ -513,7 +513,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
     ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
                                   removed, see OUTLINES in the manual; 0.02 */
-    ssdgs_real adam_epsilon;   /* of the gradient of a one-byte error in one pixel; 0.1; 0 = 1e-15 */
+    ssdgs_real adam_epsilon;   /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
     ssdgs_rates rates;
 } ssdgs_train_options;
 
@@ -961,7 +961,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BAND 16      /* image rows of a task */
 #define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
 #define SSDGS__LENGTHS 5    /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
-#define SSDGS__SERIES 10    /* factors of a series to second order in x, y, z */
+#define SSDGS__SERIES 10    /* coefficients of a series to second order in x, y, z */
 #define SSDGS__SOURCES 512  /* of light, gathered for a kernel */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
@@ -3050,6 +3050,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame) {
         for (int j = 0; j < 3; j++)
             lights[i].kept =
                 lights[i].kept && !memcmp(light->position + j, last->position + j, sizeof(ssdgs_real));
+        lights[i].shadows_ready = lights[i].kept && lights[i].shadows_ready;
         lights[i].transport_ready =
             lights[i].kept && lights[i].transport_ready &&
             !memcmp(&now->transport_detail, &old->transport_detail, sizeof now->transport_detail);
@@ -3170,7 +3171,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
             if (result) return result;
             m->cache.bounds_ready = m->cache.revision != 0;
         }
-        for (int i = 0, moved = 0; i < frame->light_count; i++) { /* after another number, views move */
+        for (int i = 0, moved = 0; i < frame->light_count;
+             i++) { /* behind another number of views all move */
             const int views = ssdgs__light_views(&frame->settings, &m->scene, lights + i,
                                                  (double)frame->options.light_detail, i, NULL);
             cached[i].kept = cached[i].kept && !moved;
@@ -3205,8 +3207,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     }
     frame->views[0].cached = m->cache.camera_ready;
     for (int i = 0, j = 1; i < frame->light_count; i++) {
-        cached[i].shadows_ready = cached[i].kept && cached[i].shadows_ready;
-        cached[i].transport_ready = cached[i].kept && cached[i].transport_ready;
         if (!needs_light) continue;
         if (!cached[i].kept)
             ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
@@ -3691,12 +3691,12 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
 typedef struct ssdgs__node {
     ssdgs_real x[3], flux;     /* the mean, and how much enters */
     ssdgs_real radius, spread; /* how far from the mean its sources lie at most, and the mean square */
-    int points;                /* of a lowest node: what receivers nearby see of it */
+    int points;                /* of a lowest node: how many points stand for it nearby */
 } ssdgs__node;
 
 #define SSDGS__LEVELS 12
 #define SSDGS__LEAF 8    /* Gaussians of a lowest node, and parts of a higher one */
-#define SSDGS__NEAR 256  /* lowest nodes near a block, between two looks of its 16s at them */
+#define SSDGS__NEAR 256  /* lowest nodes near a block, taken together */
 #define SSDGS__SOFT 0.02 /* in length units; distances are sqrt(r^2 + soft^2) */
 /* A node is one point from so many of its radii away, and joins a series around receivers from so many of
    their reaches. */
@@ -3774,22 +3774,23 @@ static void ssdgs__leaf_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
     const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
                  end = begin + SSDGS__CHUNK / SSDGS__LEAF;
-    for (int light = 0; light < job->frame->light_count; light++)
-        for (size_t leaf = job->lights[light].transport_ready ? end : begin; leaf < end && leaf < job->leaves;
-             leaf++) {
+    for (int light = 0; light < job->frame->light_count; light++) {
+        if (job->lights[light].transport_ready) continue;
+        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
             ssdgs__node parts[SSDGS__LEAF];
             job->nodes[job->count * (size_t)light + leaf] =
                 ssdgs__node_join(parts, ssdgs__leaf_parts(job->frame, light, leaf, parts));
         }
+    }
 }
 
-static void ssdgs__point_put(ssdgs_real *points, ssdgs__node *leaf, const ssdgs__node *part) {
-    ssdgs_real *const point = points + 4 * leaf->points++;
-    memcpy(point, part->x, sizeof part->x);
-    point[3] = part->flux;
+/* A node as a point: x, y, z, flux. */
+static void ssdgs__point_put(ssdgs_real *point, const ssdgs__node *node) {
+    memcpy(point, node->x, sizeof node->x);
+    point[3] = node->flux;
 }
 
-/* What receivers nearby see of these: Gaussians of much flux, and the others as one point. */
+/* The points that stand for lowest nodes nearby: Gaussians of much flux, and one for all others. */
 static void ssdgs__points_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
     const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
@@ -3806,10 +3807,10 @@ static void ssdgs__points_task(void *data, int chunk) {
             const ssdgs_real dim = nodes[leaf].radius < compact ? SSDGS__DIM * mean : 0;
             memset(&others, 0, sizeof others);
             for (size_t i = 0; i < count; i++) {
-                if (parts[i].flux > dim) ssdgs__point_put(points, nodes + leaf, parts + i);
+                if (parts[i].flux > dim) ssdgs__point_put(points + 4 * nodes[leaf].points++, parts + i);
                 else if (parts[i].flux > 0) ssdgs__node_add(&others, parts + i);
             }
-            if (others.flux > 0) ssdgs__point_put(points, nodes + leaf, &others);
+            if (others.flux > 0) ssdgs__point_put(points + 4 * nodes[leaf].points++, &others);
         }
     }
 }
@@ -3840,7 +3841,7 @@ static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, ssdgs__node_job *job) {
 }
 
 /* Gaussians that receive light, and what far sources bring around their middle, to second order: for each
-   length the factors of 1, x, y, z, xx, xy, xz, yy, yz, zz. */
+   length the coefficients of 1, x, y, z, xx, xy, xz, yy, yz, zz. */
 typedef struct ssdgs__receivers {
     ssdgs_real middle[3], reach, series[SSDGS__LENGTHS * SSDGS__SERIES];
 } ssdgs__receivers;
@@ -3869,7 +3870,7 @@ static ssdgs__receivers ssdgs__receivers_at(const ssdgs_real *x, int lanes) {
     return to;
 }
 
-/* A block of receivers at work. */
+/* What transport to one block of receivers works on. */
 typedef struct ssdgs__transport_state {
     const ssdgs__kernels *k;
     const ssdgs__node *nodes;            /* the light's */
@@ -3894,7 +3895,7 @@ static SSDGS__INLINE int ssdgs__way_of(const ssdgs__transport_state *t, const ss
                      z = node->x[2] - to->middle[2], distance2 = x * x + y * y + z * z;
     const int point_like = distance2 > point * point;
     return point_like +
-           (point_like & (distance2 > series * series)); /* without a branch: nobody could foretell it */
+           (point_like & (distance2 > series * series)); /* no branch: it would be mispredicted */
 }
 
 static void ssdgs__remote_flush(ssdgs__transport_state *t, ssdgs__receivers *to) {
@@ -3917,7 +3918,7 @@ static void ssdgs__nearby_flush(ssdgs__transport_state *t, int group) {
     t->nearby_count = 0;
 }
 
-/* The nodes near the block, as each of its 16s sees them. */
+/* The lowest nodes near the block, to each of its groups of 16. */
 static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
     for (int group = 0; group < SSDGS__BLOCK / 16; group++) {
         ssdgs__receivers *to = t->group + group;
@@ -3931,12 +3932,8 @@ static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
         for (int i = 0; i < count[SSDGS__AS_SERIES]; i++)
             ssdgs__remote_add(t, to, t->nodes + list[SSDGS__AS_SERIES][i]);
         ssdgs__remote_flush(t, to);
-        for (int i = 0; i < count[SSDGS__AS_POINT]; i++) {
-            const ssdgs__node *node = t->nodes + list[SSDGS__AS_POINT][i];
-            ssdgs_real *const at = t->nearby + 4 * t->nearby_count++;
-            memcpy(at, node->x, sizeof node->x);
-            at[3] = node->flux;
-        }
+        for (int i = 0; i < count[SSDGS__AS_POINT]; i++)
+            ssdgs__point_put(t->nearby + 4 * t->nearby_count++, t->nodes + list[SSDGS__AS_POINT][i]);
         for (int i = 0; i < count[SSDGS__AS_POINTS]; i++) {
             const uint32_t leaf = list[SSDGS__AS_POINTS][i];
             if (t->nearby_count > SSDGS__SOURCES - SSDGS__LEAF) ssdgs__nearby_flush(t, group);
@@ -3952,7 +3949,7 @@ static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
 typedef struct ssdgs__transport_job {
     ssdgs__node_job tree; /* where the light enters */
     int blocks; /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
-    ssdgs_real *sources; /* (slots, 9, SSDGS__SOURCES) */
+    ssdgs_real *sources; /* (slots, 5 remote + 4 nearby, SSDGS__SOURCES) */
     ssdgs_real *sums;    /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
     unsigned char
         *known; /* (lights, blocks) masks of groups of 16 whose sums are there: for as long as lights rest */
@@ -4009,7 +4006,7 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, i
     ssdgs__transport_leaves(&t);
     t.k->series(t.block.series, t.block.middle, x, SSDGS__BLOCK, sums);
     for (int i = 0; i < SSDGS__BLOCK / 16; i++)
-        t.k->series(t.group[i].series, t.group[i].middle, x + 16 * i, 16, sums + 16 * i);
+        if (groups >> i & 1) t.k->series(t.group[i].series, t.group[i].middle, x + 16 * i, 16, sums + 16 * i);
     for (int k = 0; k < SSDGS__LENGTHS; k++) {
         const ssdgs_real scale =
             (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
@@ -8991,8 +8988,8 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     return result;
 }
 
-/* 1 where two, without the padding between their parts, differ in nothing but what training sets: centre,
- * length_unit, light_scale, origin. */
+/* Whether two differ in nothing but what training sets: centre, length_unit, light_scale, origin. Compares
+   two pieces, without the padding between them. */
 static int ssdgs__settings_alike(const ssdgs_settings *a, const ssdgs_settings *b) {
     const size_t first =
                      offsetof(ssdgs_settings, shadow) + sizeof a->shadow - offsetof(ssdgs_settings, terms),
@@ -10057,8 +10054,8 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
    x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
    in the transmittance, and takes part in it once its own distance is reached: two batches run along the
    list, the nearer one leaves what it has met after each of its entries for the other to pick from.
-   Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. What lies in
-   the dark alone is not sampled either, where no other tile has a say. */
+   Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. An entry all
+   of whose micro-tiles are dark is not sampled either, unless its Gaussian lies in other tiles too. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = VSET(tile->log2_threshold), one = VSET(1);
     const int all = tile->flux || tile->light_map, cue = tile->cue, flux = tile->flux;
