@@ -14,10 +14,22 @@
 #endif
 
 #define PI 3.14159265358979323846
-enum { SPLIT, OUT_FOLDER, BACKGROUND, SHEET, THREADS, ISA, NETWORKS, TRAJECTORY, COMPONENTS, OPTION_COUNT };
-static const char *const option_names[OPTION_COUNT] = {"--split",    "--out",        "--background",
-                                                       "--sheet",    "--threads",    "--isa",
-                                                       "--networks", "--trajectory", "--components"};
+enum {
+    SPLIT,
+    OUT_FOLDER,
+    BACKGROUND,
+    SHEET,
+    THREADS,
+    ISA,
+    NETWORKS,
+    REDUCE,
+    TRAJECTORY, /* it and those after it take no value */
+    COMPONENTS,
+    OPTION_COUNT
+};
+static const char *const option_names[OPTION_COUNT] = {
+    "--split", "--out",      "--background", "--sheet",      "--threads",
+    "--isa",   "--networks", "--reduce",     "--trajectory", "--components"};
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
@@ -32,6 +44,8 @@ static const char *const help[] = {
     "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
     "                           shadow, normal",
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
+    "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
+    "                           DIR/reduced.ply",
     "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped",
     "                           them",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
@@ -66,6 +80,7 @@ typedef struct job {
     const char *given[OPTION_COUNT], *model_path, *dataset, *out;
     ssdgs_context_desc desc;
     ssdgs_real background[3];
+    int reduce; /* Gaussians to be left; 0 = all */
     ssdgs_context *context;
     ssdgs_model *model;
     olat_dataset data;
@@ -112,6 +127,13 @@ static int parse(job *j, int argc, char **argv) {
             return usage("--threads needs a number from 0 to 1024, not", value);
         j->desc.threads = (int)threads;
     }
+    value = j->given[REDUCE];
+    if (value) {
+        const long count = strtol(value, &end, 10);
+        if (end == value || *end || count < 1 || count > 1000000000)
+            return usage("--reduce needs a number from 1 on, not", value);
+        j->reduce = (int)count;
+    }
     value = j->given[ISA];
     while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
@@ -143,10 +165,10 @@ static const char *base_name(const olat_frame *frame) {
     return slash ? slash + 1 : frame->file;
 }
 
-/* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; OUT/metrics.json without a
-   frame. To be freed. */
+/* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; without a frame OUT/SUFFIX.
+   To be freed. */
 static char *output_path(const job *j, const olat_frame *frame, const char *suffix) {
-    const char *name = frame ? base_name(frame) : "metrics.json", *dot = frame ? strrchr(name, '.') : NULL;
+    const char *name = frame ? base_name(frame) : "", *dot = strrchr(name, '.');
     const size_t length = dot ? (size_t)(dot - name) : strlen(name);
     char *path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
     if (path) sprintf(path, "%s/%.*s%s%s", j->out, (int)length, name, suffix, frame ? ".png" : "");
@@ -185,8 +207,8 @@ static int check_outputs(job *j) {
             ok = check_output(j, path);
             free(path);
         }
-    if (ok) {
-        char *path = output_path(j, NULL, "");
+    for (int i = 0; i < (j->reduce ? 2 : 1) && ok; i++) {
+        char *path = output_path(j, NULL, i ? "reduced.ply" : "metrics.json");
         ok = check_output(j, path);
         free(path);
     }
@@ -200,7 +222,7 @@ static void write_numbers(olat__writer *w, const ssdgs_metrics *m, double flip) 
 }
 
 static int write_metrics(const job *j, const ssdgs_metrics *mean, double mean_flip) {
-    char *path = output_path(j, NULL, ""), error[512] = "";
+    char *path = output_path(j, NULL, "metrics.json"), error[512] = "";
     const char *separator = "";
     if (!path) return 0;
     olat__writer w;
@@ -550,6 +572,14 @@ static int relight(job *j) {
     if (!load_frames(j)) return 1;
     make_folders(j->out); /* so that paths can be told apart by what they are */
     if (!check_outputs(j) || !make_planes(j)) return 1;
+    if (j->reduce) {
+        char *path = output_path(j, NULL, "reduced.ply");
+        if (!path) return 1;
+        result = ssdgs_model_reduce(j->model, j->reduce);
+        if (!result) result = ssdgs_model_save(j->model, path);
+        free(path);
+        if (result) return fail(ssdgs_error_message(j->context));
+    }
     for (int i = 0; i < j->data.count; i++) {
         const olat_frame *frame = &j->data.frames[i];
         int components = j->given[COMPONENTS] != NULL;

@@ -12,6 +12,7 @@ says() { # says CODE TEXT COMMAND...: ends with that code and says that
     [ $? -eq "$code" ] && grep -q -- "$text" "$out/log"
 }
 hash_of() { find "$@" -type f -exec cksum {} + | sort; }
+differs() { ! cmp -s "$1" "$2"; }
 unchanged() { [ "$(hash_of "$set")" = "$before" ]; }
 psnr() { sed -n 's/.*"mean": {"psnr": \([-0-9.]*\).*/\1/p' "$1/metrics.json"; }
 near() { awk -v a="$1" -v b="$2" -v by="$3" 'BEGIN { exit !(a > b - by && a < b + by) }'; } # near A B BY
@@ -67,6 +68,13 @@ for file in r_001 r_002 r_003; do ln "$out/same/r_000.png" "$out/same/$file.png"
 check "into files that are links to each other" says 0 "4 images" relight --out "$out/same"
 check "relight again" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
 check "the dataset is as it was" unchanged
+
+# a level of detail is written, and is what the pictures show
+check "--reduce" says 0 "4 images" relight --out "$out/reduced" --reduce 50
+check "as reduced" says 0 "4 images" "$build/relight" "$out/reduced/reduced.ply" "$set" --out "$out/reduced2" --threads 1
+check "the same picture" cmp "$out/reduced/r_000.png" "$out/reduced2/r_000.png"
+check "another picture" differs "$out/reduced/r_000.png" "$out/relit/r_000.png"
+check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
 # names that differ in case, or by what components add, are numbered
 sed -e 's|test/r_001|test/R_000|' -e 's|test/r_002|test/r_000_depth|' "$set/transforms_test.json" >"$out/names.json"

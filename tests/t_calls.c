@@ -74,6 +74,7 @@ static int call_everything(void) {
     all.depth = 1;
     refused += ssdgs_render(model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_sort(model) == SSDGS_ERR_ARGUMENT;
+    refused += ssdgs_model_reduce(model, 1) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_create(context, NULL, 1, &other) == SSDGS_ERR_ARGUMENT && !other;
     refused += ssdgs_model_adopt(model, model) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_save(model, FILE_NAME) == SSDGS_ERR_ARGUMENT;
@@ -86,7 +87,7 @@ static int call_everything(void) {
     refused += ssdgs_trainer_create(model, &photo, 1, NULL, &next) == SSDGS_ERR_ARGUMENT && !next;
     int iteration;
     refused += ssdgs_checkpoint_iteration(context, FILE_NAME, &iteration) == SSDGS_ERR_ARGUMENT;
-    all.tries += 12;
+    all.tries += 13;
     if (trainer) {
         refused += ssdgs_trainer_step(trainer, NULL) == SSDGS_ERR_ARGUMENT;
         refused += ssdgs_trainer_run(trainer, NULL, NULL) == SSDGS_ERR_ARGUMENT;
@@ -331,6 +332,8 @@ static void test_null(void) {
     NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
           "ssdgs_checkpoint_iteration: iteration is NULL");
     NAMES(ssdgs_model_adopt(all.model, all.model), "ssdgs_model_adopt: a trainer has the model");
+    NAMES(ssdgs_model_reduce(all.model, 1), "ssdgs_model_reduce: a trainer has the model");
+    NAMES(ssdgs_model_reduce(all.model, 0), "ssdgs_model_reduce: 0 Gaussians");
     CHECK(!other);
     CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) &&
           ssdgs_model_adopt(NULL, all.model) && ssdgs_model_save(NULL, FILE_NAME) &&

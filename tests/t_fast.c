@@ -379,26 +379,29 @@ static void test_presets(void) {
     ssdgs_camera camera = camera_at(0);
     ssdgs_image out;
     memset(&out, 0, sizeof out);
-    ssdgs_render_options options[3];
+    static const char *const names[4] = {"exact", "default", "fast", "preview"};
+    static const double least[4] = {0, 50, 35, 25}; /* dB */
+    ssdgs_render_options options[4];
     options[0] = ssdgs_render_options_exact();
     options[1] = ssdgs_render_options_default();
     options[2] = ssdgs_render_options_fast();
+    options[3] = ssdgs_render_options_preview();
     if (!CHECK(!ssdgs_context_create(NULL, &context))) exit(1);
     ssdgs_model *model = make_model(context, COUNT);
-    ssdgs_render_stats stats[3];
-    for (int o = 0; o < 3; o++) {
+    ssdgs_render_stats stats[4];
+    for (int o = 0; o < 4; o++) {
         double squares = 0;
         render(model, &camera, &light, 1, options + o, image[o > 0], stats + o);
         for (int i = 0; o && i < PIXELS * 3; i++) squares += pow((double)(image[1][i] - image[0][i]), 2);
-        if (o)
-            printf("%s against exact: %.1f dB\n", o == 1 ? "default" : "fast",
-                   ssdgs__psnr(squares / (PIXELS * 3)));
-        if (o) CHECK(ssdgs__psnr(squares / (PIXELS * 3)) > (o == 1 ? 50 : 35));
+        const double psnr = ssdgs__psnr(squares / (PIXELS * 3));
+        if (o) printf("%s against exact: %.1f dB\n", names[o], psnr);
+        CHECK(psnr > least[o]);
         CHECK(stats[o].gaussians == COUNT && stats[o].light_views == 1 && stats[o].rejected == 0);
         CHECK(stats[o].network_work > 0.3 && stats[o].network_work <= 1);
     }
     CHECK(stats[0].skipped == 0 && stats[1].skipped > 0);
-    CHECK(stats[0].shaded >= stats[1].shaded + stats[1].skipped - 1 && stats[2].shaded < stats[1].shaded);
+    CHECK(stats[0].shaded >= stats[1].shaded + stats[1].skipped - 1 && stats[2].shaded < stats[1].shaded &&
+          stats[3].shaded < stats[2].shaded);
     options[0].max_error = 2;
     CHECK(ssdgs_render_ex(model, &camera, &light, 1, options, &out, NULL) == SSDGS_ERR_ARGUMENT);
     options[0] = ssdgs_render_options_exact();

@@ -389,6 +389,7 @@ static ssdgs_result do_create(void) {
 static ssdgs_result do_load(void) { return ssdgs_model_load(context, start_path, &made, NULL); }
 static ssdgs_result do_save(void) { return ssdgs_model_save(model, file_path); }
 static ssdgs_result do_sort(void) { return ssdgs_model_sort(model); }
+static ssdgs_result do_reduce(void) { return ssdgs_model_reduce(model, 20); }
 static ssdgs_result do_frame(void) { return frame(1); }
 static ssdgs_result do_compare(void) {
     return ssdgs_compare(context, pair[0], pair[1], SIDE, SIDE, &metrics);
@@ -441,6 +442,7 @@ static const operation operations[] = {{"model_create", with_context, do_create,
                                        {"model_load_memory", with_context, do_load_memory, 0},
                                        {"model_save", with_model, do_save, 0},
                                        {"model_sort", with_model, do_sort, 0},
+                                       {"model_reduce", with_model, do_reduce, 1},
                                        {"render", with_model, do_frame, 1},
                                        {"render more", with_frame, do_frame, 1},
                                        {"compare", with_frame, do_compare, 0},

@@ -1,0 +1,296 @@
+/* Levels of detail: merging keeps mass, place and spread, finds twins, takes what is hidden first, and looks
+   like the whole. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+enum { SIDE = 96, PIXELS = SIDE * SIDE };
+
+static double draw(uint64_t counter) { return test_uniform(91, counter); }
+
+static ssdgs_context *open_context(int threads) {
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = threads;
+    if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+    return context;
+}
+
+static ssdgs_model *new_model(ssdgs_context *context, const ssdgs_settings *settings, int count) {
+    ssdgs_model *model = NULL;
+    if (!CHECK(!ssdgs_model_create(context, settings, count, &model))) exit(1);
+    return model;
+}
+
+static void set(ssdgs_model *model, int index, const ssdgs_gaussian *g) {
+    CHECK(!ssdgs_model_set(model, index, g));
+}
+
+/* Somewhere in the box, of any shape and colour. */
+static ssdgs_gaussian any(int index) {
+    const uint64_t at = 64 * (uint64_t)index;
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    for (int c = 0; c < 4; c++) g.rotation[c] = (ssdgs_real)(2 * draw(at + (uint64_t)c) - 1);
+    for (int c = 0; c < 3; c++) {
+        g.position[c] = (ssdgs_real)(draw(at + 8 + (uint64_t)c) - 0.5);
+        g.scale[c] = (ssdgs_real)(0.005 + 0.03 * draw(at + 16 + (uint64_t)c));
+        g.normal[c] = (ssdgs_real)(2 * draw(at + 24 + (uint64_t)c) - 1);
+        g.diffuse[c] = (ssdgs_real)draw(at + 32 + (uint64_t)c);
+        g.specular[c] = (ssdgs_real)draw(at + 40 + (uint64_t)c);
+        g.scattering[c] = (ssdgs_real)draw(at + 48 + (uint64_t)c);
+        g.material[c] = (ssdgs_real)draw(at + 56 + (uint64_t)c);
+    }
+    g.opacity = (ssdgs_real)(0.05 + 0.2 * draw(at + 60));
+    g.sharpness[0] = (ssdgs_real)(1 + draw(at + 61));
+    g.f0 = (ssdgs_real)(0.02 + 0.1 * draw(at + 62));
+    g.softness = (ssdgs_real)(0.2 + 0.5 * draw(at + 63));
+    return g;
+}
+
+/* Their mass, opacity x area, its first and its second moments: 1 + 3 + 6. */
+static void moments(const ssdgs_model *model, int count, double sum[10]) {
+    memset(sum, 0, 10 * sizeof *sum);
+    for (int i = 0; i < count; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        const double w = (double)g.rotation[0], x = (double)g.rotation[1], y = (double)g.rotation[2],
+                     z = (double)g.rotation[3];
+        const double axis[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)},
+                                   {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)},
+                                   {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)}};
+        const double s[3] = {(double)g.scale[0], (double)g.scale[1], (double)g.scale[2]};
+        const double mass = (double)g.opacity * (s[0] * s[1] + s[1] * s[2] + s[2] * s[0]);
+        int at = 4;
+        sum[0] += mass;
+        for (int a = 0; a < 3; a++) {
+            sum[1 + a] += mass * (double)g.position[a];
+            for (int b = a; b < 3; b++, at++) {
+                sum[at] += mass * (double)g.position[a] * (double)g.position[b];
+                for (int c = 0; c < 3; c++) sum[at] += mass * axis[c][a] * axis[c][b] * s[c] * s[c];
+            }
+        }
+    }
+}
+
+static void test_moments(void) {
+    ssdgs_context *context = open_context(1);
+    ssdgs_model *model = new_model(context, NULL, 600);
+    double before[10], after[10];
+    for (int i = 0; i < 600; i++) {
+        const ssdgs_gaussian g = any(i);
+        set(model, i, &g);
+    }
+    moments(model, 600, before);
+    for (int count = 599; count > 100; count -= 149) {
+        CHECK(!ssdgs_model_reduce(model, count));
+        CHECK(ssdgs_model_arrays(model).count == count);
+        moments(model, count, after);
+        CHECK_NEAR(after, before, 10, 0.01 * before[0], 0.01, "mass, place and spread stay");
+    }
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Each of two halves of one, at the same place, becomes that one again, however their quaternions are signed.
+ */
+static void test_twins(void) {
+    enum { N = 200 };
+    ssdgs_context *context = open_context(1);
+    ssdgs_model *model = new_model(context, NULL, 2 * N);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
+    int whole = 0, turned = 0;
+    for (int i = 0; i < N; i++) {
+        ssdgs_gaussian g = any(i);
+        for (int c = 0; c < 3; c++)
+            g.position[c] = (ssdgs_real)((i / (c == 0 ? 1 : c == 1 ? 6 : 36)) % 6 - 2.5); /* far apart */
+        g.opacity /= 2;
+        set(model, i, &g);
+        set(model, 2 * N - 1 - i, &g);
+        for (size_t c = 0; c < 4; c++) /* as much of a rotation as before */
+            v.gaussians[(SSDGS_FRAME + c) * v.stride + (size_t)i] *= -3;
+    }
+    CHECK(!ssdgs_model_reduce(model, N));
+    for (int i = 0; i < N; i++) {
+        double worst = 0;
+        ssdgs_gaussian got;
+        CHECK(!ssdgs_model_get(model, i, &got));
+        int j = 0, step = 1;
+        for (int c = 0; c < 3; c++, step *= 6) j += step * (int)floor((double)got.position[c] + 3);
+        const ssdgs_gaussian want = any(j);
+        ssdgs_real length = 0;
+        for (int c = 0; c < 3; c++) length += want.normal[c] * want.normal[c];
+        length = (ssdgs_real)sqrt((double)length);
+        for (int c = 0; c < 3; c++) {
+            const ssdgs_real pairs[6][2] = {
+                {got.diffuse[c], want.diffuse[c]},       {got.specular[c], want.specular[c]},
+                {got.scattering[c], want.scattering[c]}, {got.normal[c], want.normal[c] / length},
+                {got.material[c], want.material[c]},     {got.opacity, want.opacity}};
+            for (int k = 0; k < 6; k++) {
+                const double error = fabs((double)(pairs[k][0] - pairs[k][1]));
+                worst = error <= worst ? worst : error;
+            }
+        }
+        const double others[3] = {(double)(got.sharpness[0] / want.sharpness[0]), (double)(got.f0 / want.f0),
+                                  (double)(got.softness / want.softness)};
+        for (int k = 0; k < 3; k++) worst = fabs(others[k] - 1) <= worst ? worst : fabs(others[k] - 1);
+        ssdgs_real a = got.scale[0] * got.scale[1] * got.scale[2],
+                   b = want.scale[0] * want.scale[1] * want.scale[2];
+        worst = fabs((double)(a / b) - 1) <= worst ? worst : fabs((double)(a / b) - 1);
+        whole += worst < 1e-3;
+        turned += fabs((double)got.rotation[1]) > 0.01;
+    }
+    if (!CHECK(whole >= 9 * N / 10)) printf("    %d of %d\n", whole, N);
+    CHECK(turned > N / 2);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Inside of a closed shell is nothing that one would miss. */
+static void test_hidden(void) {
+    enum { SHELL = 400, INSIDE = 200 };
+    ssdgs_context *context = open_context(1);
+    ssdgs_model *model = new_model(context, NULL, SHELL + INSIDE);
+    int outside = 0, untouched = 0;
+    for (int i = 0; i < SHELL + INSIDE; i++) {
+        const int n = i < SHELL ? SHELL : INSIDE, k = i < SHELL ? i : i - SHELL;
+        const double z = 1 - (2 * k + 1.0) / n, r = sqrt(1 - z * z), radius = i < SHELL ? 0.5 : 0.2;
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        g.position[0] = (ssdgs_real)(radius * r * cos(2.4 * k));
+        g.position[1] = (ssdgs_real)(radius * r * sin(2.4 * k));
+        g.position[2] = (ssdgs_real)(radius * z);
+        for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)(i < SHELL ? 0.08 : 0.02);
+        g.opacity = (ssdgs_real)0.99;
+        set(model, i, &g);
+    }
+    CHECK(!ssdgs_model_reduce(model, SHELL + INSIDE / 4));
+    for (int i = 0; i < SHELL + INSIDE / 4; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        double r2 = 0;
+        for (int c = 0; c < 3; c++) r2 += (double)g.position[c] * (double)g.position[c];
+        outside += r2 > 0.16;
+        untouched += r2 > 0.16 && fabs((double)g.scale[0] - 0.08) < 1e-3;
+    }
+    if (!CHECK(outside == SHELL && untouched == SHELL))
+        printf("    %d, %d as they were\n", outside, untouched);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* A sphere's shell of flat Gaussians with smooth stripes; of `step` at a time one. */
+static ssdgs_model *striped(ssdgs_context *context, int count, int step, int terms) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    settings.terms = terms & SSDGS_ALL_TERMS;
+    settings.baked = !terms;
+    settings.light_map.bias = (ssdgs_real)0.3; /* no Gaussian shadows its neighbours */
+    ssdgs_model *model = new_model(context, &settings, count / step);
+    for (int i = 0; i < count; i += step) {
+        const double z = 1 - (2 * i + 1.0) / count, r = sqrt(1 - z * z);
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        const double at[3] = {r * cos(2.39996323 * i), r * sin(2.39996323 * i), z};
+        for (int c = 0; c < 3; c++) {
+            g.normal[c] = (ssdgs_real)at[c];
+            g.position[c] = (ssdgs_real)(0.5 * at[c]);
+            g.scale[c] = (ssdgs_real)(c < 2 ? 1.2 / sqrt((double)count) : 0.002);
+            g.diffuse[c] = (ssdgs_real)(0.5 + 0.4 * sin(6 * at[c] + c));
+            g.specular[c] = (ssdgs_real)0.1;
+            g.scattering[c] = (ssdgs_real)0.2;
+            g.rotation[c] = 0;
+        }
+        g.rotation[3] = 0; /* across the normal */
+        g.opacity = (ssdgs_real)0.7;
+        set(model, i / step, &g);
+    }
+    CHECK(!ssdgs_model_sort(model));
+    return model;
+}
+
+static void picture(ssdgs_model *model, ssdgs_real *color) {
+    const ssdgs_real eye[3] = {(ssdgs_real)1.5, (ssdgs_real)-1.2, (ssdgs_real)0.7}, target[3] = {0, 0, 0},
+                     up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
+    ssdgs_light light;
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_image out;
+    memset(&light, 0, sizeof light);
+    memset(&out, 0, sizeof out);
+    out.color = color;
+    for (int c = 0; c < 3; c++) light.position[c] = 2 * eye[c], light.intensity[c] = 20;
+    CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &out, NULL));
+}
+
+static double error_of(const ssdgs_real *a, const ssdgs_real *b) {
+    double sum = 0;
+    for (int i = 0; i < 3 * PIXELS; i++) sum += (double)(a[i] - b[i]) * (double)(a[i] - b[i]);
+    return sum;
+}
+
+/* Whatever the model has: reflectance, all terms, baked colours. */
+static void test_looks(void) {
+    static ssdgs_real whole[3 * PIXELS], reduced[3 * PIXELS], fewer[3 * PIXELS];
+    static const int terms[6] = {SSDGS_DIFFUSE_TERM, 3, 5, 9, 15, 0};
+    ssdgs_context *context = open_context(2);
+    for (int i = 0; i < 3; i++) {
+        ssdgs_model *model = striped(context, 4000, 1, terms[i]), *half = striped(context, 4000, 2, terms[i]);
+        double power = 0;
+        picture(model, whole);
+        picture(half, fewer);
+        CHECK(!ssdgs_model_reduce(model, 2000) && ssdgs_model_arrays(model).count == 2000);
+        picture(model, reduced);
+        for (int k = 0; k < 3 * PIXELS; k++) power += (double)whole[k] * (double)whole[k];
+        const double left = error_of(whole, reduced) / power, dropped = error_of(whole, fewer) / power;
+        if (!CHECK(left < 4e-3 && left < 0.05 * dropped))
+            printf("    %d: %g, every other one %g\n", i, left, dropped);
+        ssdgs_model_destroy(model);
+        ssdgs_model_destroy(half);
+    }
+    ssdgs_context_destroy(context);
+}
+
+/* The same for any number of threads; what has fewer stays; nothing that is no number gets in. */
+static void test_edges(void) {
+    ssdgs_context *contexts[2];
+    ssdgs_model *models[2];
+    for (int i = 0; i < 2; i++) {
+        contexts[i] = open_context(1 + 2 * i);
+        models[i] = striped(contexts[i], 1500, 1, SSDGS_ALL_TERMS);
+        const ssdgs_model_view v = ssdgs_model_arrays(models[i]);
+        const ssdgs_settings before = *ssdgs_model_settings(models[i]);
+        CHECK(ssdgs_model_reduce(models[i], 0) == SSDGS_ERR_ARGUMENT);
+        CHECK(!ssdgs_model_reduce(models[i], 1500) && ssdgs_model_arrays(models[i]).count == 1500);
+        v.gaussians[7] = NAN;                            /* never drawn: it goes */
+        v.gaussians[SSDGS_DIFFUSE * v.stride + 9] = NAN; /* drawn black */
+        for (size_t k = 20; k < 40; k++) v.gaussians[SSDGS_OPACITY * v.stride + k] = -60; /* nothing of it */
+        CHECK(!ssdgs_model_reduce(models[i], 700) && ssdgs_model_arrays(models[i]).count == 700);
+        CHECK(!memcmp(&before, ssdgs_model_settings(models[i]), sizeof before));
+    }
+    int bad = 0;
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
+        const ssdgs_model_view a = ssdgs_model_arrays(models[0]), b = ssdgs_model_arrays(models[1]);
+        CHECK(!memcmp(a.gaussians + c * a.stride, b.gaussians + c * b.stride, 700 * sizeof(ssdgs_real)));
+        for (size_t i = 0; i < 700; i++) bad += !test_finite((double)a.gaussians[c * a.stride + i]);
+    }
+    CHECK(bad == 1); /* the black one, which comes last */
+    for (int i = 0; i < 2; i++) {
+        CHECK(!ssdgs_model_reduce(models[i], 1) && ssdgs_model_arrays(models[i]).count == 1);
+        ssdgs_model_destroy(models[i]);
+    }
+    ssdgs_model *same = new_model(contexts[0], NULL, 100); /* all in one place, and opaque */
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    g.opacity = 1;
+    for (int i = 0; i < 100; i++) set(same, i, &g);
+    CHECK(!ssdgs_model_reduce(same, 3) && ssdgs_model_arrays(same).count == 3);
+    CHECK(!ssdgs_model_get(same, 2, &g) && g.opacity > (ssdgs_real)0.99);
+    ssdgs_model_destroy(same);
+    for (int i = 0; i < 2; i++) ssdgs_context_destroy(contexts[i]);
+}
+
+int main(void) {
+    test_moments();
+    test_twins();
+    test_hidden();
+    test_looks();
+    test_edges();
+    TEST_END();
+}
