@@ -20,7 +20,7 @@
 enum {
     SIDE = 256, /* px, of the timed frames */
     MAX_PHOTOS = 16,
-    MAX_JOBS = 32,
+    MAX_JOBS = 48,
     MAX_COLUMNS = 12,
     MAX_TABLES = 32,
     MAX_FACTS = 64,
@@ -406,6 +406,12 @@ static void open_session(const bench *b, session *s, int isa, int threads, int h
     check(s->context, ssdgs_model_load(s->context, b->model, &s->model, NULL));
 }
 
+/* The session's model becomes a level of detail with a share of its Gaussians. */
+static void reduce_session(session *s, double share) {
+    const int count = (int)(share * s->model->count);
+    if (share < 1) check(s->context, ssdgs_model_reduce(s->model, count > 1 ? count : 1));
+}
+
 static void close_session(session *s) {
     ssdgs_model_destroy(s->model);
     ssdgs_context_destroy(s->context);
@@ -536,9 +542,9 @@ static void render_stored(bench *b, session *s, const ssdgs_photo *photo,
         b->color[i] = b->color[i] < 0 ? 0 : b->color[i] > 1 ? 1 : b->color[i];
 }
 
-static void measure_quality(bench *b, session *s, const ssdgs_render_options *options, int count,
-                            quality *out) {
-    const int views = s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
+/* Of jobs' models and options; the first is exact. */
+static void measure_quality(bench *b, const job *jobs, int count, quality *out) {
+    const int views = jobs->s->context->isa == b->best_isa || b->photo_count < 4 ? b->photo_count : 4;
     ssdgs_real *target = (ssdgs_real *)make(3 * MAX_PIXELS, sizeof *target);
     memset(out, 0, (size_t)count * sizeof *out);
     ssdgs_real *exact[MAX_PHOTOS];
@@ -548,7 +554,7 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
             const ssdgs_photo *photo = b->photos + v * b->photo_count / views;
             const size_t n = (size_t)photo->camera.width * (size_t)photo->camera.height;
             double photo_squares = 0;
-            render_stored(b, s, photo, options + o);
+            render_stored(b, jobs[o].s, photo, &jobs[o].options);
             if (!o)
                 exact[v] =
                     (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
@@ -571,13 +577,25 @@ static void measure_quality(bench *b, session *s, const ssdgs_render_options *op
 
 /* ---- what is measured ---- */
 
-static const char *const presets[] = {"exact", "default", "fast"};
-enum { EXACT, DEFAULT, FAST, PRESETS };
+static const char *const presets[] = {"exact", "default", "fast", "preview"};
+enum { EXACT, DEFAULT, FAST, PREVIEW, PRESETS };
 
 static ssdgs_render_options preset(int i) {
     return i == EXACT     ? ssdgs_render_options_exact()
            : i == DEFAULT ? ssdgs_render_options_default()
-                          : ssdgs_render_options_fast();
+           : i == FAST    ? ssdgs_render_options_fast()
+                          : ssdgs_render_options_preview();
+}
+
+enum { LEVELS = 6, PREVIEW_LEVEL = 4 };   /* levels of detail: the whole, then those of the sweep */
+static const double preview_share = 0.25; /* of the Gaussians: that of PREVIEW_LEVEL */
+
+/* The whole model and, behind it, that of previews: pair[i == PREVIEW] is a preset's. */
+static void open_pair(const bench *b, session pair[2], int isa, int threads, int hooks) {
+    for (int i = 0; i < 2; i++) {
+        open_session(b, pair + i, isa, threads, hooks, NULL);
+        reduce_session(pair + i, i ? preview_share : 1);
+    }
 }
 
 static const char *name_of(char text[48], const session *s,
@@ -648,6 +666,15 @@ static void measure_layers(bench *b) {
     print_table(t);
 }
 
+/* A row of a job's stages, what is beside them, and all. */
+static void add_stages(table *t, const char *name, const job *j) {
+    const int stages = t->column_count - 2;
+    double *v = new_row(t, name);
+    v[stages] = v[stages + 1] = j->ms;
+    for (int stage = 0; stage < stages; stage++) v[stages] -= v[stage] = j->stage_ms[stage];
+}
+
+/* Ends with a row of each preset, on one thread. */
 static void measure_stages(bench *b) {
     table *t[2];
     t[0] = new_table(b, "stages_frame", "project sort bin walk shade composite other total");
@@ -662,12 +689,9 @@ static void measure_stages(bench *b) {
         jobs[0].views = jobs[0].views > 4 ? 4 : jobs[0].views;
         jobs[1] = training_job(b, jobs[0], NULL, PHASES - 1);
         for (int k = 0; k < 2; k++) { /* the frame first: steps change the model */
-            const int stages = t[k]->column_count - 2;
             char name[48];
-            double *v = new_row(t[k], name_of(name, &s, NULL));
             time_jobs(b, jobs + k, 1, 1);
-            v[stages] = v[stages + 1] = jobs[k].ms;
-            for (int stage = 0; stage < stages; stage++) v[stages] -= v[stage] = jobs[k].stage_ms[stage];
+            add_stages(t[k], name_of(name, &s, NULL), jobs + k);
         }
         if (b->isas[i / b->thread_count] == b->best_isa && i % b->thread_count == 0) /* on one thread */
             add_facts(b, "walk_fraction transport_fraction", jobs[0].stage_ms[SSDGS_STAGE_WALK] / jobs[0].ms,
@@ -675,6 +699,15 @@ static void measure_stages(bench *b) {
         ssdgs_trainer_destroy(jobs[1].trainer);
         close_session(&s);
     }
+    session pair[2];
+    open_pair(b, pair, b->best_isa, 1, 1);
+    for (int p = 0; p < PRESETS; p++) {
+        job j = make_job(b, pair + (p == PREVIEW), preset(p));
+        j.views = j.views > 4 ? 4 : j.views;
+        time_jobs(b, &j, 1, 1);
+        add_stages(t[0], presets[p], &j);
+    }
+    for (int i = 0; i < 2; i++) close_session(pair + i);
     print_table(t[0]);
     print_table(t[1]);
 }
@@ -683,16 +716,15 @@ static void measure_frames(bench *b) {
     table *t =
         new_table(b, "frames", "ms frames_per_s psnr_exact max_error psnr_photo loss_db shaded_fraction");
     for (int i = 0; i < b->isa_count; i++) {
-        ssdgs_render_options options[PRESETS];
-        session s[3];
+        session pairs[3][2];
         job jobs[3 * PRESETS], *all = jobs + PRESETS * (b->thread_count - 1);
         for (int n = 0; n < b->thread_count; n++) {
-            open_session(b, s + n, b->isas[i], b->threads[n], 0, NULL);
+            open_pair(b, pairs[n], b->isas[i], b->threads[n], 0);
             for (int p = 0; p < PRESETS; p++)
-                jobs[n * PRESETS + p] = make_job(b, s + n, options[p] = preset(p));
+                jobs[n * PRESETS + p] = make_job(b, pairs[n] + (p == PREVIEW), preset(p));
         }
         quality q[PRESETS];
-        measure_quality(b, s + b->thread_count - 1, options, PRESETS, q);
+        measure_quality(b, all, PRESETS, q);
         time_jobs(b, jobs, b->thread_count * PRESETS, b->isas[i] == b->best_isa ? 6 : 2);
         for (int n = 0; n < b->thread_count * PRESETS; n++) {
             const int p = n % PRESETS;
@@ -700,19 +732,22 @@ static void measure_frames(bench *b) {
             add_row(t, name_of(name, jobs[n].s, presets[p]), jobs[n].ms, 1e3 / jobs[n].ms, q[p].psnr_exact,
                     q[p].max_error, q[p].psnr_photo, q[EXACT].psnr_photo - q[p].psnr_photo, jobs[n].shaded);
         }
-        for (int n = 0; n < b->thread_count; n++) close_session(s + n);
+        for (int n = 0; n < 2 * b->thread_count; n++) close_session(pairs[n / 2] + n % 2);
         if (b->isas[i] != b->best_isa) continue;
-        add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps", 1e3 / all[EXACT].ms,
-                  1e3 / all[DEFAULT].ms, 1e3 / all[FAST].ms);
-        add_facts(b, "default_psnr_loss_db fast_psnr_loss_db shaded_fraction threads2_speedup_render",
+        add_facts(b, "render256_exact_fps render256_default_fps render256_fast_fps render256_preview_fps",
+                  1e3 / all[EXACT].ms, 1e3 / all[DEFAULT].ms, 1e3 / all[FAST].ms, 1e3 / all[PREVIEW].ms);
+        add_facts(b,
+                  "default_psnr_loss_db fast_psnr_loss_db preview_psnr_loss_db shaded_fraction "
+                  "threads2_speedup_render",
                   q[EXACT].psnr_photo - q[DEFAULT].psnr_photo, q[EXACT].psnr_photo - q[FAST].psnr_photo,
-                  all[DEFAULT].shaded,
+                  q[EXACT].psnr_photo - q[PREVIEW].psnr_photo, all[DEFAULT].shaded,
                   b->thread_count > 1 ? jobs[DEFAULT].ms / jobs[PRESETS + DEFAULT].ms : none);
     }
     print_table(t);
 }
 
-/* One shortcut at a time on top of exact, from weak to strong. */
+/* One shortcut at a time on top of exact, from weak to strong; levels of detail, the last, by the share of
+   the Gaussians. */
 static const struct {
     const char *name;
     double values[6];
@@ -720,41 +755,41 @@ static const struct {
              {"light_detail", {0.8, 0.6, 0.5, 0.35}},
              {"stop", {1e-3, 4e-3, 0.01, 0.03}},
              {"transport_detail", {0.7, 0.5, 0.35}},
-             {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}}};
-enum { KNOBS = sizeof knobs / sizeof *knobs };
+             {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}},
+             {"gaussians", {0.7, 0.5, 0.35, 0.25, 0.12}}};
+enum { KNOBS = sizeof knobs / sizeof *knobs, GAUSSIANS = KNOBS - 1 };
 
 static void measure_sweep(bench *b) {
     table *t = new_table(b, "sweep", "ms rms_error max_error loss_db shaded_fraction");
-    ssdgs_render_options options[MAX_JOBS];
     char names[MAX_JOBS][48];
+    session levels[LEVELS];
+    job jobs[MAX_JOBS];
     int count;
+    for (int i = 0; i < LEVELS; i++) {
+        open_session(b, levels + i, b->best_isa, 0, 0, NULL);
+        reduce_session(levels + i, i ? knobs[GAUSSIANS].values[i - 1] : 1);
+    }
     for (count = 0; count < PRESETS; count++) {
-        options[count] = preset(count);
+        jobs[count] = make_job(b, levels + (count == PREVIEW ? PREVIEW_LEVEL : 0), preset(count));
         snprintf(names[count], sizeof *names, "%s", presets[count]);
     }
     for (int k = 0; k < KNOBS; k++)
-        for (int i = 0; knobs[k].values[i] > 0; i++, count++) {
-            ssdgs_render_options *o = options + count;
-            ssdgs_real *const fields[KNOBS] = {&o->max_error, &o->light_detail, &o->stop,
-                                               &o->transport_detail, &o->alpha_threshold};
-            *o = preset(EXACT);
-            *fields[k] = (ssdgs_real)knobs[k].values[i];
+        for (int i = 0; i < 6 && knobs[k].values[i] > 0; i++, count++) {
+            jobs[count] = make_job(b, levels + (k == GAUSSIANS ? i + 1 : 0), preset(EXACT));
+            ssdgs_render_options *o = &jobs[count].options;
+            ssdgs_real *const fields[GAUSSIANS] = {&o->max_error, &o->light_detail, &o->stop,
+                                                   &o->transport_detail, &o->alpha_threshold};
+            if (k < GAUSSIANS) *fields[k] = (ssdgs_real)knobs[k].values[i];
             snprintf(names[count], sizeof *names, "%s %g", knobs[k].name, knobs[k].values[i]);
         }
-    session s;
-    open_session(b, &s, b->best_isa, 0, 0, NULL);
-    job jobs[MAX_JOBS];
-    for (int i = 0; i < count; i++) {
-        jobs[i] = make_job(b, &s, options[i]);
-        jobs[i].views = jobs[i].views > 4 ? 4 : jobs[i].views;
-    }
+    for (int i = 0; i < count; i++) jobs[i].views = jobs[i].views > 4 ? 4 : jobs[i].views;
     quality q[MAX_JOBS];
-    measure_quality(b, &s, options, count, q);
+    measure_quality(b, jobs, count, q);
     time_jobs(b, jobs, count, 12);
     for (int i = 0; i < count; i++)
         add_row(t, names[i], jobs[i].ms, pow(10, -q[i].psnr_exact / 20), q[i].max_error,
                 q[EXACT].psnr_photo - q[i].psnr_photo, jobs[i].shaded);
-    close_session(&s);
+    for (int i = 0; i < LEVELS; i++) close_session(levels + i);
     print_table(t);
 }
 
@@ -774,13 +809,14 @@ static void measure_skipping(bench *b) {
                  {"no scattering, no specular", SSDGS_SCATTERING_TERM | SSDGS_SPECULAR_TERM, 0, 0, 0},
                  {"diffuse alone", SSDGS_ALL_TERMS & ~SSDGS_DIFFUSE_TERM, 0, 0, 0}};
     enum { KINDS = sizeof kinds / sizeof *kinds };
-    table *t =
-        new_table(b, "skipping", "exact_ms default_ms fast_ms exact_of_all default_of_all fast_of_all");
-    session s;
-    open_session(b, &s, b->best_isa, 0, 0, NULL);
+    table *t = new_table(b, "skipping",
+                         "exact_ms default_ms fast_ms preview_ms exact_of_all default_of_all fast_of_all "
+                         "preview_of_all");
+    session pair[2];
+    open_pair(b, pair, b->best_isa, 0, 0);
     job jobs[PRESETS * KINDS];
     for (int i = 0; i < PRESETS * KINDS; i++) {
-        jobs[i] = make_job(b, &s, preset(i % PRESETS));
+        jobs[i] = make_job(b, pair + (i % PRESETS == PREVIEW), preset(i % PRESETS));
         jobs[i].options.terms &= ~kinds[i / PRESETS].skipped_terms;
         jobs[i].fixed_light = kinds[i / PRESETS].fixed_light;
         jobs[i].fixed_camera = kinds[i / PRESETS].fixed_camera;
@@ -794,7 +830,7 @@ static void measure_skipping(bench *b) {
             v[PRESETS + p] = v[p] / jobs[p].ms;
         }
     }
-    close_session(&s);
+    for (int i = 0; i < 2; i++) close_session(pair + i);
     print_table(t);
 }
 
@@ -982,8 +1018,9 @@ static const struct {
                   {"#3d85c6", "m-3.5 -3.5h7v7h-7z"},
                   {"#2a9d6f", "m0 -5l5 9h-10z"},
                   {"#8e5bb5", "m0 -5l5 5l-5 5l-5 -5z"},
-                  {"#d98a1f", "m0 5l5 -9h-10z"}};
-enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64 };
+                  {"#d98a1f", "m0 5l5 -9h-10z"},
+                  {"#7a8b2e", "m-1.5 -5h3v3.5h3.5v3h-3.5v3.5h-3v-3.5h-3.5v-3h3.5z"}};
+enum { WIDE = 400, HIGH = 340, LEFT = 56, TOP = 64, BARS = TOP + HIGH + 72, BAR = 22 };
 static const double least_error = 1e-5,
                     largest_error = 0.1; /* images that are equal, or nearly, stand on the axis */
 
@@ -1025,6 +1062,52 @@ static void draw_axes(const chart *c, const char *title) {
             c->left + WIDE / 2, bottom + 34);
 }
 
+/* The Pareto front: no other row is as fast with as small an error. */
+static void draw_front(const chart *c, const table *t) {
+    double ms = 0;
+    fprintf(c->file, "<path class=\"f\" d=\"");
+    for (int drawn = 0;; drawn++) { /* the next slower row that errs less than all faster ones */
+        const double *next = NULL;
+        for (int r = 0; r < t->row_count; r++) {
+            const double *v = t->rows[r].value;
+            int best = v[0] > ms;
+            for (int i = 0; i < t->row_count; i++) {
+                const double *w = t->rows[i].value;
+                best = best && !(w[0] < v[0] && w[1] <= v[1]);
+            }
+            if (best && (!next || v[0] < next[0])) next = v;
+        }
+        if (!next) break;
+        fprintf(c->file, "%c%.1f %.1f", drawn ? 'L' : 'M', chart_x(c, next[0]), chart_y(next[1]));
+        ms = next[0];
+    }
+    fprintf(c->file, "\"/>\n");
+}
+
+static const char *const stage_inks[] = {"#d1495b", "#8e5bb5", "#3d85c6", "#2a9d6f",
+                                         "#d98a1f", "#7a8b2e", "#909090"};
+enum { STAGE_INKS = sizeof stage_inks / sizeof *stage_inks };
+
+/* What each stage takes of each preset's frame: the table's last rows. */
+static void draw_bars(const chart *c, const table *t) {
+    const row *rows = t->rows + t->row_count - PRESETS;
+    const double scale = (WIDE - 40) / rows[EXACT].value[STAGE_INKS];
+    for (int p = 0; p < PRESETS; p++) {
+        double x = c->left;
+        for (int i = 0; i < STAGE_INKS; i++) {
+            const double width = scale * (rows[p].value[i] > 0 ? rows[p].value[i] : 0);
+            fprintf(c->file, "<path fill=\"%s\" d=\"M%.1f %dh%.1fv%dh-%.1fz\"/>\n", stage_inks[i], x,
+                    BARS + BAR * p, width, BAR - 4, width);
+            x += width;
+        }
+        fprintf(
+            c->file,
+            "<text x=\"%.1f\" y=\"%d\" text-anchor=\"end\">%s</text><text x=\"%.1f\" y=\"%d\">%.1f</text>\n",
+            c->left - 6, BARS + BAR * p + 13, presets[p], x + 6, BARS + BAR * p + 13,
+            rows[p].value[STAGE_INKS]);
+    }
+}
+
 static void draw_sweep(chart *c, const table *t, const char *title) {
     const double *v = t->rows[EXACT].value, x0 = v[0], y0 = v[1];
     c->fastest = c->slowest = x0;
@@ -1036,6 +1119,7 @@ static void draw_sweep(chart *c, const table *t, const char *title) {
     c->fastest /= 1.15;
     c->slowest *= 1.15;
     draw_axes(c, title);
+    draw_front(c, t);
     for (int r = PRESETS, k = 0; k < KNOBS; k++) {
         fprintf(c->file, "<g fill=\"%s\"><path fill=\"none\" stroke=\"%s\" d=\"M%.1f %.1f", looks[k].ink,
                 looks[k].ink, chart_x(c, x0), chart_y(y0));
@@ -1071,20 +1155,29 @@ static void write_svg(const bench *b, FILE *file) {
             "font-size=\"12\" "
             "fill=\"#808080\">\n<style>.g "
             "path{stroke:#888;stroke-opacity:.4;fill:none}.b{font-weight:bold}.s{font-size:9px}"
-            ".p{fill:none;stroke:#808080;stroke-width:2.5}</style>\n<text x=\"12\" y=\"18\">root mean square "
-            "error against "
-            "exact; 1 is white</text>\n",
-            2 * (WIDE + LEFT) + 32, TOP + HIGH + 44);
+            ".p{fill:none;stroke:#808080;stroke-width:2.5}"
+            ".f{fill:none;stroke:#888;stroke-opacity:.35;stroke-width:9;stroke-linejoin:round}</style>\n"
+            "<text x=\"12\" y=\"18\">root mean square error against exact; 1 is white; grey: the Pareto "
+            "front</text>\n",
+            2 * (WIDE + LEFT) + 32, BARS + BAR * PRESETS + 30);
     for (int i = 0; i < KNOBS; i++)
-        fprintf(file, "<path d=\"M%d 14%s\" fill=\"%s\"/><text x=\"%d\" y=\"18\">%s</text>\n", 400 + 104 * i,
-                looks[i].mark, looks[i].ink, 410 + 104 * i, knobs[i].name);
+        fprintf(file, "<path d=\"M%d 32%s\" fill=\"%s\"/><text x=\"%d\" y=\"36\">%s</text>\n", 16 + 120 * i,
+                looks[i].mark, looks[i].ink, 26 + 120 * i, knobs[i].name);
     for (int i = 0; i < b->table_count; i++) {
         const char *key = b->tables[i].key;
-        if (strlen(key) < 5 || strcmp(key + strlen(key) - 5, "sweep")) continue;
-        draw_sweep(&c, b->tables + i, key[0] == 's' ? "default model" : "published model");
-        c.left += WIDE + LEFT;
+        const int published = key[0] == 'p';
+        c.left = LEFT + (published ? WIDE + LEFT : 0);
+        if (!strcmp(key, published ? "published_sweep" : "sweep"))
+            draw_sweep(&c, b->tables + i, published ? "published model" : "default model");
+        if (!strcmp(key, published ? "published_stages_frame" : "stages_frame")) draw_bars(&c, b->tables + i);
     }
-    fprintf(file, "</svg>\n");
+    const char *stage = "project sort bin walk shade composite other ";
+    for (int i = 0; i < STAGE_INKS; i++, stage += strcspn(stage, " ") + 1)
+        fprintf(file, "<path fill=\"%s\" d=\"M%d %dh9v9h-9z\"/><text x=\"%d\" y=\"%d\">%.*s</text>\n",
+                stage_inks[i], LEFT + 90 * i, BARS + BAR * PRESETS + 8, LEFT + 90 * i + 13,
+                BARS + BAR * PRESETS + 17, (int)strcspn(stage, " "), stage);
+    fprintf(file, "<text x=\"%d\" y=\"%d\">ms of a frame on one thread</text>\n</svg>\n",
+            LEFT + 90 * STAGE_INKS, BARS + BAR * PRESETS + 17);
 }
 
 /* ---- the program ---- */
