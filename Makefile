@@ -77,6 +77,8 @@ $(BUILD)/builds.log: %.log: $(OBJECTS)
 $(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
+test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc
+	sh tests/mpi.sh $(BUILD)
 test-asan: ## tests under the address sanitizer
 	$(MAKE) test BUILD=$(BUILD)/asan CFLAGS="-O1 -g -fsanitize=address -fno-omit-frame-pointer"
 test-ubsan: ## tests under the undefined-behaviour sanitizer
@@ -134,6 +136,8 @@ $(BUILD)/kernels.o $(BUILD)/kernels_64.o: tests/library.c $(HEADERS) | $(BUILD)
 	$(COMPILE) $(KERNELS) -DSSDGS_STATIC -DTEST_KERNELS $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
 $(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
+$(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
+	$(PROGRAM:$(CC)%=mpicc%) $(LINKED)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/hashes_64: $(BUILD)/ssdgs_64.o

@@ -495,11 +495,21 @@ typedef struct ssdgs_rates {
                                  photograph; with fewer, times the root of 300 / shows */
 } ssdgs_rates;
 
+/* Processes that share each batch: every one holds the same photographs and draws its part, and what they
+   find is added. For equal bits on one process and many: add ranks in pairs, then pairs of pairs. */
+typedef struct ssdgs_sum {
+    /* Makes of `count` values their sums over all processes, the same everywhere. Any result but SSDGS_OK
+       ends the step, which changes nothing. */
+    ssdgs_result (*add)(void *user, ssdgs_real *values, size_t count);
+    void *user;
+    int rank, processes; /* this one, 0 and up, of so many, of which `batch` is a multiple */
+} ssdgs_sum;
+
 /* Iterations marked * are of a run of 60,000; shorter runs scale them. 0 disables where nothing else is
    said. */
 typedef struct ssdgs_train_options {
     int version;             /* set by ssdgs_train_options_default / _published */
-    int iterations;          /* 20000 */
+    int iterations;          /* 20000: photographs drawn */
     uint64_t seed;           /* 1 */
     int schedule;            /* ssdgs_schedule: in which order the terms join; merged */
     int random_background;   /* 1: photographs with transparency are laid over a new colour each step; 0: over
@@ -510,6 +520,7 @@ typedef struct ssdgs_train_options {
     int densify_from;        /* first round; 200 */
     int densify_until;       /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
+    int batch;               /* photographs a step, whose gradients are averaged; rates grow as its root; 1 */
     int refine;              /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
     ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
     ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
@@ -523,6 +534,7 @@ typedef struct ssdgs_train_options {
                                   removed, see OUTLINES in the manual; 0.02 */
     ssdgs_real adam_epsilon;   /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
     ssdgs_rates rates;
+    ssdgs_sum sum; /* none */
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
@@ -532,10 +544,10 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 typedef struct ssdgs_train_stats {
     int iteration; /* done so far */
     int gaussians;
-    int shaded;        /* in this step */
+    int shaded;        /* of a photograph in this step */
     int terms;         /* SSDGS_*_TERM mask: the schedule's so far; the others are untrained */
     int skipped_steps; /* refused so far, as a gradient was not finite */
-    double loss, psnr; /* of this step's image */
+    double loss, psnr; /* of this step's images, on average */
 } ssdgs_train_stats;
 
 /* Returns 0 to stop: ssdgs_trainer_run() then returns ERR_CANCELLED, and the model is whole. */
@@ -548,8 +560,9 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer); /* NULL is fine */
-/* One iteration. ERR_NONFINITE and ERR_MEMORY: nothing has changed, but where density control alone lacks
-   memory the step is done without, as stats->iteration says. */
+/* A step: `batch` iterations. ERR_NONFINITE and ERR_MEMORY: nothing has changed, but where density control
+   alone lacks memory the step is done without, as stats->iteration says. ERR_CANCELLED: another process
+   failed. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
 /* Steps until `iterations` are done, and calls progress (may be NULL) after each. Ten refused steps in a row
    end it. */
@@ -7159,7 +7172,8 @@ struct ssdgs_trainer {
         *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
     ssdgs_real *magnify; /* per photograph: what makes up for an object small in the picture, 1 for others */
     int photo_count;
-    uint32_t *order;           /* the photographs in this pass's order */
+    uint32_t *order;           /* the photographs in the order of a pass */
+    int pass;                  /* that one; -1: none */
     size_t stride;             /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
@@ -7175,7 +7189,8 @@ struct ssdgs_trainer {
     double start_size;    /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
-    int running; /* in ssdgs_trainer_run() */
+    int running;        /* in ssdgs_trainer_run() */
+    ssdgs__buffer sums; /* of a batch */
 };
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
@@ -7198,6 +7213,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.densify_from = 200;
     o.densify_until = 50000;
     o.opacity_reset_every = 3000;
+    o.batch = 1;
     o.densify_gradient = (ssdgs_real)4e-4;
     o.densify_shadow = (ssdgs_real)0.5;
     o.prune_weight = (ssdgs_real)0.05;
@@ -7267,6 +7283,11 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
 static int ssdgs__resets(const ssdgs_train_options *o, int iteration) {
     return o->opacity_reset_every && iteration > 0 && iteration % o->opacity_reset_every == 0 &&
            ssdgs__schedule_time(o, iteration + o->opacity_reset_every / 2) <= o->densify_until;
+}
+
+/* The last iteration that could have been followed by a reset. */
+static int ssdgs__last_reset(const ssdgs_train_options *o, int iteration) {
+    return o->opacity_reset_every ? iteration - iteration % o->opacity_reset_every : 0;
 }
 
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
@@ -7588,7 +7609,7 @@ static ssdgs_real ssdgs__bias_correction(double beta,
 static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, double epsilon,
                             const ssdgs__adam_range *arrays) {
     ssdgs__adam_range *r = job->range + job->ranges++;
-    const double rate = ssdgs__group_rate(trainer, group, t);
+    const double rate = ssdgs__group_rate(trainer, group, t) * sqrt((double)trainer->options.batch);
     *r = *arrays;
     r->group = group;
     r->bad = 0;
@@ -7617,11 +7638,17 @@ static int ssdgs__group_used(int group, int terms, int asg) {
     }
 }
 
-static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double t, int terms,
-                                     const int learns[SSDGS__GROUPS]) {
+/* What the photographs of a step have in common. */
+typedef struct ssdgs__step {
+    double t; /* schedule time */
+    int terms, learns[SSDGS__GROUPS];
+} ssdgs__step;
+
+/* On the frame's gradients, of a photograph of so many pixels. */
+static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double pixels,
+                                     const ssdgs__step *step) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
-    const double pixels = (double)frame->camera.width * frame->camera.height;
     const double epsilon = (double)trainer->options.adam_epsilon / (255 * 3 * pixels);
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
@@ -7633,7 +7660,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     job.chunks = 0;
     for (int group = 0; group < SSDGS__GROUPS; group++) {
         const int shared = group - SSDGS__PLANE_GROUPS;
-        if (!learns[group] || !ssdgs__group_used(group, terms, model->settings.asg)) continue;
+        if (!step->learns[group] || !ssdgs__group_used(group, step->terms, model->settings.asg)) continue;
         if (shared >= 0) {
             const size_t at = first[shared], n = first[shared + 1] - at;
             if (!n) continue;
@@ -7642,7 +7669,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
             arrays.mean = trainer->global_mean + at;
             arrays.square = trainer->global_square + at;
             arrays.n = n;
-            ssdgs__adam_add(&job, trainer, group, t, epsilon, &arrays);
+            ssdgs__adam_add(&job, trainer, group, step->t, epsilon, &arrays);
         } else {
             for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
                 const size_t at = (size_t)c * trainer->stride;
@@ -7651,7 +7678,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
                 arrays.mean = trainer->mean + at;
                 arrays.square = trainer->square + at;
                 arrays.n = (size_t)model->count;
-                ssdgs__adam_add(&job, trainer, group, t, epsilon, &arrays);
+                ssdgs__adam_add(&job, trainer, group, step->t, epsilon, &arrays);
             }
         }
     }
@@ -7664,7 +7691,8 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
                                job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
     for (int group = 0; group < SSDGS__GROUPS; group++)
-        trainer->steps[group] += learns[group] && ssdgs__group_used(group, terms, model->settings.asg);
+        trainer->steps[group] +=
+            step->learns[group] && ssdgs__group_used(group, step->terms, model->settings.asg);
     return SSDGS_OK;
 }
 
@@ -7738,6 +7766,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
    steps. */
 
 #define SSDGS__STATISTICS 4
+#define SSDGS__MAX_BATCH 256
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
@@ -7961,8 +7990,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: weights say little */
-    const int before = trainer->iteration - 1,
-              last = o->opacity_reset_every ? before - before % o->opacity_reset_every : 0;
+    const int before = trainer->iteration - o->batch, last = ssdgs__last_reset(o, before);
     const int recovering = last > before - o->densify_every && ssdgs__resets(o, last);
     uint64_t *order;
     size_t kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n);
@@ -8059,18 +8087,20 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
     }
 }
 
-static void ssdgs__gather_statistics(ssdgs_trainer *trainer, const ssdgs_frame *frame, ssdgs_real magnify) {
+/* Adds what a photograph says of its Gaussians to (SSDGS__STATISTICS, stride) sums. */
+static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_frame *frame,
+                                     ssdgs_real magnify, ssdgs_real *sums) {
     const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2,
                      half_h = magnify * (ssdgs_real)frame->camera.height / 2;
     for (int i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
         const ssdgs_real lit = frame->terms & SSDGS_SHADOW_TERM ? frame->visibility[g] : 1;
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
-        trainer->screen_gradient[g] += SSDGS__SQRT(x * x + y * y);
-        trainer->screen_count[g] += 1;
-        trainer->contribution[g] += d[6];
+        sums[g] += SSDGS__SQRT(x * x + y * y);
+        sums[trainer->stride + g] += 1;
+        sums[2 * trainer->stride + g] += d[6];
         if (d[6] > 1)
-            trainer->half_shadow[g] +=
+            sums[3 * trainer->stride + g] +=
                 4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
     }
 }
@@ -8105,6 +8135,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(max_gaussians, 1, SSDGS__MAX_GAUSSIANS);
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
+    SSDGS__RANGE(batch, 1, SSDGS__MAX_BATCH);
     SSDGS__RANGE(refine, 0, SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT);
     SSDGS__RANGE(dssim, 0, 1);
     SSDGS__RANGE(normal_weight, 0, most);
@@ -8114,6 +8145,11 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(adam_epsilon, 0, most);
 #undef SSDGS__RANGE
+    if (o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
+                       o->batch % o->sum.processes))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "train options: process %d of %d cannot share a batch of %d", o->sum.rank,
+                           o->sum.processes, o->batch);
     for (int i = 0; i < 12; i++)
         if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
@@ -8274,6 +8310,7 @@ static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
     ssdgs__release(context, trainer->corrections);
     ssdgs__release(context, trainer->transparent);
     ssdgs__release(context, trainer->magnify);
+    ssdgs__release(context, trainer->sums.memory);
     ssdgs__release(context, trainer->order);
     ssdgs__release(context, trainer->mean);
     ssdgs__release(context, trainer->square);
@@ -8940,6 +8977,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
     model->references++;
     ssdgs__model_changed(model);
     trainer->options = options ? *options : ssdgs_train_options_default();
+    trainer->pass = -1;
     result = ssdgs__trainer_setup(trainer, photos, photo_count);
     if (result) ssdgs__trainer_drop(trainer);
     else *out = trainer;
@@ -8947,21 +8985,22 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
 }
 
 /* The photograph of an iteration: every pass visits each once, in an order drawn for the pass. */
-static int ssdgs__next_photo(ssdgs_trainer *trainer) {
-    const int n = trainer->photo_count, at = trainer->iteration % n;
-    const uint64_t pass = (uint64_t)(trainer->iteration / n);
-    if (at == 0)
-        for (int i = 0; i < n; i++) trainer->order[i] = (uint32_t)i;
-    if (at == 0)
+static int ssdgs__photo_of(ssdgs_trainer *trainer, int iteration) {
+    const int n = trainer->photo_count, pass = iteration / n;
+    uint32_t *order = trainer->order;
+    if (pass != trainer->pass) {
+        for (int i = 0; i < n; i++) order[i] = (uint32_t)i;
         for (int i = n - 1; i > 0; i--) {
             const int j = (int)(ssdgs__uniform(trainer->options.seed ^ UINT64_C(0x70617373),
-                                               pass * (uint64_t)n + (uint64_t)i) *
+                                               (uint64_t)pass * (uint64_t)n + (uint64_t)i) *
                                 (i + 1));
-            const uint32_t swap = trainer->order[i];
-            trainer->order[i] = trainer->order[j];
-            trainer->order[j] = swap;
+            const uint32_t swap = order[i];
+            order[i] = order[j];
+            order[j] = swap;
         }
-    return (int)trainer->order[at];
+        trainer->pass = pass;
+    }
+    return (int)order[iteration % n];
 }
 
 /* Adds the gradient of SSDGS__FADE x the sum of opacities / pixels at time t, where outlines are not
@@ -8988,89 +9027,202 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
                      "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
 }
 
-static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
+/* What one says, or a batch on average, beside the gradients of the model. */
+typedef struct ssdgs__drawn {
+    double loss, psnr, shaded;
+} ssdgs__drawn;
+
+/* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in moves
+   (9). */
+static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step *step, int iteration,
+                                      int photo, ssdgs_frame *frame, double moves[9], ssdgs__drawn *drawn) {
     const ssdgs_train_options *o = &trainer->options;
-    ssdgs_result result = ssdgs__trainer_check(trainer);
-    if (result) return result;
-    const double t = ssdgs__schedule_time(o, trainer->iteration);
-    int learns[SSDGS__GROUPS];
-    const int terms =
-        ssdgs__phase(o, trainer->model->settings.asg, t, learns) & trainer->model->settings.terms;
-    const int photo = ssdgs__next_photo(trainer);
-    ssdgs__correction *correction = trainer->corrections + photo;
+    const double *correction = trainer->corrections[photo].value;
     ssdgs_real background[3];
     for (int j = 0; j < 3; j++)
         background[j] = o->random_background && (trainer->transparent[photo] || trainer->filled)
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
-                                                         3 * (uint64_t)trainer->iteration + (uint64_t)j)
+                                                         3 * (uint64_t)iteration + (uint64_t)j)
                             : o->background[j];
     ssdgs_camera camera;
     ssdgs_light light;
-    ssdgs__correct(trainer->photos + photo, correction->value, &camera, &light);
-    int frozen[2];
-    for (int j = 0; j < 2; j++)
-        frozen[j] = !learns[SSDGS__PLANE_GROUPS + (j ? SSDGS__SHADOW_NET : SSDGS__SCATTERING_NET)];
+    ssdgs__correct(trainer->photos + photo, correction, &camera, &light);
     ssdgs__loss_values values;
-    ssdgs_frame frame;
-    const ssdgs__photo_job shot = {trainer->photos + photo, &camera,  &light,          background, terms,
-                                   {frozen[0], frozen[1]},  o->dssim, o->normal_weight};
-    result = ssdgs__photo_backward(&frame, trainer->model, &shot, &values);
+    const int *learns = step->learns + SSDGS__PLANE_GROUPS;
+    const ssdgs__photo_job shot = {trainer->photos + photo,
+                                   &camera,
+                                   &light,
+                                   background,
+                                   step->terms,
+                                   {!learns[SSDGS__SCATTERING_NET], !learns[SSDGS__SHADOW_NET]},
+                                   o->dssim,
+                                   o->normal_weight};
+    const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &shot, &values);
     if (result) return result;
-    double gradient[9];
-    ssdgs__correct_backward(trainer->photos + photo, correction->value, frame.view_gradient, gradient);
-    for (int j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-    int moves[2];
-    moves[0] = (o->refine & SSDGS_REFINE_CAMERA) && t >= 5e3;
-    moves[1] = (o->refine & SSDGS_REFINE_LIGHT) && t >= 16e3 && light.kind == SSDGS_LIGHT_POINT;
-    for (int j = 0; j < 9 && !result; j++)
-        if (moves[j > 5] && !ssdgs__finite((ssdgs_real)gradient[j]))
-            result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
-                                 "iteration %d refused: the gradient of photograph %d's %s "
-                                 "is not finite",
-                                 trainer->iteration, photo, j > 5 ? "light" : "camera");
-    ssdgs__fade(trainer, t, (double)camera.width * camera.height,
-                frame.gradient + SSDGS_OPACITY * frame.gaussians.stride);
-    if (!result) result = ssdgs__adam_step(trainer, &frame, t, terms, learns);
-    trainer->skipped += result != SSDGS_OK;
-    if (!result) {
-        const double shows = (double)o->iterations / trainer->photo_count,
-                     wider = shows < 300 ? sqrt(300 / shows) : 1;
-        const double angle = ssdgs__view_angle(&camera);
-        if (moves[0])
-            ssdgs__correction_step(correction, gradient, 0,
-                                   wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) *
-                                       (t < 20e3 ? t / 20e3 : 1),
-                                   trainer->unit, angle);
-        if (moves[0] && o->rates.position.start > 0)
-            ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
-        if (moves[1])
-            ssdgs__correction_step(correction, gradient, 1,
-                                   wider * ssdgs__decay(o->rates.light, 0, 60e3, t) *
-                                       (t < 30e3 ? t / 30e3 : 1),
-                                   trainer->unit, angle);
-    }
-    if (!trainer->iteration && !frame.shaded_count)
+    ssdgs__correct_backward(trainer->photos + photo, correction, frame->view_gradient, moves);
+    for (int j = 0; j < 3; j++) moves[6 + j] = (double)frame->light_gradient[j];
+    ssdgs__fade(trainer, step->t, (double)camera.width * camera.height,
+                frame->gradient + SSDGS_OPACITY * frame->gaussians.stride);
+    if (!iteration && !frame->shaded_count)
         ssdgs__note(
             trainer->context,
             "the first photograph drawn has no Gaussian in view: do the camera's axes, position, near_plane "
             "and the bounds suit each other?");
+    drawn->loss = values.loss;
+    drawn->psnr = ssdgs__psnr(values.mse);
+    drawn->shaded = frame->shaded_count;
+    return SSDGS_OK;
+}
+
+/* Where things lie in what a batch adds up, and how long it is. */
+typedef struct ssdgs__batch_layout {
+    size_t moves, gradient, globals, statistics, size; /* before: failures, loss, psnr, shaded */
+} ssdgs__batch_layout;
+
+static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) {
+    ssdgs__batch_layout at;
+    at.moves = 4;
+    at.gradient = at.moves + 9 * (size_t)trainer->options.batch;
+    at.globals = at.gradient + SSDGS_CHANNELS * trainer->stride;
+    at.statistics = at.globals + trainer->model->global_count;
+    at.size = at.statistics + SSDGS__STATISTICS * trainer->stride;
+    return at;
+}
+
+/* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits do not
+   depend on how many processes share it. Leaves the mean gradients in the frame, all photographs' in moves
+   (batch, 9) and their statistics' sums, (SSDGS__STATISTICS, stride), where *statistics says. A process that
+   fails takes part in the sum, so that the others hear of it. */
+static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
+                                      ssdgs_frame *frame, double *moves, const ssdgs_real **statistics,
+                                      ssdgs__drawn *drawn) {
+    ssdgs_context *context = trainer->context;
+    const ssdgs_sum *sum = &trainer->options.sum;
+    const ssdgs__batch_layout at = ssdgs__batch_layout_of(trainer);
+    const int batch = trainer->options.batch, own = sum->add ? batch / sum->processes : batch;
+    const int first = sum->add ? own * sum->rank : 0;
+    int depth = 0, room = 2;
+    for (int i = own; i > 1; i /= 2) room++;
+    ssdgs_real *sums;
+    SSDGS__RESERVE(trainer->sums, sums, ssdgs_real, at.size * (size_t)room);
+    ssdgs_result failed = SSDGS_OK;
+    for (int i = 0; i < own && !failed; i++) {
+        const int b = first + i;
+        ssdgs_real *out = sums + at.size * (size_t)depth++;
+        memset(out, 0, at.size * sizeof *out);
+        failed =
+            ssdgs__draw_photo(trainer, step, trainer->iteration + b, photos[b], frame, moves + 9 * b, drawn);
+        if (failed) break;
+        ssdgs__gather_statistics(trainer, frame, trainer->magnify[photos[b]], out + at.statistics);
+        out[1] = (ssdgs_real)drawn->loss;
+        out[2] = (ssdgs_real)drawn->psnr;
+        out[3] = (ssdgs_real)drawn->shaded;
+        for (int j = 0; j < 9; j++) out[at.moves + (size_t)(9 * b + j)] = (ssdgs_real)moves[9 * b + j];
+        memcpy(out + at.gradient, frame->gradient, SSDGS_CHANNELS * trainer->stride * sizeof *out);
+        memcpy(out + at.globals, frame->global_gradient, trainer->model->global_count * sizeof *out);
+        for (int pairs = i + 1; depth > 1 && (pairs % 2 == 0 || i + 1 == own); pairs /= 2, depth--)
+            for (size_t k = 0; k < at.size; k++)
+                sums[at.size * (size_t)(depth - 2) + k] += sums[at.size * (size_t)(depth - 1) + k];
+    }
+    if (failed) memset(sums, 0, at.size * sizeof *sums);
+    sums[0] = failed != SSDGS_OK;
+    const ssdgs_result result = sum->add ? sum->add(sum->user, sums, at.size) : SSDGS_OK;
+    if (failed) return failed;
+    if (result)
+        return ssdgs__fail(context, result, "iteration %d refused: options.sum.add() failed",
+                           trainer->iteration);
+    if (sums[0] > 0)
+        return ssdgs__fail(context, SSDGS_ERR_CANCELLED, "iteration %d refused: another process failed",
+                           trainer->iteration);
+    const ssdgs_real mean = 1 / (ssdgs_real)batch;
+    drawn->loss = (double)(mean * sums[1]);
+    drawn->psnr = (double)(mean * sums[2]);
+    drawn->shaded = (double)(mean * sums[3]);
+    for (int j = 0; j < 9 * batch; j++) moves[j] = (double)sums[at.moves + (size_t)j];
+    for (size_t k = 0; k < at.globals - at.gradient; k++) frame->gradient[k] = mean * sums[at.gradient + k];
+    for (size_t k = 0; k < at.statistics - at.globals; k++)
+        frame->global_gradient[k] = mean * sums[at.globals + k];
+    *statistics = sums + at.statistics;
+    return SSDGS_OK;
+}
+
+/* Moves the camera and the light of a photograph. */
+static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, const double gradient[9],
+                               const int moves[2]) {
+    const ssdgs_train_options *o = &trainer->options;
+    const double shows = (double)o->iterations / trainer->photo_count,
+                 wider = shows < 300 ? sqrt(300 / shows) : 1;
+    const double angle = ssdgs__view_angle(&trainer->photos[photo].camera);
+    ssdgs__correction *correction = trainer->corrections + photo;
+    if (moves[0])
+        ssdgs__correction_step(correction, gradient, 0,
+                               wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
+                               trainer->unit, angle);
+    if (moves[0] && o->rates.position.start > 0)
+        ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
+    if (moves[1] && trainer->photos[photo].light.kind == SSDGS_LIGHT_POINT)
+        ssdgs__correction_step(correction, gradient, 1,
+                               wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
+                               trainer->unit, angle);
+}
+
+static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
+    const ssdgs_train_options *o = &trainer->options;
+    const int before = trainer->iteration, after = before + o->batch;
+    ssdgs_result result = ssdgs__trainer_check(trainer);
+    if (result) return result;
+    ssdgs__step step;
+    step.t = ssdgs__schedule_time(o, before);
+    step.terms =
+        ssdgs__phase(o, trainer->model->settings.asg, step.t, step.learns) & trainer->model->settings.terms;
+    int photos[SSDGS__MAX_BATCH];
+    double moves[9 * SSDGS__MAX_BATCH];
+    for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
+    const ssdgs_real *statistics = NULL;
+    ssdgs__drawn drawn;
+    ssdgs_frame frame;
+    result = o->batch > 1 || o->sum.add
+                 ? ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn)
+                 : ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
+    if (result) return result;
+    const int refines[2] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
+                            (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3};
+    for (int i = 0; i < 9 * o->batch && !result; i++) {
+        const ssdgs_photo *photo = trainer->photos + photos[i / 9];
+        const int of_light = i % 9 > 5;
+        if (refines[of_light] && !(of_light && photo->light.kind != SSDGS_LIGHT_POINT) &&
+            !ssdgs__finite((ssdgs_real)moves[i]))
+            result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
+                                 "iteration %d refused: the gradient of photograph %d's %s is not finite",
+                                 before, photos[i / 9], of_light ? "light" : "camera");
+    }
+    if (!result) {
+        const ssdgs_camera *camera = &trainer->photos[photos[0]].camera;
+        result = ssdgs__adam_step(trainer, &frame, (double)camera->width * camera->height, &step);
+    }
+    trainer->skipped += result != SSDGS_OK;
+    for (int i = 0; i < o->batch && !result; i++)
+        ssdgs__refine_step(trainer, step.t, photos[i], moves + 9 * i, refines);
     ssdgs__model_changed(trainer->model);
-    trainer->iteration++;
-    const double until = ssdgs__schedule_time(o, trainer->iteration);
-    if (!result && until <= o->densify_until) {
-        ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photo]);
-        if (trainer->iteration >= o->densify_from && trainer->iteration % o->densify_every == 0)
+    trainer->iteration = after;
+    if (!result && ssdgs__schedule_time(o, after) <= o->densify_until) {
+        for (size_t k = 0; statistics && k < SSDGS__STATISTICS * trainer->stride; k++)
+            trainer->screen_gradient[k] += statistics[k];
+        if (!statistics)
+            ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photos[0]], trainer->screen_gradient);
+        if (after >= o->densify_from && after / o->densify_every > before / o->densify_every)
             result = ssdgs__densify(trainer);
-        if (ssdgs__resets(o, trainer->iteration)) ssdgs__reset_opacity(trainer);
+        const int last = ssdgs__last_reset(o, after);
+        if (last > before && ssdgs__resets(o, last)) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
         stats->iteration = trainer->iteration;
         stats->gaussians = trainer->model->count;
-        stats->shaded = frame.shaded_count;
-        stats->terms = terms;
+        stats->shaded = (int)(drawn.shaded + 0.5);
+        stats->terms = step.terms;
         stats->skipped_steps = trainer->skipped;
-        stats->loss = values.loss;
-        stats->psnr = ssdgs__psnr(values.mse);
+        stats->loss = drawn.loss;
+        stats->psnr = drawn.psnr;
     }
     return result;
 }
@@ -9236,7 +9388,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* Reads and writes it in native byte order; another version, precision or run is refused. */
 
-#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK2" /* the last letter changes with the layout */
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK3" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
@@ -9282,7 +9434,6 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
         if (!result) result = visit(user, shared[i], globals);
     }
     for (int i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
-    if (!result) result = visit(user, trainer->order, (size_t)trainer->photo_count * sizeof *trainer->order);
     if (!result)
         result =
             visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
@@ -9309,8 +9460,9 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     /* ints, then reals, without the padding between them */
     head->inputs =
         ssdgs__fold(UINT64_C(0xCBF29CE484222325), o, offsetof(ssdgs_train_options, refine) + sizeof(int));
-    head->inputs =
-        ssdgs__fold(head->inputs, o->background, sizeof *o - offsetof(ssdgs_train_options, background));
+    head->inputs = ssdgs__fold(head->inputs, o->background,
+                               offsetof(ssdgs_train_options, rates) + sizeof o->rates -
+                                   offsetof(ssdgs_train_options, background));
     for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const ssdgs_camera *camera = &photo->camera;

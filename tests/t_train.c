@@ -716,8 +716,6 @@ static void test_adam(double share) {
     for (int step = 0; step < STEPS; step++) {
         ssdgs_frame frame;
         memset(&frame, 0, sizeof frame);
-        frame.camera.width = 20;
-        frame.camera.height = 15;
         frame.gradient = gradient[step] = (ssdgs_real *)malloc(values * sizeof **gradient);
         frame.global_gradient = frame.gradient + planes;
         for (size_t i = 0; i < values;
@@ -730,7 +728,11 @@ static void test_adam(double share) {
         }
         for (int g = 0; g < SSDGS__GROUPS; g++) learns[g] = (g + step) % 3 != 0;
         terms[step] = step & 1 ? ALL : SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-        CHECK(!ssdgs__adam_step(trainer, &frame, times[step], terms[step], learns));
+        ssdgs__step now;
+        now.t = times[step];
+        now.terms = terms[step];
+        memcpy(now.learns, learns, sizeof learns);
+        CHECK(!ssdgs__adam_step(trainer, &frame, 20 * 15, &now));
     }
     for (size_t i = 0; i < values; i++) {
         double mean = 0, square = 0, value = (double)start[i], epsilon = share / (255 * 3 * 20 * 15);
@@ -2133,8 +2135,8 @@ static void test_half_shadow(void) {
         if (i < 3)
             trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] =
                 trainer->screen_count[0] = 0;
-        ssdgs__gather_statistics(trainer, &frame, 1);
-        if (i == 3) ssdgs__gather_statistics(trainer, &frame, 2);
+        ssdgs__gather_statistics(trainer, &frame, 1, trainer->screen_gradient);
+        if (i == 3) ssdgs__gather_statistics(trainer, &frame, 2, trainer->screen_gradient);
         CHECK(fabs((double)trainer->half_shadow[0] - (i == 0 ? 6.4 : i == 3 ? 12.8 : 0)) < 1e-5);
         CHECK(fabs((double)trainer->contribution[0] - (i == 2 ? 0.9 : i == 3 ? 22.9 : 11)) < 1e-5);
         CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 20 : 5)) < 1e-5 &&
