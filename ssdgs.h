@@ -9549,11 +9549,6 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
             memcpy(&x, at, sizeof x);
             if (part && (!ssdgs__finite(x) || (part / 2 == 2 && x < 0))) return 0; /* 4, 5: second moments */
         }
-    for (int i = 0; i < head->photo_count; i++, at += sizeof(uint32_t)) {
-        uint32_t photo;
-        memcpy(&photo, at, sizeof photo);
-        if (photo >= (uint32_t)head->photo_count) return 0;
-    }
     for (int i = 0; i < head->photo_count; i++, at += sizeof(ssdgs__correction)) {
         ssdgs__correction c;
         memcpy(&c, at, sizeof c);
@@ -9593,7 +9588,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
     if (!reason) {
         const size_t expected =
-            sizeof head + 8 + (size_t)head.photo_count * (sizeof(uint32_t) + sizeof(ssdgs__correction)) +
+            sizeof head + 8 + (size_t)head.photo_count * sizeof(ssdgs__correction) +
             sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) +
                                   3 * (size_t)head.global_count);
         uint64_t hash;

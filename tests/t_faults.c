@@ -848,8 +848,7 @@ static void test_checkpoints(void) {
     const size_t moments = parameters + n * SSDGS_CHANNELS + (size_t)h.global_count * sizeof(ssdgs_real);
     const size_t squares = 2 * moments - parameters;
     const size_t statistics = 3 * moments - 2 * parameters;
-    const size_t order = statistics + n * SSDGS__STATISTICS;
-    const size_t corrections = order + PHOTOS * sizeof(uint32_t);
+    const size_t corrections = statistics + n * SSDGS__STATISTICS;
     CHECK(whole.size == corrections + PHOTOS * sizeof(ssdgs__correction) + 8);
     for (size_t k = 0; k < whole.size && wrong < 9;
          k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
@@ -901,9 +900,7 @@ static void test_checkpoints(void) {
                     {"square", squares, REAL, nan_value},
                     {"square", statistics - sizeof(ssdgs_real), REAL, -1},
                     {"statistic", statistics, REAL, nan_value},
-                    {"statistic", order - sizeof(ssdgs_real), REAL, infinite},
-                    {"order", order, WORD, PHOTOS},
-                    {"order", order + 4, WORD, -1},
+                    {"statistic", corrections - sizeof(ssdgs_real), REAL, infinite},
                     {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
                     {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
                     {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},

@@ -229,7 +229,8 @@ static void test_resume(void) {
         CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
         for (int i = 0; i < 5; i++) { /* wrong inside, with the right checksum */
             unsigned char *copy = (unsigned char *)malloc(size);
-            const uint32_t photo = PHOTOS;
+            ssdgs__correction last;
+            unsigned char *const corrected = copy + size - 8 - sizeof last;
             memcpy(copy, bytes, size);
             ssdgs__checkpoint_head head;
             memcpy(&head, copy, sizeof head);
@@ -238,9 +239,9 @@ static void test_resume(void) {
             if (i == 2) head.count = 0x0FFFFFFF;
             if (i == 4) head.start_size = -1;
             memcpy(copy, &head, sizeof head);
-            if (i == 3)
-                memcpy(copy + size - 8 - PHOTOS * (sizeof photo + sizeof(ssdgs__correction)), &photo,
-                       sizeof photo);
+            memcpy(&last, corrected, sizeof last);
+            if (i == 3) last.steps[1] = -1;
+            memcpy(corrected, &last, sizeof last);
             uint64_t sum = ssdgs__fold(UINT64_C(0xCBF29CE484222325), copy, size - 8);
             memcpy(copy + size - 8, &sum, 8);
             FILE *f = fopen("build/t_train_bad.ckpt", "wb");
