@@ -508,17 +508,18 @@ typedef struct ssdgs_sum {
 /* Iterations marked * are of a run of 60,000; shorter runs scale them. 0 disables where nothing else is
    said. */
 typedef struct ssdgs_train_options {
-    int version;             /* set by ssdgs_train_options_default / _published */
-    int iterations;          /* 20000: photographs drawn */
-    uint64_t seed;           /* 1 */
-    int schedule;            /* ssdgs_schedule: in which order the terms join; merged */
-    int random_background;   /* 1: photographs with transparency are laid over a new colour each step; 0: over
-                                background; 1 */
-    int initial_points;      /* random Gaussians in the bounds when the model is empty; 10000 */
-    int max_gaussians;       /* density control stops here; 100000 */
-    int densify_every;       /* iterations between two rounds of density control; 100 */
-    int densify_from;        /* first round; 200 */
-    int densify_until;       /* last round; 50000* */
+    int version;           /* set by ssdgs_train_options_default / _published */
+    int iterations;        /* 20000: photographs drawn */
+    uint64_t seed;         /* 1 */
+    int schedule;          /* ssdgs_schedule: in which order the terms join; merged */
+    int random_background; /* 1: photographs with transparency are laid over a new colour each step; 0: over
+                              background; 1 */
+    int initial_points;    /* random Gaussians in the bounds when the model is empty; 10000 */
+    int max_gaussians;     /* density control stops here; 0: at three quarters of the pixels that a photograph
+                              shows, on average, but from 2,000 to 100,000; 0 */
+    int densify_every;     /* iterations between two rounds of density control; 100 */
+    int densify_from;      /* first round; 200 */
+    int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
     int batch;               /* photographs a step, whose gradients are averaged; rates grow as its root; 1 */
     int refine;              /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
@@ -7183,6 +7184,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     double extent;        /* 1.1 x the cameras' radius */
+    int most;             /* Gaussians, by density control */
     int outlines;         /* photographs show where the object ends */
     int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
     double unit;          /* the bounds' longest side */
@@ -7208,7 +7210,6 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
         o.bounds_min[i] = (ssdgs_real)-0.5;
         o.bounds_max[i] = (ssdgs_real)0.5;
     }
-    o.max_gaussians = 100000;
     o.densify_every = 100;
     o.densify_from = 200;
     o.densify_until = 50000;
@@ -7240,6 +7241,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
 SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     ssdgs_train_options o = ssdgs_train_options_default();
     o.iterations = 60000;
+    o.max_gaussians = 100000;
     o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
     o.densify_from = 500;
     o.normal_weight = 0;
@@ -7527,6 +7529,7 @@ typedef struct ssdgs__photo_job {
     int terms;                    /* to render */
     int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_real dssim, normal_weight;
+    int exact; /* 1: as written, for poses and lights; 0: as default options draw it */
 } ssdgs__photo_job;
 
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
@@ -7534,9 +7537,14 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const ssdgs_camera *camera = shot->camera;
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
+    const ssdgs_render_options easy = ssdgs_render_options_default();
     ssdgs_render_options options = ssdgs_render_options_exact();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     options.terms = shot->terms;
+    if (!shot->exact) { /* Gaussians learn no worse */
+        options.stop = easy.stop;
+        options.transport_detail = easy.transport_detail;
+    }
     ssdgs_result result = ssdgs__frame_begin(frame, model, camera, shot->light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
@@ -7767,6 +7775,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 #define SSDGS__STATISTICS 4
 #define SSDGS__MAX_BATCH 256
+#define SSDGS__PER_PIXEL 0.75  /* more Gaussians than that take time and show nothing */
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
@@ -8033,13 +8042,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
     wanted = wanted - pulled < halved ? wanted : pulled + halved;
-    size_t room = (size_t)o->max_gaussians > n - dropped ? (size_t)o->max_gaussians - (n - dropped) : 0;
-    if (wanted > room || n - dropped > (size_t)o->max_gaussians) {
+    size_t room = (size_t)trainer->most > n - dropped ? (size_t)trainer->most - (n - dropped) : 0;
+    if (wanted > room || n - dropped > (size_t)trainer->most) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
            at a time */
         ssdgs__ranked *least = candidates + n;
-        const size_t over =
-            n - dropped > (size_t)o->max_gaussians ? n - dropped - (size_t)o->max_gaussians : 0;
+        const size_t over = n - dropped > (size_t)trainer->most ? n - dropped - (size_t)trainer->most : 0;
         const size_t more = wanted > room ? wanted - room : 0;
         size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
         for (size_t i = 0; i < n; i++)
@@ -8132,7 +8140,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
 #define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", o, field, low, high)
     SSDGS__RANGE(iterations, 1, 100000000);
     SSDGS__RANGE(schedule, 0, SSDGS_SCHEDULE_MERGED);
-    SSDGS__RANGE(max_gaussians, 1, SSDGS__MAX_GAUSSIANS);
+    SSDGS__RANGE(max_gaussians, 0, SSDGS__MAX_GAUSSIANS);
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
     SSDGS__RANGE(batch, 1, SSDGS__MAX_BATCH);
@@ -8237,7 +8245,8 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    const size_t n = (size_t)(o->initial_points < o->max_gaussians ? o->initial_points : o->max_gaussians);
+    const size_t n = (size_t)(o->max_gaussians && o->max_gaussians < o->initial_points ? o->max_gaussians
+                                                                                       : o->initial_points);
     double volume = 1;
     size_t kept = 0;
     if (o->initial_points < 1)
@@ -8858,6 +8867,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
     int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0;
+    double shown = 0;
     if (result) return result;
     if (model->settings.baked)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
@@ -8889,6 +8899,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         for (size_t at = 0; at < pixels; at++) {
             const int alpha = ssdgs__photo_alpha(photos + i, at);
             clear += !alpha;
+            shown += alpha / 65535.0 / photo_count;
             veiled += alpha < 65535;
         }
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
@@ -8898,6 +8909,11 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         trainer->magnify[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
         empty += clear == pixels;
     }
+    const double most = SSDGS__PER_PIXEL * shown;
+    trainer->most = o->max_gaussians ? o->max_gaussians
+                    : most < 2000    ? 2000
+                    : most < 100000  ? (int)most
+                                     : 100000;
     result = ssdgs__doubt_outlines(trainer);
     if (result) return result;
     for (int i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
@@ -9056,7 +9072,8 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                    step->terms,
                                    {!learns[SSDGS__SCATTERING_NET], !learns[SSDGS__SHADOW_NET]},
                                    o->dssim,
-                                   o->normal_weight};
+                                   o->normal_weight,
+                                   o->refine};
     const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &shot, &values);
     if (result) return result;
     ssdgs__correct_backward(trainer->photos + photo, correction, frame->view_gradient, moves);
@@ -9355,7 +9372,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         ssdgs_frame frame;
         const ssdgs__photo_job shot = {
             photo,           &camera, &light, background, model->settings.terms, {frozen[0], frozen[1]},
-            (ssdgs_real)0.2, 0};
+            (ssdgs_real)0.2, 0,       1};
         result = ssdgs__photo_backward(&frame, model, &shot, &values);
         if (result) return result;
         double gradient[9];

@@ -439,7 +439,8 @@ static void test_photo(int transfer, double intensity) {
     ssdgs__loss_values values;
     ssdgs_frame frame;
     const ssdgs__photo_job shot = {
-        &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, {frozen[0], frozen[1]}, 0.2, 0};
+        &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, {frozen[0], frozen[1]}, 0.2, 0,
+        1};
     if (ssdgs__photo_backward(&frame, model, &shot, &values)) exit(1);
     ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
     for (size_t i = 0; i < SSDGS_CHANNELS * COUNT; i++)

@@ -1911,7 +1911,8 @@ static void test_clipped(void) {
                                            SSDGS_DIFFUSE_TERM,
                                            {frozen[0], frozen[1]},
                                            (ssdgs_real)0.2,
-                                           0};
+                                           0,
+                                           1};
             CHECK(!ssdgs__photo_backward(&frame, model, &shot, &values));
             CHECK(full > SIDE);
             if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01))
@@ -2148,6 +2149,41 @@ static void test_half_shadow(void) {
     ssdgs_context_destroy(context);
 }
 
+/* How many Gaussians there may be: three quarters of what photographs show, of alpha's pixels, within limits.
+ */
+static void test_budget(void) {
+    enum { SIZE = 200 };
+    static unsigned char shown[3][SIZE * SIZE * 4];
+    ssdgs_context *context = NULL;
+    ssdgs_photo sized[3];
+    /* three quarters of 40,000 and of 40,000 and 16,000; of 100; as given; as published */
+    static const int counts[5] = {1, 2, 1, 2, 2}, most[5] = {30000, 21000, 2000, 77, 100000};
+    for (int i = 0; i < 3; i++) /* all of it; half of it at half opacity; nearly nothing */
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const int inside = i == 0 || (i == 1 && k < SIZE * SIZE / 2) || k < 100;
+            shown[i][4 * k + 3] = (unsigned char)(!inside ? 0 : i == 1 ? 204 : 255);
+            for (int c = 0; c < 3; c++) shown[i][4 * k + c] = 90;
+        }
+    CHECK(!ssdgs_context_create(NULL, &context));
+    for (int i = 0; i < 5; i++) {
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_train_options options = short_run(10);
+        options.max_gaussians = i == 3 ? 77 : i == 4 ? ssdgs_train_options_published().max_gaussians : 0;
+        for (int k = 0; k < 3; k++) {
+            sized[k] = photos[k];
+            sized[k].camera.width = sized[k].camera.height = SIZE;
+            sized[k].pixels = shown[i == 2 ? 2 : k % 2];
+        }
+        CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+        CHECK(!ssdgs_trainer_create(model, sized, counts[i], &options, &trainer));
+        if (trainer && !CHECK(trainer->most == most[i])) printf("    %d: %d\n", i, trainer->most);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     make_photos();
     test_adam(0);
@@ -2178,6 +2214,7 @@ int main(void) {
     test_doubts();
     test_softness();
     test_rearranged();
+    test_budget();
     test_fade();
     test_half_shadow();
     test_learning();
