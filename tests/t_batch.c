@@ -38,7 +38,7 @@ static ssdgs_train_options short_run(int batch) {
     o.initial_points = 300;
     o.max_gaussians = 500;
     o.densify_from = 8;
-    o.densify_every = 12;
+    o.densify_every = 10; /* no multiple of the batch */
     o.opacity_reset_every = 30;
     o.densify_gradient = (ssdgs_real)1e-5;
     o.batch = batch;
@@ -158,6 +158,11 @@ static void test_same_bits(void) {
     for (int step = 0; step < 20; step++) {
         CHECK(!ssdgs_trainer_step(alone.trainer, &one));
         CHECK(one.iteration == BATCH * (step + 1));
+        ssdgs_real most = 0; /* statistics grow until density control, after 10 iterations and more */
+        for (int i = 0; i < alone.model->count; i++)
+            most = alone.trainer->screen_count[i] > most ? alone.trainer->screen_count[i] : most;
+        if (step < 2) CHECK(most > BATCH * step && most <= BATCH * (step + 1));
+        if (step == 2) CHECK(most <= 0); /* it was, at the twelfth */
         for (int k = 0; k < 3; k++) {
             step_all(many[k], 1 << k, &all);
             CHECK(!memcmp(&one, &all, sizeof one));
@@ -235,28 +240,28 @@ static void test_rate(void) {
     for (int i = 0; i < 2; i++) close_process(p + i);
 }
 
-static int fails; /* shading, from the next call on */
+static int fails; /* shading, when it has been called so often; 0: not */
 static ssdgs_result shade(void *user, ssdgs_frame *frame) {
     (void)user;
-    return fails ? SSDGS_ERR_LIMIT : ssdgs_stage_cpu(frame, SSDGS_STAGE_SHADE);
+    if (fails && --fails == 0) return SSDGS_ERR_LIMIT;
+    return ssdgs_stage_cpu(frame, SSDGS_STAGE_SHADE);
 }
 
 /* Where this process fails the others hear of it; where another fails this one stays as it was. */
 static void test_failures(void) {
-    const ssdgs_train_options options = short_run(2);
+    const ssdgs_train_options options = short_run(BATCH);
     ssdgs_gpu_hook gpu;
     memset(&gpu, 0, sizeof gpu);
     gpu.stage[SSDGS_STAGE_SHADE] = shade;
     process p;
     open_process(&p, &options, 0, 2, &gpu);
     const uint64_t before = state_of(&p);
-    fails = 1;
+    fails = 2; /* one of this process's two is drawn */
     CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_LIMIT && p.calls == 1);
     const ssdgs__batch_layout at = ssdgs__batch_layout_of(p.trainer);
     int other = 0;
     for (size_t k = 1; k < at.size; k++) other += !(p.part[k] == 0);
     CHECK(p.count == at.size && p.part[0] == 1 && other == 0);
-    fails = 0;
     CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_IO);
     ssdgs_real *total = (ssdgs_real *)malloc(p.count * sizeof *total);
     if (!total) exit(1);
@@ -267,7 +272,7 @@ static void test_failures(void) {
     CHECK(strstr(ssdgs_error_message(p.context), "another process failed") != NULL);
     total[0] = 0;
     total[at.gradient + 3] = NAN; /* refused by all alike; its photographs are passed over */
-    CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_NONFINITE && p.trainer->iteration == 2);
+    CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_NONFINITE && p.trainer->iteration == BATCH);
     free(total);
     close_process(&p);
     static const int wrong[5][3] = {
