@@ -637,6 +637,8 @@ typedef struct ssdgs_model_view {
     size_t shadow_count;
 } ssdgs_model_view;
 SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model);
+/* The same to read alone: what frames have kept stays. */
+SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
 
 /* ==== stages of a frame, seen with SSDGS_STAGES: for GPUs and engines that run some of their own ====
    ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A hook reads and writes the
@@ -2314,7 +2316,7 @@ static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
 
 static void ssdgs__model_changed(ssdgs_model *model) { model->revision = ++model->context->revisions; }
 
-static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
+static ssdgs_model_view ssdgs__model_view(const ssdgs_model *model) {
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     ssdgs_model_view view;
@@ -2331,12 +2333,15 @@ static ssdgs_model_view ssdgs__model_view(ssdgs_model *model) {
     return view;
 }
 
-SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model) {
+SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model) {
     ssdgs_model_view none;
     memset(&none, 0, sizeof none);
-    if (!model) return none;
-    ssdgs__model_changed(model);
-    return ssdgs__model_view(model);
+    return model ? ssdgs__model_view(model) : none;
+}
+
+SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model) {
+    if (model) ssdgs__model_changed(model);
+    return ssdgs_model_peek(model);
 }
 
 /* ---- one Gaussian in physical units ---- */

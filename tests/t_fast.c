@@ -91,6 +91,9 @@ static void test_kept(void) {
     FIRST();
     check_same(model, &a, lights, 2, &options, 1, 2, "nothing moved");
     FIRST();
+    CHECK(ssdgs_model_peek(model).gaussians == model->gaussians && !ssdgs_model_peek(NULL).gaussians);
+    check_same(model, &a, lights, 2, &options, 1, 2, "its arrays were read");
+    FIRST();
     check_same(model, &b, lights, 2, &options, 0, 2, "the camera moved");
     FIRST();
     check_same(model, &a, &moved, 1, &options, 1, 0, "another light");

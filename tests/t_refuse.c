@@ -59,9 +59,10 @@ static const field train_fields[] = {
 #define RATE(name) R(rates.name.start, 0, 1e30), R(rates.name.end, 0, 1e30)
     I(iterations, 1, 100000000),
     I(schedule, 0, 3),
-    I(max_gaussians, 1, 1 << 28),
+    I(max_gaussians, 0, 1 << 28),
     I(densify_every, 1, 2000000000),
     I(opacity_reset_every, 0, 2000000000),
+    I(batch, 1, 256),
     I(refine, 0, 3),
     R(dssim, 0, 1),
     R(normal_weight, 0, 1e30),
