@@ -32,6 +32,7 @@ enum {
     ISA,
     TRAIN_JSON,
     SET,
+    REFIT,
     RESUME,
     REFINE,
     OPTION_COUNT /* the flags, RESUME and on, take no value */
@@ -39,7 +40,7 @@ enum {
 static const char *const option_names[OPTION_COUNT] = {
     "-o",      "--iterations", "--background", "--preset",        "--transfer", "--schedule",
     "--terms", "--seed",       "--threads",    "--max-gaussians", "--points",   "--checkpoint-every",
-    "--isa",   "--train-json", "--set",        "--resume",        "--refine"};
+    "--isa",   "--train-json", "--set",        "--refit",         "--resume",   "--refine"};
 
 static const char *const help[] = {
     "usage: train DATASET -o MODEL.ply [OPTION...]",
@@ -57,6 +58,8 @@ static const char *const help[] = {
     "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
     "  --refine                 also fits camera poses and light positions, into MODEL.ply.refined.json",
+    "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
+    "                           --max-gaussians are left, and trains those for 1000 iterations",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again",
     "  --points N               random points at the start, of which those outside of the outlines go;",
@@ -332,6 +335,8 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     if (code == SSDGS_OK) fprintf(stderr, "train: note: %s\n", message);
 }
 
+enum { RATES_OF_MODEL = 10 }; /* the first of ssdgs_rates: all but camera and light */
+
 static int parse(job *j, int argc, char **argv) {
     const char **given = j->given;
     int sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
@@ -353,6 +358,16 @@ static int parse(job *j, int argc, char **argv) {
     if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
     j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
     j->options = preset ? ssdgs_train_options_published() : ssdgs_train_options_default();
+    if (given[REFIT]) { /* nothing but fine steps */
+        j->options.iterations = 1000;
+        j->options.schedule = SSDGS_SCHEDULE_JOINT;
+        j->options.densify_until = j->options.opacity_reset_every = 0;
+        ssdgs_rate *rates = &j->options.rates.position;
+        for (int i = 0; i < RATES_OF_MODEL; i++) {
+            rates[i].start *= (ssdgs_real)(i ? 0.3 : 0.03);
+            rates[i].end *= (ssdgs_real)0.3;
+        }
+    }
     if (!choose(given, BACKGROUND, "black|white", &white))
         return usage("no such background:", given[BACKGROUND]);
     if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer))
@@ -452,6 +467,7 @@ static void print_peak_memory(void) {
    training. */
 static int check_outputs(job *j, const char *train_json, char error[512]) {
     const char *const outputs[3] = {j->given[OUTPUT], j->checkpoint, j->refined};
+    if (j->given[REFIT] && olat_guard_input(&j->guard, j->given[REFIT], error)) return 1;
     if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_train.json", error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error) ||
@@ -521,7 +537,18 @@ static int train(job *j) {
     free(test_json);
     if (check_outputs(j, train_json, error)) return fail(error);
 
-    if (olat_load(j->dataset, train_json, 0, &j->train_set, error)) return fail(error);
+    ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
+    if (result) return fail(ssdgs_result_string(result));
+    double origin[3] = {0, 0, 0};
+    if (j->given[REFIT]) {
+        if (ssdgs_model_load(j->context, j->given[REFIT], &j->model, NULL) ||
+            (j->options.max_gaussians && ssdgs_model_reduce(j->model, j->options.max_gaussians)))
+            return fail(ssdgs_error_message(j->context));
+        for (int i = 0; i < 3; i++) origin[i] = (double)ssdgs_model_settings(j->model)->origin[i];
+    }
+    if (j->model ? olat_load_at(j->dataset, train_json, 0, origin, &j->train_set, error)
+                 : olat_load(j->dataset, train_json, 0, &j->train_set, error))
+        return fail(error);
     if (has_test &&
         olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error))
         return fail(error);
@@ -538,10 +565,8 @@ static int train(job *j) {
         if (j->photos[i].camera.width > width) width = j->photos[i].camera.width;
         if (j->photos[i].camera.height > height) height = j->photos[i].camera.height;
     }
-    ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
-    if (result) return fail(ssdgs_result_string(result));
     if (!j->given[RESUME] && check_checkpoint(j, error)) return fail(error);
-    if (ssdgs_model_create(j->context, &j->settings, 0, &j->model) ||
+    if ((!j->model && ssdgs_model_create(j->context, &j->settings, 0, &j->model)) ||
         ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
         return fail(ssdgs_error_message(j->context));
     fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s\n", j->dataset, j->train_set.count, width,

@@ -76,6 +76,13 @@ check "the same picture" cmp "$out/reduced/r_000.png" "$out/reduced2/r_000.png"
 check "another picture" differs "$out/reduced/r_000.png" "$out/relit/r_000.png"
 check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
+# fewer Gaussians, trained on
+check "--refit" says 0 "refit.ply: 50 Gaussians" "$build/train" "$set" -o "$out/refit.ply" --refit "$model" --max-gaussians 50 --iterations 60 --threads 1
+check "--refit of itself" says 1 "would replace an input" "$build/train" "$set" -o "$out/refit.ply" --refit "$out/refit.ply"
+check "--refit of nothing" says 1 "nowhere.ply" "$build/train" "$set" -o "$out/refit.ply" --refit "$out/nowhere.ply"
+refitted=$("$build/relight" "$out/refit.ply" "$set" --out "$out/refit" --threads 1 | sed -n 's/^test: PSNR \([0-9.]*\).*/\1/p')
+check "--refit learns: $refitted dB, $(psnr "$out/reduced") before" awk -v a="$refitted" -v b="$(psnr "$out/reduced")" 'BEGIN { exit !(a > b + 0.1) }'
+
 # names that differ in case, or by what components add, are numbered
 sed -e 's|test/r_001|test/R_000|' -e 's|test/r_002|test/r_000_depth|' "$set/transforms_test.json" >"$out/names.json"
 cp "$set/test/r_001.png" "$set/test/R_000.png" 2>/dev/null
