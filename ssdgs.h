@@ -147,9 +147,8 @@ CONTENTS, search for the tag
   >>model >>frame                    parameters and networks; a frame's memory, views and cache
   >>project >>shadow >>transport     splats and tiles; visibility from the lights; dipole transport
   >>shade >>composite >>render       colour of the Gaussians seen; blending, highlights; stages in order
-  >>reduce                           fewer Gaussians: levels of detail
   >>loss >>ply                       loss and metrics; model files
-  >>trainer >>density                one photograph and Adam; clone, split, prune
+  >>trainer >>density >>reduce       one photograph and Adam; clone, split, prune; merge: levels of detail
   >>steps >>checkpoint               the trainer's public functions; a run's whole state
   >>kernels >>vmath >>*_kernel       vector macros, functions, and the kernels in the same order */
 
@@ -336,10 +335,6 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
 /* Puts Gaussians in the order that training leaves, neighbours together, which is faster. Indices change.
    Call it once a model made in code is filled; not while it is trained. ERR_ARGUMENT, ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
-/* Makes a level of detail: merges neighbours, those least missed first, until `count` Gaussians are left.
-   Needs no photographs. Indices change. A second for 30,000; save the result. Where the model has fewer it
-   stays. ERR_ARGUMENT: count < 1, or a trainer has the model. ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count);
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
@@ -571,6 +566,12 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
 /* Camera and light of photograph `index` as refined so far. */
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
                                              ssdgs_light *light);
+
+/* Makes a level of detail: merges neighbours, those least missed first, until `count` Gaussians are left.
+   Needs no photographs. Indices change. A second for 30,000; save the result. Where the model has fewer it
+   stays. With photographs 1,000 more iterations win back what was lost (examples/train.c, --refit).
+   ERR_ARGUMENT: count < 1, or a trainer has the model. ERR_MEMORY. */
+SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count);
 
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
@@ -5435,289 +5436,6 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
 }
 
-/* ==== >>reduce  fewer Gaussians: levels of detail ==== */
-
-/* Reads a model's Gaussians and how much of each is seen from around. Merges neighbours, those first that are
-   least missed. Public: ssdgs_model_reduce(). */
-
-#define SSDGS__REDUCE_LEAF 16      /* neighbours among which partners are found, at most */
-#define SSDGS__REDUCE_VIEWS 8      /* directions that tell what is seen */
-#define SSDGS__REDUCE_STEP 8       /* of so many one goes a round, at most: then partners are found anew */
-#define SSDGS__REDUCE_UNSEEN 1e-3  /* the share that counts of what nobody sees */
-#define SSDGS__REDUCE_OPAQUE 0.999 /* no merged Gaussian has more opacity */
-#define SSDGS__REDUCE_NEVER (ssdgs_real)1e30 /* the cost of what is no number */
-
-/* What merging reads of a Gaussian. */
-typedef struct ssdgs__blob {
-    double position[3], covariance[9], log_determinant; /* world; of the covariance */
-    double seen, share;         /* of its opacity x area: what is seen from around, on average */
-    double normal[3], color[9]; /* c_d, c_s, c_sss */
-} ssdgs__blob;
-
-typedef struct ssdgs__pair {
-    ssdgs_real cost;
-    uint32_t kept, gone; /* the first becomes both */
-} ssdgs__pair;
-
-typedef struct ssdgs__reduce_job {
-    const ssdgs_model *model;
-    const ssdgs_real *seen;
-    int offset; /* of the leaves */
-    ssdgs__pair
-        *pairs; /* (leaves, SSDGS__REDUCE_LEAF / 2) those without a partner last, with a cost of 1e30 */
-} ssdgs__reduce_job;
-
-/* A third of an ellipsoid's surface, about: its shadows' mean area, but for a factor. */
-static double ssdgs__blob_area(const double scale[3]) {
-    return scale[0] * scale[1] + scale[1] * scale[2] + scale[2] * scale[0];
-}
-
-static void ssdgs__blob_load(const ssdgs_model *model, size_t index, double seen, ssdgs__blob *b) {
-    ssdgs_gaussian g;
-    ssdgs__gaussian_load(&g, model->gaussians + index, model->capacity);
-    ssdgs_real q[4], r[9];
-    ssdgs__rotation_scalar(g.rotation, q, r);
-    double scale[3];
-    b->log_determinant = 0;
-    for (int c = 0; c < 3; c++) {
-        b->position[c] = (double)g.position[c];
-        b->normal[c] = (double)g.normal[c];
-        b->color[c] = (double)g.diffuse[c];
-        b->color[3 + c] = (double)g.specular[c];
-        b->color[6 + c] = (double)g.scattering[c];
-        scale[c] = (double)g.scale[c];
-        b->log_determinant += 2 * log(scale[c]);
-    }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double sum = 0;
-            for (int c = 0; c < 3; c++)
-                sum += (double)r[3 * i + c] * (double)r[3 * j + c] * scale[c] * scale[c];
-            b->covariance[3 * i + j] = sum;
-        }
-    const double mass = (double)g.opacity * ssdgs__blob_area(scale);
-    b->share = SSDGS__REDUCE_UNSEEN + (mass > 0 ? seen / mass : 0);
-    b->seen = b->share * mass;
-}
-
-/* What is missed when two become one: how far apart they are, by their places and shapes (as the
-   Bhattacharyya distance has them, the shapes with half its weight), normals and colours, times what is seen
-   of the lesser. */
-static double ssdgs__merge_cost(const ssdgs__blob *a, const ssdgs__blob *b) {
-    double s[9], d[3], adjugate[9], away = 0, other = 0;
-    for (int i = 0; i < 9; i++) s[i] = a->covariance[i] + b->covariance[i];
-    for (int i = 0; i < 3; i++) {
-        const int i1 = 3 * ((i + 1) % 3), i2 = 3 * ((i + 2) % 3);
-        d[i] = a->position[i] - b->position[i];
-        other += (a->normal[i] - b->normal[i]) * (a->normal[i] - b->normal[i]);
-        for (int j = 0; j < 3; j++) {
-            const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            adjugate[3 * i + j] = s[i1 + j1] * s[i2 + j2] - s[i1 + j2] * s[i2 + j1];
-        }
-    }
-    for (int i = 0; i < 9; i++) other += (a->color[i] - b->color[i]) * (a->color[i] - b->color[i]);
-    const double determinant = s[0] * adjugate[0] + s[1] * adjugate[1] + s[2] * adjugate[2];
-    for (int i = 0; i < 9; i++) away += d[i / 3] * adjugate[i] * d[i % 3] / determinant;
-    const double shape = log(determinant / 8) - 0.5 * (a->log_determinant + b->log_determinant);
-    return (3 * (away + shape) + other) * a->seen * b->seen / (a->seen + b->seen);
-}
-
-static int ssdgs__pair_compare(const void *a, const void *b) {
-    const ssdgs__pair *x = (const ssdgs__pair *)a, *y = (const ssdgs__pair *)b;
-    if (x->cost < y->cost || y->cost < x->cost) return x->cost < y->cost ? -1 : 1;
-    return x->kept < y->kept ? -1 : x->kept > y->kept;
-}
-
-/* Pairs off the Gaussians of a leaf, the cheapest pair first. */
-static void ssdgs__pair_task(void *data, int leaf) {
-    const ssdgs__reduce_job *job = (const ssdgs__reduce_job *)data;
-    const int from = leaf * SSDGS__REDUCE_LEAF - job->offset, begin = from > 0 ? from : 0;
-    const int end =
-        from + SSDGS__REDUCE_LEAF < job->model->count ? from + SSDGS__REDUCE_LEAF : job->model->count;
-    ssdgs__blob blob[SSDGS__REDUCE_LEAF];
-    ssdgs__pair all[SSDGS__REDUCE_LEAF * (SSDGS__REDUCE_LEAF - 1) / 2],
-        *out = job->pairs + leaf * (SSDGS__REDUCE_LEAF / 2);
-    size_t n = 0;
-    unsigned taken = 0;
-    for (int i = begin; i < end; i++)
-        ssdgs__blob_load(job->model, (size_t)i, (double)job->seen[i], blob + (i - begin));
-    for (int i = begin; i < end; i++)
-        for (int j = i + 1; j < end; j++) {
-            const double cost = ssdgs__merge_cost(blob + (i - begin), blob + (j - begin));
-            all[n].cost = cost < (double)SSDGS__REDUCE_NEVER ? (ssdgs_real)cost : SSDGS__REDUCE_NEVER;
-            all[n].kept = (uint32_t)i;
-            all[n++].gone = (uint32_t)j;
-        }
-    qsort(all, n, sizeof *all, ssdgs__pair_compare);
-    for (size_t i = 0; i < n; i++) {
-        const unsigned both = 1u << ((int)all[i].kept - begin) | 1u << ((int)all[i].gone - begin);
-        if (!(taken & both)) *out++ = all[i];
-        taken |= taken & both ? 0 : both;
-    }
-    for (; out < job->pairs + (leaf + 1) * (SSDGS__REDUCE_LEAF / 2); out++)
-        out->cost = 2 * SSDGS__REDUCE_NEVER;
-}
-
-/* The axes of a covariance as a quaternion, their standard deviations (Jacobi's method). */
-static void ssdgs__blob_axes(double s[9], double q[4], double scale[3]) {
-    q[0] = 1;
-    q[1] = q[2] = q[3] = 0;
-    for (int turn = 0; turn < 24; turn++) {
-        const int k = turn % 3, i = (k + 1) % 3, j = (k + 2) % 3;
-        const double apart = s[4 * i] - s[4 * j], both = s[3 * i + j];
-        const double angle = (apart < 0 ? -0.5 : 0.5) * atan2(2 * both, fabs(apart));
-        const double c = cos(angle), d = sin(angle), h = cos(angle / 2), p = sin(angle / 2);
-        for (int l = 0; l < 3; l++) { /* columns, then rows */
-            const double x = s[3 * l + i], y = s[3 * l + j];
-            s[3 * l + i] = c * x + d * y;
-            s[3 * l + j] = c * y - d * x;
-        }
-        for (int l = 0; l < 3; l++) {
-            const double x = s[3 * i + l], y = s[3 * j + l];
-            s[3 * i + l] = c * x + d * y;
-            s[3 * j + l] = c * y - d * x;
-        }
-        const double w = q[0], a = q[1 + i], b = q[1 + j], z = q[1 + k]; /* q (h, p around axis k) */
-        q[0] = h * w - p * z;
-        q[1 + i] = h * a + p * b;
-        q[1 + j] = h * b - p * a;
-        q[1 + k] = h * z + p * w;
-    }
-    for (int c = 0; c < 3; c++) scale[c] = sqrt(s[4 * c] > 1e-30 ? s[4 * c] : 1e-30);
-}
-
-/* Gaussian `kept` becomes both: their mean, by what is seen of each. Its opacity makes as much seen of it as
-   of both where the share that is seen is their mean. */
-static void ssdgs__merge(ssdgs_model *model, const ssdgs__pair *pair, ssdgs_real *seen) {
-    const size_t stride = model->capacity;
-    ssdgs_real *kept = model->gaussians + pair->kept, *gone = model->gaussians + pair->gone;
-    ssdgs__blob a, b;
-    ssdgs__blob_load(model, pair->kept, (double)seen[pair->kept], &a);
-    ssdgs__blob_load(model, pair->gone, (double)seen[pair->gone], &b);
-    const double sum = a.seen + b.seen, w = sum > 0 ? a.seen / sum : 0.5;
-    const double share = w * a.share + (1 - w) * b.share;
-    double s[9], q[4], scale[3], raw[SSDGS_CHANNELS], along = 0, length[2] = {0, 0};
-    for (int i = 0; i < 9; i++)
-        s[i] =
-            w * a.covariance[i] + (1 - w) * b.covariance[i] +
-            w * (1 - w) * (a.position[i / 3] - b.position[i / 3]) * (a.position[i % 3] - b.position[i % 3]);
-    ssdgs__blob_axes(s, q, scale);
-    for (size_t c = SSDGS_FRAME; c < SSDGS_FRAME + 4; c++) {
-        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
-        along += x * y;
-        length[0] += x * x;
-        length[1] += y * y;
-    }
-    const double turn = (along < 0 ? -1 : 1) * sqrt(length[0] / (length[1] > 0 ? length[1] : 1));
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
-        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
-        raw[c] = w * x + (1 - w) * (c >= SSDGS_FRAME && c < SSDGS_FRAME + 4 ? turn * y : y);
-    }
-    for (int c = 0; c < 3; c++) {
-        raw[SSDGS_POSITION + c] = w * a.position[c] + (1 - w) * b.position[c];
-        raw[SSDGS_LOG_SCALE + c] = log(scale[c]);
-    }
-    for (int c = 0; c < 4; c++) raw[SSDGS_ROTATION + c] = q[c];
-    for (int c = 0; c < 9; c++)
-        raw[SSDGS_DIFFUSE + c] = ssdgs__softplus_inverse(w * a.color[c] + (1 - w) * b.color[c]);
-    const double opacity = sum / share / ssdgs__blob_area(scale);
-    raw[SSDGS_OPACITY] = ssdgs__logit(opacity < SSDGS__REDUCE_OPAQUE ? opacity : SSDGS__REDUCE_OPAQUE);
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) kept[c * stride] = (ssdgs_real)raw[c];
-    seen[pair->kept] += seen[pair->gone];
-}
-
-/* How much of each Gaussian is seen from around: what parallel lights shed on it, on average. */
-static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssdgs_real *flux) {
-    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
-    const ssdgs_camera camera = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
-    const ssdgs_render_options options = ssdgs_render_options_exact();
-    const size_t n = (size_t)model->count;
-    memset(seen, 0, n * sizeof *seen);
-    for (int view = 0; view < SSDGS__REDUCE_VIEWS; view++) { /* on a spiral around the sphere */
-        const double z = 1 - (2 * view + 1.0) / SSDGS__REDUCE_VIEWS, r = sqrt(1 - z * z), turn = 2.39996323;
-        const ssdgs_light light = {
-            SSDGS_LIGHT_DIRECTIONAL,
-            {(ssdgs_real)(r * cos(turn * view)), (ssdgs_real)(r * sin(turn * view)), (ssdgs_real)z},
-            {1, 1, 1}};
-        ssdgs_frame frame;
-        ssdgs_result result = ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0);
-        frame.flux = flux;
-        for (int stage = SSDGS_STAGE_PROJECT; stage <= SSDGS_STAGE_WALK && !result; stage++)
-            result = ssdgs_stage_cpu(&frame, (ssdgs_stage)stage);
-        if (result) return result;
-        for (size_t i = 0; i < n; i++) seen[i] += flux[i] / SSDGS__REDUCE_VIEWS;
-    }
-    return SSDGS_OK;
-}
-
-/* Keeps the Gaussians listed in `keys` in their order, which ssdgs__split makes compact. */
-static void ssdgs__reduce_keep(ssdgs_model *model, uint64_t *keys, size_t count, ssdgs_real *seen,
-                               ssdgs_real *scratch) {
-    ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
-    ssdgs__arrange(model->gaussians, model->capacity, keys, count, scratch);
-    for (size_t i = 0; i < count; i++) scratch[i] = seen[(uint32_t)keys[i]];
-    memcpy(seen, scratch, count * sizeof *seen);
-    model->count = (int)count;
-}
-
-static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
-    ssdgs_context *context = model->context;
-    const size_t n = (size_t)model->count, leaves = n / SSDGS__REDUCE_LEAF + 2;
-    if (count < 1) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: %d Gaussians", count);
-    if (model->references > 1)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: a trainer has the model");
-    if (count >= model->count) return SSDGS_OK;
-    /* the pairs; keys; what is seen, a plane in another order, which is of a light at first; what goes */
-    ssdgs__pair *pairs = (ssdgs__pair *)ssdgs__allocate(
-        context, leaves * (SSDGS__REDUCE_LEAF / 2) * sizeof *pairs +
-                     n * (sizeof(uint64_t) + 2 * sizeof(ssdgs_real) + 1) + SSDGS__BLOCK);
-    if (!pairs) return SSDGS_ERR_MEMORY;
-    uint64_t *keys = (uint64_t *)(void *)(pairs + leaves * (SSDGS__REDUCE_LEAF / 2));
-    ssdgs_real *seen = (ssdgs_real *)(void *)(keys + n), *scratch = seen + n;
-    unsigned char *gone = (unsigned char *)(scratch + n);
-    const ssdgs_settings settings = model->settings;
-    model->settings.baked = 0; /* for the lights that tell what is seen */
-    model->settings.terms |= SSDGS_SHADOW_TERM;
-    model->settings.asg = SSDGS_ASG_GEOMETRIC;
-    ssdgs_result result = ssdgs__seen_around(model, seen, scratch);
-    model->settings = settings;
-    ssdgs__model_changed(model);
-    if (!result) {
-        size_t left = 0;
-        for (size_t i = 0; i < n; i++) { /* less those that no frame draws */
-            size_t c;
-            for (c = 0; c < SSDGS_DIFFUSE && ssdgs__finite(model->gaussians[c * model->capacity + i]); c++) {}
-            if (c == SSDGS_DIFFUSE) keys[left++] = i;
-        }
-        ssdgs__reduce_keep(model, keys, left, seen, scratch);
-        model->arrangement++;
-    }
-    for (int round = 0; model->count > count && !result; round++) {
-        ssdgs__reduce_job job = {model, seen, round % 2 * SSDGS__REDUCE_LEAF / 2, pairs};
-        const int now = model->count, tasks = (now + job.offset - 1) / SSDGS__REDUCE_LEAF + 1;
-        const int most = now / SSDGS__REDUCE_STEP + 1, merges = now - count < most ? now - count : most;
-        ssdgs__parallel(context, tasks, ssdgs__pair_task, &job);
-        qsort(pairs, (size_t)tasks * (SSDGS__REDUCE_LEAF / 2), sizeof *pairs, ssdgs__pair_compare);
-        memset(gone, 0, (size_t)now);
-        for (int i = 0; i < merges && pairs[i].cost <= SSDGS__REDUCE_NEVER; i++) {
-            ssdgs__merge(model, pairs + i, seen);
-            gone[pairs[i].gone] = 1;
-        }
-        size_t left = 0;
-        for (int i = 0; i < now; i++)
-            if (!gone[i]) keys[left++] = (uint64_t)i;
-        ssdgs__reduce_keep(model, keys, left, seen, scratch);
-    }
-    ssdgs__release(context, pairs);
-    return result;
-}
-
-SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_reduce");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_reduce(model, count));
-}
-
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */
 
 /* Reads images of stored values. Writes loss, gradient, bytes and metrics. Called by the trainer and by
@@ -8116,6 +7834,288 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
             sums[3 * trainer->stride + g] +=
                 4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
     }
+}
+
+/* ==== >>reduce  fewer Gaussians: levels of detail ==== */
+
+/* Reads a model's Gaussians and how much of each is seen from around. Merges neighbours, those first that are
+   least missed. Public: ssdgs_model_reduce(). */
+
+#define SSDGS__REDUCE_LEAF 16      /* neighbours among which partners are found, at most */
+#define SSDGS__REDUCE_VIEWS 8      /* directions that tell what is seen */
+#define SSDGS__REDUCE_STEP 8       /* of so many one goes a round, at most: then partners are found anew */
+#define SSDGS__REDUCE_UNSEEN 1e-3  /* the share that counts of what nobody sees */
+#define SSDGS__REDUCE_OPAQUE 0.999 /* no merged Gaussian has more opacity */
+#define SSDGS__REDUCE_NEVER (ssdgs_real)1e30 /* the cost of what is no number */
+
+/* What merging reads of a Gaussian. */
+typedef struct ssdgs__blob {
+    double position[3], covariance[9], log_determinant; /* world; of the covariance */
+    double seen, share;         /* of its opacity x area: what is seen from around, on average */
+    double normal[3], color[9]; /* c_d, c_s, c_sss */
+} ssdgs__blob;
+
+typedef struct ssdgs__pair {
+    ssdgs_real cost;
+    uint32_t kept, gone; /* the first becomes both */
+} ssdgs__pair;
+
+typedef struct ssdgs__reduce_job {
+    const ssdgs_model *model;
+    const ssdgs_real *seen;
+    int offset;         /* of the leaves */
+    ssdgs__pair *pairs; /* (leaves, SSDGS__REDUCE_LEAF / 2) unused ones cost more than any other */
+} ssdgs__reduce_job;
+
+/* About proportional to an ellipsoid's surface, so to the mean area of its shadows. */
+static double ssdgs__blob_area(const double scale[3]) {
+    return scale[0] * scale[1] + scale[1] * scale[2] + scale[2] * scale[0];
+}
+
+static void ssdgs__blob_load(const ssdgs_model *model, size_t index, double seen, ssdgs__blob *b) {
+    ssdgs_gaussian g;
+    ssdgs__gaussian_load(&g, model->gaussians + index, model->capacity);
+    ssdgs_real q[4], r[9];
+    ssdgs__rotation_scalar(g.rotation, q, r);
+    double scale[3];
+    b->log_determinant = 0;
+    for (int c = 0; c < 3; c++) {
+        b->position[c] = (double)g.position[c];
+        b->normal[c] = (double)g.normal[c];
+        b->color[c] = (double)g.diffuse[c];
+        b->color[3 + c] = (double)g.specular[c];
+        b->color[6 + c] = (double)g.scattering[c];
+        scale[c] = (double)g.scale[c];
+        b->log_determinant += 2 * log(scale[c]);
+    }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double sum = 0;
+            for (int c = 0; c < 3; c++)
+                sum += (double)r[3 * i + c] * (double)r[3 * j + c] * scale[c] * scale[c];
+            b->covariance[3 * i + j] = sum;
+        }
+    const double mass = (double)g.opacity * ssdgs__blob_area(scale);
+    b->share = SSDGS__REDUCE_UNSEEN + (mass > 0 ? seen / mass : 0);
+    b->seen = b->share * mass;
+}
+
+/* What is missed when two become one: how far apart they are, by their places and shapes (as the
+   Bhattacharyya distance has them, the shapes with half its weight), normals and colours, times what is seen
+   of the lesser. */
+static double ssdgs__merge_cost(const ssdgs__blob *a, const ssdgs__blob *b) {
+    double s[9], d[3], adjugate[9], away = 0, other = 0;
+    for (int i = 0; i < 9; i++) s[i] = a->covariance[i] + b->covariance[i];
+    for (int i = 0; i < 3; i++) {
+        const int i1 = 3 * ((i + 1) % 3), i2 = 3 * ((i + 2) % 3);
+        d[i] = a->position[i] - b->position[i];
+        other += (a->normal[i] - b->normal[i]) * (a->normal[i] - b->normal[i]);
+        for (int j = 0; j < 3; j++) {
+            const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+            adjugate[3 * i + j] = s[i1 + j1] * s[i2 + j2] - s[i1 + j2] * s[i2 + j1];
+        }
+    }
+    for (int i = 0; i < 9; i++) other += (a->color[i] - b->color[i]) * (a->color[i] - b->color[i]);
+    const double determinant = s[0] * adjugate[0] + s[1] * adjugate[1] + s[2] * adjugate[2];
+    for (int i = 0; i < 9; i++) away += d[i / 3] * adjugate[i] * d[i % 3] / determinant;
+    const double shape = log(determinant / 8) - 0.5 * (a->log_determinant + b->log_determinant);
+    return (3 * (away + shape) + other) * a->seen * b->seen / (a->seen + b->seen);
+}
+
+static int ssdgs__pair_compare(const void *a, const void *b) {
+    const ssdgs__pair *x = (const ssdgs__pair *)a, *y = (const ssdgs__pair *)b;
+    if (x->cost < y->cost || y->cost < x->cost) return x->cost < y->cost ? -1 : 1;
+    return x->kept < y->kept ? -1 : x->kept > y->kept;
+}
+
+/* Pairs off the Gaussians of a leaf, the cheapest pair first. */
+static void ssdgs__pair_task(void *data, int leaf) {
+    const ssdgs__reduce_job *job = (const ssdgs__reduce_job *)data;
+    const int from = leaf * SSDGS__REDUCE_LEAF - job->offset, begin = from > 0 ? from : 0;
+    const int end =
+        from + SSDGS__REDUCE_LEAF < job->model->count ? from + SSDGS__REDUCE_LEAF : job->model->count;
+    ssdgs__blob blob[SSDGS__REDUCE_LEAF];
+    ssdgs__pair all[SSDGS__REDUCE_LEAF * (SSDGS__REDUCE_LEAF - 1) / 2],
+        *out = job->pairs + leaf * (SSDGS__REDUCE_LEAF / 2);
+    size_t n = 0;
+    unsigned taken = 0;
+    for (int i = begin; i < end; i++)
+        ssdgs__blob_load(job->model, (size_t)i, (double)job->seen[i], blob + (i - begin));
+    for (int i = begin; i < end; i++)
+        for (int j = i + 1; j < end; j++) {
+            const double cost = ssdgs__merge_cost(blob + (i - begin), blob + (j - begin));
+            all[n].cost = cost < (double)SSDGS__REDUCE_NEVER ? (ssdgs_real)cost : SSDGS__REDUCE_NEVER;
+            all[n].kept = (uint32_t)i;
+            all[n++].gone = (uint32_t)j;
+        }
+    qsort(all, n, sizeof *all, ssdgs__pair_compare);
+    for (size_t i = 0; i < n; i++) {
+        const unsigned both = 1u << ((int)all[i].kept - begin) | 1u << ((int)all[i].gone - begin);
+        if (!(taken & both)) *out++ = all[i];
+        taken |= taken & both ? 0 : both;
+    }
+    for (; out < job->pairs + (leaf + 1) * (SSDGS__REDUCE_LEAF / 2); out++)
+        out->cost = 2 * SSDGS__REDUCE_NEVER;
+}
+
+/* The axes of a covariance as a quaternion, their standard deviations (Jacobi's method). */
+static void ssdgs__blob_axes(double s[9], double q[4], double scale[3]) {
+    q[0] = 1;
+    q[1] = q[2] = q[3] = 0;
+    for (int turn = 0; turn < 24; turn++) {
+        const int k = turn % 3, i = (k + 1) % 3, j = (k + 2) % 3;
+        const double apart = s[4 * i] - s[4 * j], both = s[3 * i + j];
+        const double angle = (apart < 0 ? -0.5 : 0.5) * atan2(2 * both, fabs(apart));
+        const double c = cos(angle), d = sin(angle), h = cos(angle / 2), p = sin(angle / 2);
+        for (int l = 0; l < 3; l++) { /* columns, then rows */
+            const double x = s[3 * l + i], y = s[3 * l + j];
+            s[3 * l + i] = c * x + d * y;
+            s[3 * l + j] = c * y - d * x;
+        }
+        for (int l = 0; l < 3; l++) {
+            const double x = s[3 * i + l], y = s[3 * j + l];
+            s[3 * i + l] = c * x + d * y;
+            s[3 * j + l] = c * y - d * x;
+        }
+        const double w = q[0], a = q[1 + i], b = q[1 + j], z = q[1 + k]; /* q (h, p around axis k) */
+        q[0] = h * w - p * z;
+        q[1 + i] = h * a + p * b;
+        q[1 + j] = h * b - p * a;
+        q[1 + k] = h * z + p * w;
+    }
+    for (int c = 0; c < 3; c++) scale[c] = sqrt(s[4 * c] > 1e-30 ? s[4 * c] : 1e-30);
+}
+
+/* Gaussian `kept` becomes both: their mean, by what is seen of each. Its opacity makes as much seen of it as
+   of both where the share that is seen is their mean. */
+static void ssdgs__merge(ssdgs_model *model, const ssdgs__pair *pair, ssdgs_real *seen) {
+    const size_t stride = model->capacity;
+    ssdgs_real *kept = model->gaussians + pair->kept, *gone = model->gaussians + pair->gone;
+    ssdgs__blob a, b;
+    ssdgs__blob_load(model, pair->kept, (double)seen[pair->kept], &a);
+    ssdgs__blob_load(model, pair->gone, (double)seen[pair->gone], &b);
+    const double sum = a.seen + b.seen, w = sum > 0 ? a.seen / sum : 0.5;
+    const double share = w * a.share + (1 - w) * b.share;
+    double s[9], q[4], scale[3], raw[SSDGS_CHANNELS], along = 0, length[2] = {0, 0};
+    for (int i = 0; i < 9; i++)
+        s[i] =
+            w * a.covariance[i] + (1 - w) * b.covariance[i] +
+            w * (1 - w) * (a.position[i / 3] - b.position[i / 3]) * (a.position[i % 3] - b.position[i % 3]);
+    ssdgs__blob_axes(s, q, scale);
+    for (size_t c = SSDGS_FRAME; c < SSDGS_FRAME + 4; c++) {
+        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
+        along += x * y;
+        length[0] += x * x;
+        length[1] += y * y;
+    }
+    const double turn = (along < 0 ? -1 : 1) * sqrt(length[0] / (length[1] > 0 ? length[1] : 1));
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
+        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
+        raw[c] = w * x + (1 - w) * (c >= SSDGS_FRAME && c < SSDGS_FRAME + 4 ? turn * y : y);
+    }
+    for (int c = 0; c < 3; c++) {
+        raw[SSDGS_POSITION + c] = w * a.position[c] + (1 - w) * b.position[c];
+        raw[SSDGS_LOG_SCALE + c] = log(scale[c]);
+    }
+    for (int c = 0; c < 4; c++) raw[SSDGS_ROTATION + c] = q[c];
+    for (int c = 0; c < 9; c++)
+        raw[SSDGS_DIFFUSE + c] = ssdgs__softplus_inverse(w * a.color[c] + (1 - w) * b.color[c]);
+    const double opacity = sum / share / ssdgs__blob_area(scale);
+    raw[SSDGS_OPACITY] = ssdgs__logit(opacity < SSDGS__REDUCE_OPAQUE ? opacity : SSDGS__REDUCE_OPAQUE);
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++) kept[c * stride] = (ssdgs_real)raw[c];
+    seen[pair->kept] += seen[pair->gone];
+}
+
+/* How much of each Gaussian is seen from around: what parallel lights shed on it, on average. */
+static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssdgs_real *flux) {
+    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    const size_t n = (size_t)model->count;
+    memset(seen, 0, n * sizeof *seen);
+    for (int view = 0; view < SSDGS__REDUCE_VIEWS; view++) { /* on a spiral around the sphere */
+        const double z = 1 - (2 * view + 1.0) / SSDGS__REDUCE_VIEWS, r = sqrt(1 - z * z), turn = 2.39996323;
+        const ssdgs_light light = {
+            SSDGS_LIGHT_DIRECTIONAL,
+            {(ssdgs_real)(r * cos(turn * view)), (ssdgs_real)(r * sin(turn * view)), (ssdgs_real)z},
+            {1, 1, 1}};
+        ssdgs_frame frame;
+        ssdgs_result result = ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0);
+        frame.flux = flux;
+        for (int stage = SSDGS_STAGE_PROJECT; stage <= SSDGS_STAGE_WALK && !result; stage++)
+            result = ssdgs_stage_cpu(&frame, (ssdgs_stage)stage);
+        if (result) return result;
+        for (size_t i = 0; i < n; i++) seen[i] += flux[i] / SSDGS__REDUCE_VIEWS;
+    }
+    return SSDGS_OK;
+}
+
+/* Keeps the Gaussians listed in `keys` in their order, which ssdgs__split makes compact. */
+static void ssdgs__reduce_keep(ssdgs_model *model, uint64_t *keys, size_t count, ssdgs_real *seen,
+                               ssdgs_real *scratch) {
+    ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
+    ssdgs__arrange(model->gaussians, model->capacity, keys, count, scratch);
+    for (size_t i = 0; i < count; i++) scratch[i] = seen[(uint32_t)keys[i]];
+    memcpy(seen, scratch, count * sizeof *seen);
+    model->count = (int)count;
+}
+
+static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
+    ssdgs_context *context = model->context;
+    const size_t n = (size_t)model->count, leaves = n / SSDGS__REDUCE_LEAF + 2;
+    if (count < 1) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: %d Gaussians", count);
+    if (model->references > 1)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: a trainer has the model");
+    if (count >= model->count) return SSDGS_OK;
+    /* the pairs; keys; what is seen, a plane in another order, which is of a light at first; what goes */
+    ssdgs__pair *pairs = (ssdgs__pair *)ssdgs__allocate(
+        context, leaves * (SSDGS__REDUCE_LEAF / 2) * sizeof *pairs +
+                     n * (sizeof(uint64_t) + 2 * sizeof(ssdgs_real) + 1) + SSDGS__BLOCK);
+    if (!pairs) return SSDGS_ERR_MEMORY;
+    uint64_t *keys = (uint64_t *)(void *)(pairs + leaves * (SSDGS__REDUCE_LEAF / 2));
+    ssdgs_real *seen = (ssdgs_real *)(void *)(keys + n), *scratch = seen + n;
+    unsigned char *gone = (unsigned char *)(scratch + n);
+    const ssdgs_settings settings = model->settings;
+    model->settings.baked = 0; /* for the lights that tell what is seen */
+    model->settings.terms |= SSDGS_SHADOW_TERM;
+    model->settings.asg = SSDGS_ASG_GEOMETRIC;
+    ssdgs_result result = ssdgs__seen_around(model, seen, scratch);
+    model->settings = settings;
+    ssdgs__model_changed(model);
+    if (!result) {
+        size_t left = 0;
+        for (size_t i = 0; i < n; i++) { /* less those that no frame draws */
+            size_t c;
+            for (c = 0; c < SSDGS_DIFFUSE && ssdgs__finite(model->gaussians[c * model->capacity + i]); c++) {}
+            if (c == SSDGS_DIFFUSE) keys[left++] = i;
+        }
+        ssdgs__reduce_keep(model, keys, left, seen, scratch);
+        model->arrangement++;
+    }
+    for (int round = 0; model->count > count && !result; round++) {
+        ssdgs__reduce_job job = {model, seen, round % 2 * SSDGS__REDUCE_LEAF / 2, pairs};
+        const int now = model->count, tasks = (now + job.offset - 1) / SSDGS__REDUCE_LEAF + 1;
+        const int most = now / SSDGS__REDUCE_STEP + 1, merges = now - count < most ? now - count : most;
+        ssdgs__parallel(context, tasks, ssdgs__pair_task, &job);
+        qsort(pairs, (size_t)tasks * (SSDGS__REDUCE_LEAF / 2), sizeof *pairs, ssdgs__pair_compare);
+        memset(gone, 0, (size_t)now);
+        for (int i = 0; i < merges && pairs[i].cost <= SSDGS__REDUCE_NEVER; i++) {
+            ssdgs__merge(model, pairs + i, seen);
+            gone[pairs[i].gone] = 1;
+        }
+        size_t left = 0;
+        for (int i = 0; i < now; i++)
+            if (!gone[i]) keys[left++] = (uint64_t)i;
+        ssdgs__reduce_keep(model, keys, left, seen, scratch);
+    }
+    ssdgs__release(context, pairs);
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count) {
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_reduce");
+    return result ? result : ssdgs__leave(model->context, ssdgs__model_reduce(model, count));
 }
 
 /* ==== >>steps  the trainer's public functions ==== */
