@@ -94,8 +94,9 @@ THREADS
   After fork() the child may use its copies, without threads.
 
 DETERMINISM
-  The same calls give the same bits for any number of threads. AVX2, AVX-512 and NEON give the same bits, and
-so do SSE2 and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm does.
+  The same calls give the same bits for any number of threads, and of processes that share the batches of
+  training (options.sum). AVX2, AVX-512 and NEON give the same bits, and so do SSE2 and scalar code; the two
+  groups differ, as FMA rounds once. Builds agree as far as their libm does.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
