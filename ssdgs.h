@@ -530,6 +530,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
                                   removed, see OUTLINES in the manual; 0.02 */
     ssdgs_real adam_epsilon;   /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
+    ssdgs_real finish; /* factor of the model's rates in the last tenth of the iterations; 0.3; 1 = none */
     ssdgs_rates rates;
     ssdgs_sum sum; /* none */
 } ssdgs_train_options;
@@ -6944,6 +6945,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
     o.adam_epsilon = (ssdgs_real)0.1;
+    o.finish = (ssdgs_real)0.3;
 #define SSDGS__RATE(field, first, last) \
     o.rates.field.start = (ssdgs_real)(first), o.rates.field.end = (ssdgs_real)(last)
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
@@ -6972,6 +6974,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.densify_gradient = (ssdgs_real)2e-4;
     o.densify_shadow = 0;
     o.prune_weight = o.prune_outside = o.adam_epsilon = 0;
+    o.finish = 1;
     return o;
 }
 
@@ -7341,7 +7344,10 @@ static ssdgs_real ssdgs__bias_correction(double beta,
 static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, double epsilon,
                             const ssdgs__adam_range *arrays) {
     ssdgs__adam_range *r = job->range + job->ranges++;
-    const double rate = ssdgs__group_rate(trainer, group, t) * sqrt((double)trainer->options.batch);
+    const ssdgs_train_options *o = &trainer->options;
+    const double end = o->iterations > 60000 ? o->iterations : 60e3;
+    const double rate = ssdgs__group_rate(trainer, group, t) * sqrt((double)o->batch) *
+                        (t < 0.9 * end ? 1 : (double)o->finish);
     *r = *arrays;
     r->group = group;
     r->bad = 0;
@@ -8158,6 +8164,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(adam_epsilon, 0, most);
+    SSDGS__RANGE(finish, 0, 1);
 #undef SSDGS__RANGE
     if (o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
                        o->batch % o->sum.processes))

@@ -71,6 +71,7 @@ static const field train_fields[] = {
     R(prune_weight, 0, 1e30),
     R(prune_outside, 0, 1),
     R(adam_epsilon, 0, 1e30),
+    R(finish, 0, 1),
     RATE(position),
     RATE(opacity),
     RATE(scale),
