@@ -158,9 +158,9 @@ static void test_same_bits(void) {
     for (int step = 0; step < 20; step++) {
         CHECK(!ssdgs_trainer_step(alone.trainer, &one));
         CHECK(one.iteration == BATCH * (step + 1));
-        ssdgs_real most = 0; /* statistics grow until density control, after 10 iterations and more */
+        double most = 0; /* statistics grow until density control, after 10 iterations and more */
         for (int i = 0; i < alone.model->count; i++)
-            most = alone.trainer->screen_count[i] > most ? alone.trainer->screen_count[i] : most;
+            most = fmax(most, (double)alone.trainer->screen_count[i]);
         if (step < 2) CHECK(most > BATCH * step && most <= BATCH * (step + 1));
         if (step == 2) CHECK(most <= 0); /* it was, at the twelfth */
         for (int k = 0; k < 3; k++) {
