@@ -1,15 +1,17 @@
-/* mpicc -O2 examples/train_mpi.c -o train_mpi -lm -lpthread; mpirun -n 4 train_mpi DATASET MODEL.ply:
-   training on several processes, here by MPI; ssdgs.h knows only the function add() */
+/* mpicc -O2 examples/train_mpi.c -o train_mpi -lm -lpthread; mpirun --bind-to none -n 4 train_mpi DATASET
+   MODEL.ply: training on several processes, here by MPI; ssdgs.h knows only the function add() */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
 #include <mpi.h>
 
 static const char *const usage =
-    "usage: mpirun -n PROCESSES train_mpi DATASET MODEL.ply [ITERATIONS [BATCH [BACKGROUND]]]\n"
+    "usage: mpirun --bind-to none -n PROCESSES train_mpi DATASET MODEL.ply [ITERATIONS [BATCH "
+    "[BACKGROUND]]]\n"
     "Trains on a folder of photographs, BATCH a step, shared by 1, 2, 4, 8 ... processes; the model is the "
     "same\n"
-    "for any number of them. 20000 iterations; a batch of 4 or of the processes; black or white behind\n"
+    "for any number of them. Bound to one core each their threads would share it. 20000 iterations; a batch "
+    "of 4 or of the processes; black or white behind\n"
     "transparent pixels.\n";
 
 typedef struct team {

@@ -9,7 +9,7 @@ check() { # check NAME COMMAND...
 run() { # run CODE PROCESSES ARGUMENTS...
     code=$1 processes=$2; shift 2
     OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
-        mpirun --oversubscribe -n "$processes" "$build/train_mpi" "$@" >"$out/log" 2>&1
+        mpirun --bind-to none --oversubscribe -n "$processes" "$build/train_mpi" "$@" >"$out/log" 2>&1
     [ $? -eq "$code" ]
 }
 mkdir -p "$out"
