@@ -8,10 +8,9 @@
 static const char *const usage =
     "usage: mpirun --bind-to none -n PROCESSES train_mpi DATASET MODEL.ply [ITERATIONS [BATCH "
     "[BACKGROUND]]]\n"
-    "Trains on a folder of photographs, BATCH a step, shared by 1, 2, 4, 8 ... processes; the model is the "
-    "same\n"
-    "for any number of them. Bound to one core each their threads would share it. 20000 iterations; a batch "
-    "of 4 or of the processes; black or white behind\n"
+    "Trains on a folder of photographs, BATCH a step, shared by 1, 2, 4, 8 ... processes. The model is the\n"
+    "same for any number of them. Bound to a core, a process would have its threads share it.\n"
+    "20000 iterations; a batch of 4, or of as many as there are processes; black or white behind\n"
     "transparent pixels.\n";
 
 typedef struct team {
