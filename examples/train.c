@@ -270,7 +270,7 @@ static void on_interrupt(int signal_number) {
 }
 
 typedef struct run {
-    int iterations, checkpoint_every, terminal;
+    int iterations, batch, checkpoint_every, terminal;
     int kept; /* iterations in the checkpoint that another run left: it is replaced once this run has done as
                  many */
     int done; /* iterations of this run */
@@ -292,8 +292,8 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
     }
     r->psnr += 0.02 * (stats->psnr - r->psnr);
     char left[32];
-    if (done == r->first + 50) {
-        r->speed = 50 / (now - r->start + 1e-9);
+    if (r->speed <= 0 && done >= r->first + 50) {
+        r->speed = (done - r->first) / (now - r->start + 1e-9);
         fprintf(stderr, "at this speed %s for the %d iterations left; it falls as Gaussians are added\n",
                 clock_text((total - done) / r->speed, left), total - done);
     }
@@ -310,7 +310,8 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
         r->drawn_at = done;
         r->percent = percent / 5;
     }
-    return !interrupted && (finished || !r->checkpoint_every || done % r->checkpoint_every);
+    return !interrupted && (finished || !r->checkpoint_every ||
+                            done / r->checkpoint_every == (done - r->batch) / r->checkpoint_every);
 }
 
 /* Everything the program holds; main releases it. */
@@ -576,6 +577,7 @@ static int train(job *j) {
         return fail(ssdgs_error_message(j->context));
 
     j->progress.iterations = j->options.iterations;
+    j->progress.batch = j->options.batch;
     j->progress.terminal = on_terminal();
     j->progress.first = -1;
     signal(SIGINT, on_interrupt);

@@ -76,6 +76,11 @@ check "the same picture" cmp "$out/reduced/r_000.png" "$out/reduced2/r_000.png"
 check "another picture" differs "$out/reduced/r_000.png" "$out/relit/r_000.png"
 check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
+# several photographs a step: how far it is, and checkpoints
+check "--set batch=3" says 0 "iterations left" "$build/train" "$set" -o "$out/batch.ply" --iterations 180 --points 200 --threads 1 --set batch=3 --checkpoint-every 100
+check "a checkpoint after the hundredth" grep -q SSDGSCK "$out/batch.ply.ckpt"
+check "which goes on" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/batch.ply" --iterations 180 --points 200 --threads 1 --set batch=3 --resume
+
 # fewer Gaussians, trained on
 check "--refit" says 0 "refit.ply: 50 Gaussians" "$build/train" "$set" -o "$out/refit.ply" --refit "$model" --max-gaussians 50 --iterations 60 --threads 1
 check "--refit of itself" says 1 "would replace an input" "$build/train" "$set" -o "$out/refit.ply" --refit "$out/refit.ply"
