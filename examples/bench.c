@@ -587,14 +587,26 @@ static ssdgs_render_options preset(int i) {
                           : ssdgs_render_options_preview();
 }
 
-enum { LEVELS = 6, PREVIEW_LEVEL = 4 };   /* levels of detail: the whole, then those of the sweep */
-static const double preview_share = 0.25; /* of the Gaussians: that of PREVIEW_LEVEL */
+/* One shortcut at a time on top of exact, from weak to strong; levels of detail, the last, by the share of
+   the Gaussians. */
+static const struct {
+    const char *name;
+    double values[6];
+} knobs[] = {{"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}},
+             {"light_detail", {0.8, 0.6, 0.5, 0.35}},
+             {"stop", {1e-3, 4e-3, 0.01, 0.03}},
+             {"transport_detail", {0.7, 0.5, 0.35}},
+             {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}},
+             {"gaussians", {0.7, 0.5, 0.35, 0.25, 0.12}}};
+enum { KNOBS = sizeof knobs / sizeof *knobs, GAUSSIANS = KNOBS - 1 };
+
+enum { LEVELS = 6, PREVIEW_LEVEL = 4 }; /* levels of detail: the whole, then those of the sweep */
 
 /* The whole model and, behind it, that of previews: pair[i == PREVIEW] is a preset's. */
 static void open_pair(const bench *b, session pair[2], int isa, int threads, int hooks) {
     for (int i = 0; i < 2; i++) {
         open_session(b, pair + i, isa, threads, hooks, NULL);
-        reduce_session(pair + i, i ? preview_share : 1);
+        reduce_session(pair + i, i ? knobs[GAUSSIANS].values[PREVIEW_LEVEL - 1] : 1);
     }
 }
 
@@ -746,19 +758,6 @@ static void measure_frames(bench *b) {
     print_table(t);
 }
 
-/* One shortcut at a time on top of exact, from weak to strong; levels of detail, the last, by the share of
-   the Gaussians. */
-static const struct {
-    const char *name;
-    double values[6];
-} knobs[] = {{"max_error", {0.01, 0.03, 0.06, 0.12, 0.25}},
-             {"light_detail", {0.8, 0.6, 0.5, 0.35}},
-             {"stop", {1e-3, 4e-3, 0.01, 0.03}},
-             {"transport_detail", {0.7, 0.5, 0.35}},
-             {"alpha_threshold", {0.005, 0.006, 0.01, 0.02}},
-             {"gaussians", {0.7, 0.5, 0.35, 0.25, 0.12}}};
-enum { KNOBS = sizeof knobs / sizeof *knobs, GAUSSIANS = KNOBS - 1 };
-
 static void measure_sweep(bench *b) {
     table *t = new_table(b, "sweep", "ms rms_error max_error loss_db shaded_fraction");
     char names[MAX_JOBS][48];
@@ -774,7 +773,7 @@ static void measure_sweep(bench *b) {
         snprintf(names[count], sizeof *names, "%s", presets[count]);
     }
     for (int k = 0; k < KNOBS; k++)
-        for (int i = 0; i < 6 && knobs[k].values[i] > 0; i++, count++) {
+        for (int i = 0; knobs[k].values[i] > 0; i++, count++) {
             jobs[count] = make_job(b, levels + (k == GAUSSIANS ? i + 1 : 0), preset(EXACT));
             ssdgs_render_options *o = &jobs[count].options;
             ssdgs_real *const fields[GAUSSIANS] = {&o->max_error, &o->light_detail, &o->stop,

@@ -7,9 +7,9 @@ shift 3
 i=0
 while [ $i -lt "$readings" ]; do
     for program in "$old" "$new"; do
-        "$program" --quick "$@" >"$program.log" 2>&1 || { tail -3 "$program.log"; exit 1; }
+        said=$("$program" --quick "$@" 2>&1) || { echo "$said" | tail -n 3 >&2; exit 1; }
         # the facts: lines of a key and a number; a table's rows have more
-        awk -v side="$program" 'NF == 2 && $1 ~ /^[a-z0-9_]+$/ && $2 ~ /^[-+0-9.e]+$/ { print side, $1, $2 }' "$program.log"
+        echo "$said" | awk -v side="$program" 'NF == 2 && $1 ~ /^[a-z0-9_]+$/ && $2 ~ /^[-+0-9.e]+$/ { print side, $1, $2 }'
     done
     i=$((i + 1))
 done | sort -k2,2 -k1,1 -k3,3g | awk -v old="$old" -v new="$new" '
@@ -17,7 +17,7 @@ done | sort -k2,2 -k1,1 -k3,3g | awk -v old="$old" -v new="$new" '
         if (n) { median[side] = n % 2 ? v[(n + 1) / 2] : (v[n / 2] + v[n / 2 + 1]) / 2; low[side] = v[1]; high[side] = v[n]; seen[side] = key }
         n = 0
     }
-    function spread(side) { return median[side] ? 100 * (high[side] - low[side]) / median[side] : 0 }
+    function spread(side) { return median[side] ? 100 * (high[side] - low[side]) / (median[side] < 0 ? -median[side] : median[side]) : 0 }
     function print_key() {
         close_series()
         if (seen[old] == key && seen[new] == key)
