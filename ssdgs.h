@@ -123,8 +123,8 @@ SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with the
   number of Gaussians: ssdgs_model_reduce() makes levels of detail, for what is far away or must be quick.
-Left out without changing a bit: what no pixel blends, neurons that are 0 for 64 neighbours, terms nobody
-asked for, and what the last frame found.
+  Left out without changing a bit: what no pixel blends, neurons that are 0 for 64 neighbours, terms nobody
+  asked for, and what the last frame found.
 
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
@@ -491,8 +491,9 @@ typedef struct ssdgs_rates {
                                  photograph; with fewer, times the root of 300 / shows */
 } ssdgs_rates;
 
-/* Processes that share each batch: every one holds the same photographs and draws its part, and what they
-   find is added. For equal bits on one process and many: add ranks in pairs, then pairs of pairs. */
+/* Processes that share each batch. All hold the same photographs and options; each draws its part, and the
+   gradients are added. For the same bits on any number of processes add the ranks in pairs, then the pairs in
+   pairs (examples/train_mpi.c). */
 typedef struct ssdgs_sum {
     /* Makes of `count` values their sums over all processes, the same everywhere. Any result but SSDGS_OK
        ends the step, which changes nothing. */
@@ -517,8 +518,8 @@ typedef struct ssdgs_train_options {
     int densify_from;      /* first round; 200 */
     int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
-    int batch;               /* photographs a step, whose gradients are averaged; rates grow as its root; 1 */
-    int refine;              /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
+    int batch;  /* photographs a step, whose gradients are averaged; rates grow with its square root; 1 */
+    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
     ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
     ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
     ssdgs_real normal_weight;    /* deferred: weight of blended normals' distance to the depth's; 0.05 */
@@ -6909,7 +6910,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     double extent;        /* 1.1 x the cameras' radius */
-    int most;             /* Gaussians, by density control */
+    int budget;           /* density control makes no more Gaussians */
     int outlines;         /* photographs show where the object ends */
     int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
     double unit;          /* the bounds' longest side */
@@ -6983,6 +6984,11 @@ static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) 
     return o->iterations < 60000 ? iteration * (60000.0 / o->iterations) : (double)iteration;
 }
 
+/* The schedule time at which a run ends. */
+static double ssdgs__schedule_end(const ssdgs_train_options *o) {
+    return o->iterations > 60000 ? o->iterations : 60e3;
+}
+
 /* Terms in use at time t, and per group whether it learns. Deferred lobes have no basis that could be
    frozen. */
 static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int learns[SSDGS__GROUPS]) {
@@ -7027,7 +7033,7 @@ static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) 
 
 static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double t) {
     const ssdgs_train_options *o = &trainer->options;
-    const double whole = o->iterations > 60000 ? o->iterations : 60e3;
+    const double whole = ssdgs__schedule_end(o);
     switch (group) {
     case SSDGS__G_POSITION: return trainer->extent * ssdgs__decay(o->rates.position, 0, whole, t);
     case SSDGS__G_ROTATION: return ssdgs__decay(o->rates.rotation, 0, whole, t);
@@ -7256,7 +7262,7 @@ typedef struct ssdgs__photo_job {
     int terms;                    /* to render */
     int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_real dssim, normal_weight;
-    int exact; /* 1: as written, for poses and lights; 0: as default options draw it */
+    int exact; /* 1: for poses and lights; 0: with default options, which Gaussians learn from as well */
 } ssdgs__photo_job;
 
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
@@ -7264,14 +7270,11 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const ssdgs_camera *camera = shot->camera;
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-    const ssdgs_render_options easy = ssdgs_render_options_default();
-    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_render_options options =
+        shot->exact ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     options.terms = shot->terms;
-    if (!shot->exact) { /* Gaussians learn no worse */
-        options.stop = easy.stop;
-        options.transport_detail = easy.transport_detail;
-    }
+    options.max_error = 0; /* all that a pixel blends gets a gradient */
     ssdgs_result result = ssdgs__frame_begin(frame, model, camera, shot->light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
@@ -7345,9 +7348,8 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
                             const ssdgs__adam_range *arrays) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     const ssdgs_train_options *o = &trainer->options;
-    const double end = o->iterations > 60000 ? o->iterations : 60e3;
     const double rate = ssdgs__group_rate(trainer, group, t) * sqrt((double)o->batch) *
-                        (t < 0.9 * end ? 1 : (double)o->finish);
+                        (t < 0.9 * ssdgs__schedule_end(o) ? 1 : (double)o->finish);
     *r = *arrays;
     r->group = group;
     r->bad = 0;
@@ -7772,12 +7774,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
     wanted = wanted - pulled < halved ? wanted : pulled + halved;
-    size_t room = (size_t)trainer->most > n - dropped ? (size_t)trainer->most - (n - dropped) : 0;
-    if (wanted > room || n - dropped > (size_t)trainer->most) {
+    size_t room = (size_t)trainer->budget > n - dropped ? (size_t)trainer->budget - (n - dropped) : 0;
+    if (wanted > room || n - dropped > (size_t)trainer->budget) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
            at a time */
         ssdgs__ranked *least = candidates + n;
-        const size_t over = n - dropped > (size_t)trainer->most ? n - dropped - (size_t)trainer->most : 0;
+        const size_t over = n - dropped > (size_t)trainer->budget ? n - dropped - (size_t)trainer->budget : 0;
         const size_t more = wanted > room ? wanted - room : 0;
         size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
         for (size_t i = 0; i < n; i++)
@@ -7850,10 +7852,10 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
 
 #define SSDGS__REDUCE_LEAF 16      /* neighbours among which partners are found, at most */
 #define SSDGS__REDUCE_VIEWS 8      /* directions that tell what is seen */
-#define SSDGS__REDUCE_STEP 8       /* of so many one goes a round, at most: then partners are found anew */
-#define SSDGS__REDUCE_UNSEEN 1e-3  /* the share that counts of what nobody sees */
+#define SSDGS__REDUCE_STEP 8       /* a round removes one Gaussian of so many at most; then new partners */
+#define SSDGS__REDUCE_UNSEEN 1e-3  /* a hidden Gaussian counts as if this share of it were seen */
 #define SSDGS__REDUCE_OPAQUE 0.999 /* no merged Gaussian has more opacity */
-#define SSDGS__REDUCE_NEVER (ssdgs_real)1e30 /* the cost of what is no number */
+#define SSDGS__REDUCE_NEVER (ssdgs_real)1e30 /* the cost of a pair with values that are not finite */
 
 /* What merging reads of a Gaussian. */
 typedef struct ssdgs__blob {
@@ -7907,9 +7909,8 @@ static void ssdgs__blob_load(const ssdgs_model *model, size_t index, double seen
     b->seen = b->share * mass;
 }
 
-/* What is missed when two become one: how far apart they are, by their places and shapes (as the
-   Bhattacharyya distance has them, the shapes with half its weight), normals and colours, times what is seen
-   of the lesser. */
+/* The cost of merging two: how far apart they are in place and shape (the Bhattacharyya distance, but shapes
+   count half), normal and colour, times the lesser one's seen amount. */
 static double ssdgs__merge_cost(const ssdgs__blob *a, const ssdgs__blob *b) {
     double s[9], d[3], adjugate[9], away = 0, other = 0;
     for (int i = 0; i < 9; i++) s[i] = a->covariance[i] + b->covariance[i];
@@ -7993,8 +7994,8 @@ static void ssdgs__blob_axes(double s[9], double q[4], double scale[3]) {
     for (int c = 0; c < 3; c++) scale[c] = sqrt(s[4 * c] > 1e-30 ? s[4 * c] : 1e-30);
 }
 
-/* Gaussian `kept` becomes both: their mean, by what is seen of each. Its opacity makes as much seen of it as
-   of both where the share that is seen is their mean. */
+/* Gaussian `kept` becomes the mean of both, weighted by what is seen of each. Its opacity is such that, where
+   their mean share of it is seen, it shows as much as both did. */
 static void ssdgs__merge(ssdgs_model *model, const ssdgs__pair *pair, ssdgs_real *seen) {
     const size_t stride = model->capacity;
     ssdgs_real *kept = model->gaussians + pair->kept, *gone = model->gaussians + pair->gone;
@@ -8923,10 +8924,10 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         empty += clear == pixels;
     }
     const double most = SSDGS__PER_PIXEL * shown;
-    trainer->most = o->max_gaussians ? o->max_gaussians
-                    : most < 2000    ? 2000
-                    : most < 100000  ? (int)most
-                                     : 100000;
+    trainer->budget = o->max_gaussians ? o->max_gaussians
+                      : most < 2000    ? 2000
+                      : most < 100000  ? (int)most
+                                       : 100000;
     result = ssdgs__doubt_outlines(trainer);
     if (result) return result;
     for (int i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
@@ -9136,7 +9137,7 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     ssdgs_real *sums;
     SSDGS__RESERVE(trainer->sums, sums, ssdgs_real, at.size * (size_t)room);
     ssdgs_result failed = SSDGS_OK;
-    for (int i = 0; i < own && !failed; i++) {
+    for (int i = 0; i < own; i++) {
         const int b = first + i;
         ssdgs_real *out = sums + at.size * (size_t)depth++;
         memset(out, 0, at.size * sizeof *out);

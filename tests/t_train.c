@@ -2179,7 +2179,7 @@ static void test_budget(void) {
         }
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, sized, counts[i], &options, &trainer));
-        if (trainer && !CHECK(trainer->most == most[i])) printf("    %d: %d\n", i, trainer->most);
+        if (trainer && !CHECK(trainer->budget == most[i])) printf("    %d: %d\n", i, trainer->budget);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
