@@ -511,7 +511,8 @@ typedef struct ssdgs_train_options {
     int schedule;          /* ssdgs_schedule: in which order the terms join; merged */
     int random_background; /* 1: photographs with transparency are laid over a new colour each step; 0: over
                               background; 1 */
-    int initial_points;    /* random Gaussians in the bounds when the model is empty; 10000 */
+    int initial_points;    /* random Gaussians in the bounds when the model is empty, no more than density
+                              control makes; 10000 */
     int max_gaussians;     /* density control stops here; 0: at three quarters of the pixels that a photograph
                               shows, on average, but from 2,000 to 100,000; 0 */
     int densify_every;     /* iterations between two rounds of density control; 100 */
@@ -8259,8 +8260,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    const size_t n = (size_t)(o->max_gaussians && o->max_gaussians < o->initial_points ? o->max_gaussians
-                                                                                       : o->initial_points);
+    const size_t n = (size_t)(o->initial_points < trainer->budget ? o->initial_points : trainer->budget);
     double volume = 1;
     size_t kept = 0;
     if (o->initial_points < 1)

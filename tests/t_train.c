@@ -2171,6 +2171,7 @@ static void test_budget(void) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         ssdgs_train_options options = short_run(10);
+        options.initial_points = 30000;
         options.max_gaussians = i == 3 ? 77 : i == 4 ? ssdgs_train_options_published().max_gaussians : 0;
         for (int k = 0; k < 3; k++) {
             sized[k] = photos[k];
@@ -2179,6 +2180,7 @@ static void test_budget(void) {
         }
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
         CHECK(!ssdgs_trainer_create(model, sized, counts[i], &options, &trainer));
+        CHECK(model->count > 0 && model->count <= most[i]); /* the start keeps to it */
         if (trainer && !CHECK(trainer->budget == most[i])) printf("    %d: %d\n", i, trainer->budget);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
