@@ -140,7 +140,7 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM:$(CC)%=mpicc%) $(LINKED)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
-$(BUILD)/hashes_64: $(BUILD)/ssdgs_64.o
+$(BUILD)/hashes_64 $(BUILD)/t_scene_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
 $(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(BUILD)/kernels_64.o

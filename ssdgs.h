@@ -84,11 +84,11 @@ CONVENTIONS
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
   Buffers only grow: a second frame of the same size allocates nothing. What a frame keeps for the next
-  belongs to its model, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models
-  and trainers may be destroyed in any order.
+  belongs to its model or scene, the rest to the context. Pixels, planes and paths stay the caller's.
+  Contexts, models, scenes and trainers may be destroyed in any order.
 
 THREADS
-  A context serves one thread at a time, with its models and trainers; contexts share nothing. Hooks,
+  A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
   allocator, log and progress run on the caller's thread. A call made while another is at work on the context,
   from a hook or another thread, returns ERR_ARGUMENT; progress may call all but the trainer's destruction.
   After fork() the child may use its copies, without threads.
@@ -118,6 +118,11 @@ OUTLINES
   transparent it shows an outline; of eight or more those that contradict the others are left out. Where too
   few are transparent, borders decide: of the colour of options.background they are empty, and Gaussians of
   that colour fade; else all that is shown is opaque. A note says which.
+
+SCENES
+  ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
+  together, shadowing each other. What the networks predict and what true dipole transport brings stays within
+  an object and its own space. A light's map covers all objects, with at most 2048 pixels a side.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
@@ -210,6 +215,7 @@ typedef enum ssdgs_isa {
 
 typedef struct ssdgs_context ssdgs_context; /* allocator, log, threads, kernels */
 typedef struct ssdgs_model ssdgs_model;     /* Gaussians, ASG bases, both networks, settings */
+typedef struct ssdgs_scene ssdgs_scene;     /* what frames of placed models keep for the next */
 typedef struct ssdgs_trainer ssdgs_trainer; /* optimiser state of one training run */
 
 /* ---- context ---- */
@@ -242,7 +248,8 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
 
 /* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
-/* Joins the threads. The memory stays until the context's models and trainers are gone too. NULL is fine. */
+/* Joins the threads. The memory stays until the context's models, scenes and trainers are gone too. NULL is
+ * fine. */
 SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
@@ -441,6 +448,31 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
                                        const ssdgs_light *lights, int light_count,
                                        const ssdgs_render_options *options, const ssdgs_image *image,
                                        ssdgs_render_stats *stats);
+
+/* ---- scenes: several models in one frame ---- */
+
+/* A model placed in the world. */
+typedef struct ssdgs_object {
+    ssdgs_model *model;      /* of the scene's context; one model may stand in many places */
+    ssdgs_real to_world[12]; /* (3,4) row-major, the model's space to the world: a rotation or a reflection,
+                                times one scale above 0; then a translation */
+    ssdgs_real tint[3];      /* RGB, 0 or more: factor of the light that it sends */
+} ssdgs_object;
+SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* where it was trained, tint 1 */
+
+/* A scene holds no objects: it keeps what its last frame found. Renders of one view in turn belong on one
+   scene, other views on their own. */
+SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **out);
+SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene); /* NULL is fine */
+/* As ssdgs_render_ex(), of several objects. Their Gaussians are sorted and blended together and shadow each
+   other. Light scatters within each alone. A model that is scaled stays as bright: a light's E at a place is
+   the same for all. objects may be NULL when object_count is 0. ERR_ARGUMENT: a transform is none of the
+   above, a tint is negative, or the models mix settings.transfer (baked ones may). ERR_LIMIT: 2^28 Gaussians
+   in all, 65,535 objects. */
+SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
+                                          const ssdgs_camera *camera, const ssdgs_light *lights,
+                                          int light_count, const ssdgs_render_options *options,
+                                          const ssdgs_image *image, ssdgs_render_stats *stats);
 
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
@@ -746,19 +778,43 @@ typedef struct ssdgs_splat_view {
         *light_map; /* a light's: (tiles, 16 micro-tiles, 16 pixels), rows first. NULL: not wanted */
 } ssdgs_splat_view;
 
-typedef struct ssdgs_frame {
-    ssdgs_context *context;
+/* A model in a frame. Its Gaussian i is Gaussian first + i of the frame. */
+typedef struct ssdgs_placed {
     ssdgs_model *model;
+    uint64_t revision; /* of the model */
     ssdgs_settings settings;
     ssdgs_model_view gaussians;
+    int first;       /* a multiple of 64; the gaps that this leaves are not drawn */
+    int terms;       /* to render, after settings and options */
+    int light_count; /* the frame's, 0 where colours are baked */
+    int turned;      /* 0: rotation is the identity */
+    ssdgs_real
+        rotation[9]; /* row-major, to the world; it may mirror. A point goes to scale rotation p + offset */
+    ssdgs_real scale, offset[3], tint[3];
+    int material; /* pixels blend and light the layers of each material by themselves */
+} ssdgs_placed;
+
+typedef struct ssdgs_frame {
+    ssdgs_context *context;
+    ssdgs_model *model; /* this and the next two are the first object's; in training there is no other */
+    ssdgs_settings settings;
+    ssdgs_model_view gaussians;
+    ssdgs_placed *objects;
+    int object_count;
+    int count; /* Gaussians of all objects and the gaps between them; n below */
+    int material_count;
+    const uint16_t *material_of; /* (n / 64) of 64 Gaussians; NULL: all are of one material */
     ssdgs_camera camera;
     ssdgs_render_options options;
     ssdgs_real eye[3]; /* the camera's centre */
     const ssdgs_light *lights;
     int light_count;
-    int terms;     /* to render, after settings and options */
-    int training;  /* 1: network activations are kept for the backward */
-    int frozen[2]; /* 1: no gradient of the scattering, the shadow network's weights */
+    int terms;             /* to render, of any object */
+    ssdgs_real bias[2];    /* world units: the largest light_map.bias, of Gaussians and of pixels */
+    ssdgs_real near_plane; /* world units: of cameras that name none */
+    int cue;               /* 1: depth_cue is asked for */
+    int training;          /* 1: network activations are kept for the backward */
+    int frozen[2];         /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
     /* SSDGS_STAGE_WALK */
@@ -1040,7 +1096,7 @@ enum {
 /* ---- what the kernels are called with ---- */
 
 typedef struct ssdgs__projection {
-    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance;
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance, depth_scale;
     int width, height, orthographic, by_distance, compensate, blur;
 } ssdgs__projection;
 
@@ -1055,6 +1111,8 @@ typedef struct ssdgs__tile {
     int cue, flux, orthographic;        /* whether the light pass finds them */
     ssdgs_light_pixel *light_map;       /* of the tile, or NULL */
     const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
+    const uint16_t *material_of;        /* NULL: layers are those of all; else of `material` alone */
+    int material;
 } ssdgs__tile;
 
 typedef struct ssdgs__product {
@@ -2004,10 +2062,11 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
     }
 #endif
     if (context->references > 1)
-        ssdgs__note(context,
-                    "ssdgs_context_destroy: %d models or trainers are still there: the context goes with the "
-                    "last of them",
-                    context->references - 1);
+        ssdgs__note(
+            context,
+            "ssdgs_context_destroy: %d models, scenes or trainers are still there: the context goes with the "
+            "last of them",
+            context->references - 1);
     ssdgs__leave_and_drop(context);
 }
 
@@ -2640,7 +2699,7 @@ typedef struct ssdgs__view_memory {
 
 /* What the last frame was of: as long as that stays, what was found for it does. */
 typedef struct ssdgs__cache {
-    uint64_t revision; /* of the model; 0 = nothing is kept */
+    int objects; /* how many; -1: nothing is kept */
     ssdgs_camera camera;
     ssdgs_render_options options;
     int terms, light_count;
@@ -2662,7 +2721,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
 /* Of a model, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
-        shadow_known, transport, transport_known;
+        shadow_known, transport, transport_known, objects, material_of;
     int view_room;
     ssdgs__cache cache;
     ssdgs__bounds scene;
@@ -2671,7 +2730,7 @@ typedef struct ssdgs__frame_memory {
 /* Of a context: every frame writes it anew. */
 typedef struct ssdgs__scratch {
     ssdgs__buffer shaded, color, component[5], pixels, transmittance, layers, layer_pixels, pixel_visibility,
-        pixel_shadow, bounds, image, sources, lightings, activations, scratch;
+        pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, activations, scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
         splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals;
 } ssdgs__scratch;
@@ -2778,10 +2837,120 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     return camera;
 }
 
-/* Where a Gaussian reaches, and its mean log scale; 0 where alpha_threshold, by its logit, lets it draw
-   nothing. */
-static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint, double low[3],
-                         double high[3], double *log_scale) {
+/* ---- objects: models placed in a frame ---- */
+
+/* From the world to the object's space. */
+static void ssdgs__to_object(const ssdgs_placed *o, const ssdgs_real world[3], ssdgs_real local[3]) {
+    double d[3];
+    for (int i = 0; i < 3; i++) d[i] = ((double)world[i] - (double)o->offset[i]) / (double)o->scale;
+    for (int i = 0; i < 3; i++)
+        local[i] = (ssdgs_real)((double)o->rotation[i] * d[0] + (double)o->rotation[3 + i] * d[1] +
+                                (double)o->rotation[6 + i] * d[2]);
+}
+
+/* A direction, from the object's space to the world or back. */
+static void ssdgs__turn(const ssdgs_placed *o, int back, const ssdgs_real from[3], ssdgs_real to[3]) {
+    const ssdgs_real x = from[0], y = from[1], z = from[2], *r = o->rotation;
+    for (int i = 0; i < 3; i++) {
+        const int at = back ? i : 3 * i, step = back ? 3 : 1;
+        to[i] = r[at] * x + r[at + step] * y + r[at + 2 * step] * z;
+    }
+}
+
+/* The object that Gaussian g of the frame belongs to, or stands behind in its gap. */
+static const ssdgs_placed *ssdgs__object_of(const ssdgs_frame *frame, int g) {
+    int low = 0, high = frame->object_count;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (frame->objects[middle].first <= g) low = middle;
+        else high = middle;
+    }
+    return frame->objects + low;
+}
+
+static int ssdgs__chunks(int count) { return (count + SSDGS__CHUNK - 1) / SSDGS__CHUNK; }
+
+static int ssdgs__chunk_end(const ssdgs_frame *frame, int chunk) {
+    return frame->count / SSDGS__CHUNK > chunk ? (chunk + 1) * SSDGS__CHUNK : frame->count;
+}
+
+/* Some Gaussians of one object, in its own numbers. */
+typedef struct ssdgs__piece {
+    const ssdgs_placed *object;
+    int begin, end, gap; /* the gap's Gaussians follow end */
+} ssdgs__piece;
+
+/* Takes from the frame's Gaussians *at .. end those of one object; 0 when none are left. */
+static int ssdgs__piece_next(const ssdgs_frame *frame, int *at, int end, ssdgs__piece *piece) {
+    if (*at >= end) return 0;
+    const ssdgs_placed *o = ssdgs__object_of(frame, *at), *next = o + 1;
+    const int last = next < frame->objects + frame->object_count && next->first < end ? next->first : end;
+    const int count = o->gaussians.count;
+    piece->object = o;
+    piece->begin = *at - o->first < count ? *at - o->first : count;
+    piece->end = last - o->first < count ? last - o->first : count;
+    piece->gap = last - o->first - piece->end;
+    *at = last;
+    return 1;
+}
+
+static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_object *objects, int count) {
+    int64_t gaussians = 0;
+    const ssdgs_model *first = NULL;
+    if (count < 0 || (count && !objects))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           count < 0 ? "%d objects" : "%d objects, but the array is NULL", count);
+    for (int i = 0; i < count; i++) {
+        const ssdgs_object *o = objects + i;
+        double length2 = 0;
+        if (!o->model || o->model->context != context)
+            return ssdgs__fail(
+                context, SSDGS_ERR_ARGUMENT,
+                o->model ? "object %d: its model is of another context" : "object %d: its model is NULL", i);
+        for (int j = 0; j < 12; j++)
+            if (!ssdgs__finite(o->to_world[j]))
+                return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "object %d: to_world[%d] is not finite", i,
+                                   j);
+        for (int j = 0; j < 9; j++) {
+            const double x = (double)o->to_world[j / 3 * 4 + j % 3];
+            length2 += x * x / 3;
+        }
+        if (!(length2 >= 1e-24 && length2 <= 1e24))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "object %d: to_world's scale is %g", i,
+                               sqrt(length2));
+        for (int j = 0; j < 9; j++) {
+            const ssdgs_real *a = o->to_world + j / 3 * 4, *b = o->to_world + j % 3 * 4;
+            const double dot =
+                (double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2];
+            if (!(fabs(dot / length2 - (j % 4 == 0)) <= 1e-3))
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "object %d: to_world is not a rotation times one scale", i);
+        }
+        for (int j = 0; j < 3; j++)
+            if (!(o->tint[j] >= 0) || !ssdgs__finite(o->tint[j]))
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "object %d: tint[%d] = %g is negative or not finite", i, j,
+                                   (double)o->tint[j]);
+        if (!o->model->settings.baked) {
+            if (first && first->settings.transfer != o->model->settings.transfer)
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "object %d: its settings.transfer is not that of the objects before it",
+                                   i);
+            first = o->model;
+        }
+        gaussians += (o->model->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+    }
+    if (gaussians > SSDGS__MAX_GAUSSIANS || count > UINT16_MAX)
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects and more than %d Gaussians",
+                           count, count > UINT16_MAX ? 0 : SSDGS__MAX_GAUSSIANS);
+    return SSDGS_OK;
+}
+
+/* Where a Gaussian reaches in the world, and its mean log scale; 0 where alpha_threshold, by its logit, lets
+   it draw nothing. */
+static int ssdgs__box_of(const ssdgs_placed *o, int index, ssdgs_real faint, double low[3], double high[3],
+                         double *log_scale) {
+    const ssdgs_model_view *g = &o->gaussians;
     const ssdgs_real *p = g->gaussians + index;
     ssdgs_real largest = -20;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
@@ -2794,41 +2963,47 @@ static int ssdgs__box_of(const ssdgs_model_view *g, int index, ssdgs_real faint,
         *log_scale += (double)(s > -SSDGS__MOST_RAW ? s : -SSDGS__MOST_RAW) / 3;
     }
     if (!usable) return 0;
-    const double reach = (double)(3 * ssdgs__exp_scalar(largest));
+    const double scale = (double)o->scale, reach = scale * (double)(3 * ssdgs__exp_scalar(largest));
+    *log_scale += log(scale);
     for (j = 0; j < 3; j++) {
-        low[j] = (double)p[(size_t)j * g->stride] - reach;
-        high[j] = (double)p[(size_t)j * g->stride] + reach;
+        double at = 0;
+        for (int i = 0; i < 3; i++) at += (double)o->rotation[3 * j + i] * (double)p[(size_t)i * g->stride];
+        at = scale * at + (double)o->offset[j];
+        low[j] = at - reach;
+        high[j] = at + reach;
     }
     return 1;
 }
 
 typedef struct ssdgs__bounds_job {
-    const ssdgs_model_view *g;
+    const ssdgs_frame *frame;
     ssdgs__bounds *chunk;
     ssdgs_real faint;
 } ssdgs__bounds_job;
 
 static void ssdgs__bounds_task(void *data, int index) {
     const ssdgs__bounds_job *job = (const ssdgs__bounds_job *)data;
-    const ssdgs_model_view *g = job->g;
+    const ssdgs_frame *frame = job->frame;
     ssdgs__bounds *b = job->chunk + index;
-    const int end = (index + 1) * SSDGS__CHUNK < g->count ? (index + 1) * SSDGS__CHUNK : g->count;
+    ssdgs__piece piece;
+    const int end = ssdgs__chunk_end(frame, index);
     for (int j = 0; j < 3; j++) {
         b->low[j] = 1e30;
         b->high[j] = -1e30;
     }
     b->log_scale = 0;
     b->count = 0;
-    for (int i = index * SSDGS__CHUNK; i < end; i++) {
-        double low[3], high[3], log_scale;
-        if (!ssdgs__box_of(g, i, job->faint, low, high, &log_scale)) continue;
-        b->log_scale += log_scale;
-        b->count++;
-        for (int j = 0; j < 3; j++) {
-            b->low[j] = low[j] < b->low[j] ? low[j] : b->low[j];
-            b->high[j] = high[j] > b->high[j] ? high[j] : b->high[j];
+    for (int at = index * SSDGS__CHUNK; ssdgs__piece_next(frame, &at, end, &piece);)
+        for (int i = piece.begin; i < piece.end; i++) {
+            double low[3], high[3], log_scale;
+            if (!ssdgs__box_of(piece.object, i, job->faint, low, high, &log_scale)) continue;
+            b->log_scale += log_scale;
+            b->count++;
+            for (int j = 0; j < 3; j++) {
+                b->low[j] = low[j] < b->low[j] ? low[j] : b->low[j];
+                b->high[j] = high[j] > b->high[j] ? high[j] : b->high[j];
+            }
         }
-    }
 }
 
 /* least, in order, are the `keep` least of the numbers it was shown. */
@@ -2842,14 +3017,17 @@ static void ssdgs__keep_least(double *least, int keep, double number) {
 /* Cuts what a few stray Gaussians add to the bounds: these stay within thrice the box that, on each side, one
    in 200 of a sample reaches beyond. A light's map that had to hold them would have few pixels left for the
    scene. */
-static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs__bounds *total) {
+static void ssdgs__cut_strays(const ssdgs_frame *frame, ssdgs_real faint, ssdgs__bounds *total) {
     enum { SAMPLE = 4096, KEEP = SAMPLE / 200 + 1 };
     double least[6][KEEP];
     int seen = 0;
     for (int i = 0; i < 6 * KEEP; i++) least[i / KEEP][i % KEEP] = 1e300;
-    for (int i = 0; i < g->count; i += 1 + (g->count - 1) / SAMPLE) {
+    for (int i = 0; i < frame->count; i += 1 + (frame->count - 1) / SAMPLE) {
+        const ssdgs_placed *o = ssdgs__object_of(frame, i);
         double low[3], high[3], log_scale;
-        if (!ssdgs__box_of(g, i, faint, low, high, &log_scale)) continue;
+        if (i - o->first >= o->gaussians.count ||
+            !ssdgs__box_of(o, i - o->first, faint, low, high, &log_scale))
+            continue;
         seen++;
         for (int j = 0; j < 3; j++) {
             ssdgs__keep_least(least[j], KEEP, low[j]);
@@ -2864,14 +3042,14 @@ static void ssdgs__cut_strays(const ssdgs_model_view *g, ssdgs_real faint, ssdgs
 }
 
 /* Of the Gaussians that alpha_threshold lets draw anything. */
-static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__scratch *w, const ssdgs_model_view *g,
-                                        ssdgs_real alpha_threshold, ssdgs__bounds *total) {
-    const int chunks = (g->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
+static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds *total) {
+    ssdgs_context *context = frame->context;
+    const int chunks = ssdgs__chunks(frame->count);
+    const double threshold = (double)frame->options.alpha_threshold;
     ssdgs__bounds_job job;
-    SSDGS__RESERVE(w->bounds, job.chunk, ssdgs__bounds, chunks + 1);
-    job.g = g;
-    job.faint = alpha_threshold > (ssdgs_real)1e-9 ? (ssdgs_real)log((double)alpha_threshold)
-                                                   : -21; /* below the logit, by little */
+    SSDGS__RESERVE(frame->scratch->bounds, job.chunk, ssdgs__bounds, chunks + 1);
+    job.frame = frame;
+    job.faint = threshold > 1e-9 ? (ssdgs_real)log(threshold) : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
     for (int i = 0; i < chunks; i++) {
@@ -2885,14 +3063,23 @@ static ssdgs_result ssdgs__scene_bounds(ssdgs_context *context, ssdgs__scratch *
         total->log_scale += b->log_scale;
     }
     if (total->count) total->log_scale /= total->count;
-    ssdgs__cut_strays(g, job.faint, total);
+    ssdgs__cut_strays(frame, job.faint, total);
     return SSDGS_OK;
+}
+
+static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *variance, int *compensate) {
+    *blur = s->light_map.blur;
+    *compensate = *blur == SSDGS_BLUR_FLOOR;
+    *variance = (ssdgs_real)(*compensate ? 0.2 : 0.3);
 }
 
 /* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very
    far, six faces of a cube from close by or inside. Returns how many; with views NULL only that. */
-static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bounds *b,
-                              const ssdgs_light *light, double detail, int index, ssdgs_splat_view *views) {
+static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_view *views) {
+    const ssdgs_settings *settings = &frame->settings;
+    const ssdgs__bounds *b = &frame->memory->scene;
+    const ssdgs_light *light = frame->lights + index;
+    const double detail = (double)frame->options.light_detail;
     double centre[3], position[3], to_scene[3], radius2 = 0, distance2 = 0;
     for (int i = 0; i < 3; i++) {
         const double half = b->count ? 0.5 * (b->high[i] - b->low[i]) : 1;
@@ -2909,8 +3096,8 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
     if (!views) return faces;
     int map = settings->light_map.size;
     if (!map) {
-        const double size = 2 * radius / exp(b->log_scale);
-        map = size < 64 ? 64 : size > 512 ? 512 : (int)size;
+        const double size = 2 * radius / exp(b->log_scale), most = frame->object_count > 1 ? 2048 : 512;
+        map = (int)(size < 64 ? 64 : size > most ? most : size);
     }
     const double size = map * detail < 8192 ? map * detail : 8192;
     map = size < 16 ? 16 : ((int)size + 15) / 16 * 16;
@@ -2919,9 +3106,7 @@ static int ssdgs__light_views(const ssdgs_settings *settings, const ssdgs__bound
         memset(v, 0, sizeof *v);
         v->light = index;
         v->width = v->height = map;
-        v->blur = settings->light_map.blur;
-        v->variance = (ssdgs_real)(v->blur == SSDGS_BLUR_FLOOR ? 0.2 : 0.3);
-        v->compensate = settings->light_map.blur == SSDGS_BLUR_FLOOR;
+        ssdgs__light_blur(settings, &v->blur, &v->variance, &v->compensate);
         v->cx = v->cy = (ssdgs_real)map / 2;
         double direction[3], eye[3], f;
         if (faces == 6) {
@@ -3053,10 +3238,20 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     return SSDGS_OK;
 }
 
+/* Whether an object scatters what comes to it by true dipole transport. */
+static int ssdgs__has_transport(const ssdgs_placed *o) {
+    return (o->terms & SSDGS_SCATTERING_TERM) && o->settings.transport && o->light_count;
+}
+
 /* Whether the lights' maps serve these terms. */
 static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
-    return (terms & SSDGS_SHADOW_TERM) ||
-           ((terms & SSDGS_SCATTERING_TERM) && (frame->settings.depth_cue || frame->settings.transport));
+    for (int i = 0; i < frame->object_count; i++) {
+        const ssdgs_settings *s = &frame->objects[i].settings;
+        const int asked = s->baked ? 0 : s->terms & terms;
+        if (asked & SSDGS_SHADOW_TERM) return 1;
+        if ((asked & SSDGS_SCATTERING_TERM) && (s->depth_cue || s->transport)) return 1;
+    }
+    return 0;
 }
 
 static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
@@ -3064,15 +3259,15 @@ static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
 }
 
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
-   time, and what hooks leave is theirs. */
-static void ssdgs__compare_cache(ssdgs_frame *frame) {
+   time, and what hooks leave is theirs. same: the objects are those of the last frame, where they were. */
+static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
     ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
     const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
-    int known = !frame->training && cache->revision == frame->model->revision;
+    int known = !frame->training && same;
     for (int i = 0; i < SSDGS_STAGE_COUNT; i++) known = known && !frame->context->gpu.stage[i];
-    cache->revision = frame->training ? 0 : frame->model->revision;
+    cache->objects = frame->training ? -1 : frame->object_count;
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
     cache->bounds_ready = cache->bounds_ready && known;
@@ -3111,44 +3306,46 @@ static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
     return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
 }
 
-static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
-    const ssdgs_settings *s = &frame->settings;
+/* As an object sees it in its own space, where a length is 1 / scale of the world's. */
+static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light) {
+    const ssdgs_settings *s = &o->settings;
+    const ssdgs_light *from = frame->lights + light;
     const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
     ssdgs__lighting k;
     memset(&k, 0, sizeof k);
-    for (int i = 0; i < 3; i++) {
-        k.light[i] = frame->lights[light].position[i];
-        k.intensity[i] = frame->lights[light].intensity[i] * s->light_scale;
-        k.eye[i] = frame->eye[i];
-    }
+    k.directional = from->kind == SSDGS_LIGHT_DIRECTIONAL;
+    const ssdgs_real area = k.directional ? 1 : o->scale * o->scale;
+    ssdgs__to_object(o, frame->eye, k.eye);
+    if (k.directional) ssdgs__turn(o, 1, from->position, k.light);
+    else ssdgs__to_object(o, from->position, k.light);
+    for (int i = 0; i < 3; i++) k.intensity[i] = from->intensity[i] * s->light_scale / area;
     k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
     k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
-    k.directional = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL;
     k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
-    k.diffuse = (frame->terms & SSDGS_DIFFUSE_TERM) != 0;
-    k.specular = (frame->terms & SSDGS_SPECULAR_TERM) != 0;
-    k.shadow = (frame->terms & SSDGS_SHADOW_TERM) != 0;
-    k.scattering = (frame->terms & SSDGS_SCATTERING_TERM) != 0;
+    k.diffuse = (o->terms & SSDGS_DIFFUSE_TERM) != 0;
+    k.specular = (o->terms & SSDGS_SPECULAR_TERM) != 0;
+    k.shadow = (o->terms & SSDGS_SHADOW_TERM) != 0;
+    k.scattering = (o->terms & SSDGS_SCATTERING_TERM) != 0;
     k.residual_shadow = s->residual_shadow;
     k.refined_shadow = s->shadow.layers > 0;
     k.per_channel_optics = s->per_channel_optics;
     k.shadow_on_scattering = s->shadow_on_scattering;
-    k.deferred = frame->layer_count > 0;
+    k.deferred = s->asg == SSDGS_ASG_DEFERRED && o->light_count;
     memcpy(k.view, frame->camera.view, sizeof k.view);
     k.inverse_fx = 1 / frame->camera.fx;
     k.inverse_fy = 1 / frame->camera.fy;
     k.cx = frame->camera.cx;
     k.cy = frame->camera.cy;
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
-        const ssdgs_real *sharpness = frame->gaussians.asg_sharpness + 2 * j;
+        const ssdgs_real *sharpness = o->gaussians.asg_sharpness + 2 * j;
         ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
-        ssdgs__rotation_scalar(frame->gaussians.asg_basis + 4 * j, q, r);
+        ssdgs__rotation_scalar(o->gaussians.asg_basis + 4 * j, q, r);
         for (int i = 0; i < 9; i++) b[i] = r[i % 3 * 3 + i / 3]; /* columns: the basis axes */
         if (k.deferred) {
             b[8] = ssdgs__sigmoid_scalar(sharpness[1]);
             b[9] = ssdgs__exp_scalar(sharpness[0]);
-            b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
-            b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(frame->gaussians.asg_sigma[j]));
+            b[10] = ssdgs__softplus_scalar(ssdgs__lobe_raw(o->gaussians.asg_sigma[j]));
+            b[11] = ssdgs__sigmoid_scalar(ssdgs__lobe_raw(o->gaussians.asg_sigma[j]));
         } else {
             for (int i = 0; i < 2; i++) b[9 + i] = ssdgs__exp_scalar(sharpness[i]);
         }
@@ -3156,22 +3353,153 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, int light) {
     return k;
 }
 
-static const ssdgs__lighting *ssdgs__lightings(const ssdgs_frame *frame) {
-    return (const ssdgs__lighting *)frame->scratch->lightings.memory;
+/* The lights as an object sees them. */
+static const ssdgs__lighting *ssdgs__lightings(const ssdgs_frame *frame, const ssdgs_placed *o) {
+    return (const ssdgs__lighting *)frame->scratch->lightings.memory +
+           (o - frame->objects) * (ptrdiff_t)frame->light_count;
+}
+
+/* The lights in the world, with a material's lobes: for pixels. */
+static const ssdgs__lighting *ssdgs__pixel_lightings(const ssdgs_frame *frame, int material) {
+    return (const ssdgs__lighting *)frame->scratch->lightings.memory +
+           (ptrdiff_t)(frame->object_count + material) * frame->light_count;
+}
+
+/* Whether pixels are lit in the same way: by the same lobes, with the same kind of shadow. */
+static int ssdgs__lit_alike(const ssdgs__lighting *a, const ssdgs__lighting *b) {
+    if (!a->deferred || !b->deferred) return a->deferred == b->deferred;
+    return !memcmp(a->basis, b->basis, sizeof a->basis) && a->shadow == b->shadow &&
+           a->refined_shadow == b->refined_shadow && a->residual_shadow == b->residual_shadow;
+}
+
+/* Fills the table, objects first. Objects that pixels light alike share a material. */
+static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    const int lights = frame->light_count;
+    ssdgs__lighting *table, *pixels;
+    SSDGS__RESERVE(frame->scratch->lightings, table, ssdgs__lighting,
+                   2 * (size_t)frame->object_count * (size_t)lights + 1);
+    pixels = table + frame->object_count * (ptrdiff_t)lights;
+    frame->material_count = 0;
+    for (int i = 0; i < frame->object_count; i++) {
+        ssdgs_placed *o = frame->objects + i, world = *o;
+        memset(world.rotation, 0, sizeof world.rotation);
+        memset(world.offset, 0, sizeof world.offset);
+        world.rotation[0] = world.rotation[4] = world.rotation[8] = world.scale = 1;
+        world.settings.length_unit *= o->scale;
+        for (int light = 0; light < lights; light++) *table++ = ssdgs__lighting_of(frame, o, light);
+        if (!lights) continue;
+        const ssdgs__lighting lit = ssdgs__lighting_of(frame, &world, 0);
+        for (o->material = 0; o->material < frame->material_count; o->material++)
+            if (ssdgs__lit_alike(pixels + o->material * (ptrdiff_t)lights, &lit)) break;
+        if (o->material < frame->material_count) continue;
+        for (int light = 0; light < lights; light++)
+            pixels[frame->material_count * (ptrdiff_t)lights + light] =
+                ssdgs__lighting_of(frame, &world, light);
+        frame->material_count++;
+    }
+    return SSDGS_OK;
+}
+
+/* A model where it stands. */
+static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
+    const ssdgs_real *m = object->to_world;
+    double length2 = 0;
+    memset(o, 0, sizeof *o);
+    o->model = object->model;
+    o->revision = o->model->revision;
+    o->settings = o->model->settings;
+    o->gaussians = ssdgs__model_view(o->model);
+    for (int i = 0; i < 9; i++) length2 += (double)m[i / 3 * 4 + i % 3] * (double)m[i / 3 * 4 + i % 3] / 3;
+    o->scale = (ssdgs_real)(fabs(length2 - 1) < 1e-12 ? 1 : sqrt(length2));
+    for (int i = 0; i < 9; i++) {
+        o->rotation[i] = m[i / 3 * 4 + i % 3] / o->scale;
+        o->turned |= !(o->rotation[i] >= (i % 4 == 0) && o->rotation[i] <= (i % 4 == 0));
+    }
+    for (int i = 0; i < 3; i++) {
+        o->offset[i] = m[4 * i + 3];
+        o->tint[i] = object->tint[i];
+    }
+}
+
+/* Puts the objects into the frame, one after the other. same: they are those of the last frame, where they
+   were. */
+static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *objects, int count,
+                                     int light_count, int *same) {
+    ssdgs_context *context = frame->context;
+    ssdgs__frame_memory *m = frame->memory;
+    const int known = m->cache.objects, fits = m->objects.bytes >= (size_t)count * sizeof(ssdgs_placed);
+    uint64_t at = 0;
+    m->cache.objects = -1; /* until the whole list is this frame's */
+    SSDGS__RESERVE(m->objects, frame->objects, ssdgs_placed, count + 1);
+    *same = known == count && fits;
+    frame->object_count = count;
+    frame->settings = ssdgs_settings_default();
+    frame->near_plane = (ssdgs_real)1e30;
+    for (int i = 0; i < count; i++) {
+        ssdgs_placed o, *last = frame->objects + i;
+        ssdgs__place(objects + i, &o);
+        const int kept = i < known && fits && last->revision == o.revision;
+        if (!kept) {
+            const ssdgs_result result = ssdgs__globals_check(o.model);
+            if (result) return result;
+        }
+        *same = *same && kept && !memcmp(last->rotation, o.rotation, sizeof o.rotation) &&
+                !memcmp(&last->scale, &o.scale, sizeof o.scale) &&
+                !memcmp(last->offset, o.offset, sizeof o.offset);
+        o.first = (int)at;
+        o.terms = o.settings.terms & frame->options.terms;
+        o.light_count = o.settings.baked ? 0 : light_count;
+        frame->light_count = o.light_count > frame->light_count ? o.light_count : frame->light_count;
+        frame->terms |= o.terms;
+        frame->cue |= (o.terms & SSDGS_SCATTERING_TERM) && o.settings.depth_cue;
+        frame->count = o.first + o.gaussians.count;
+        at = ((uint64_t)frame->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+        const ssdgs_real unit = o.settings.length_unit * o.scale,
+                         rounding = (ssdgs_real)1e-5; /* casts no shadow */
+        const ssdgs_real bias[2] = {o.settings.light_map.bias * unit,
+                                    (o.settings.light_map.bias + rounding) * unit};
+        for (int j = 0; j < 2; j++) frame->bias[j] = bias[j] > frame->bias[j] ? bias[j] : frame->bias[j];
+        const ssdgs_real near_plane =
+            ssdgs__has_unit(&o.settings) ? (ssdgs_real)0.02 * unit : (ssdgs_real)0.01 * o.scale;
+        if (near_plane < frame->near_plane) frame->near_plane = near_plane;
+        *last = o;
+    }
+    for (int i = 0; i < count; i++) { /* one that is lit says how colours are stored */
+        if (i && (frame->objects[i].settings.baked || !frame->settings.baked)) continue;
+        frame->model = frame->objects[i].model;
+        frame->settings = frame->objects[i].settings;
+        frame->gaussians = frame->objects[i].gaussians;
+    }
+    return SSDGS_OK;
+}
+
+/* Of which material each 64 Gaussians are; none where there is one. */
+static ssdgs_result ssdgs__materials(ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    uint16_t *of;
+    SSDGS__RESERVE(frame->memory->material_of, of, uint16_t, (size_t)frame->count / SSDGS__BLOCK + 1);
+    for (int i = 0; i < frame->object_count; i++) {
+        const ssdgs_placed *o = frame->objects + i;
+        for (int g = 0; g < o->gaussians.count; g += SSDGS__BLOCK)
+            of[(o->first + g) / SSDGS__BLOCK] = (uint16_t)o->material;
+    }
+    frame->material_of = frame->material_count > 1 ? of : NULL;
+    return SSDGS_OK;
 }
 
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
-static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
+static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *context,
+                                       ssdgs__frame_memory **memory, const ssdgs_object *objects,
+                                       int object_count, const ssdgs_camera *camera,
                                        const ssdgs_light *lights, int light_count,
                                        const ssdgs_render_options *options, int components, int training) {
-    ssdgs_context *context = model->context;
     ssdgs__frame_memory *m;
     ssdgs__scratch *w;
-    const size_t n = (size_t)model->count + SSDGS__BLOCK;
-    if (!model->frame) model->frame = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
+    if (!*memory) *memory = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
     if (!context->scratch) context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *w);
-    if (!model->frame || !context->scratch) return SSDGS_ERR_MEMORY;
-    m = model->frame;
+    if (!*memory || !context->scratch) return SSDGS_ERR_MEMORY;
+    m = *memory;
     w = context->scratch;
     memset(frame, 0, sizeof *frame);
     frame->options = options ? *options : ssdgs_render_options_default();
@@ -3182,41 +3510,34 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
-    if (m->cache.revision != model->revision) {
-        result = ssdgs__globals_check(model);
-        if (result) return result;
-    }
     frame->context = context;
-    frame->model = model;
     frame->memory = m;
     frame->scratch = w;
-    frame->settings = model->settings;
-    frame->gaussians = ssdgs__model_view(model);
     frame->camera = *camera;
     frame->lights = lights;
-    frame->light_count = model->settings.baked ? 0 : light_count;
-    if (model->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
-    frame->terms = model->settings.terms & frame->options.terms;
     frame->training = training;
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
+    int same;
+    result = ssdgs__place_all(frame, objects, object_count, light_count, &same);
+    if (result) return result;
+    const size_t n = (size_t)frame->count + SSDGS__BLOCK;
+    if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     const int needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__cached_light *cached;
     SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
-    ssdgs__compare_cache(frame);
+    ssdgs__compare_cache(frame, same);
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
         if (!m->cache.bounds_ready) {
-            result =
-                ssdgs__scene_bounds(context, w, &frame->gaussians, frame->options.alpha_threshold, &m->scene);
+            result = ssdgs__scene_bounds(frame, &m->scene);
             if (result) return result;
-            m->cache.bounds_ready = m->cache.revision != 0;
+            m->cache.bounds_ready = m->cache.objects >= 0;
         }
         for (int i = 0, moved = 0; i < frame->light_count;
              i++) { /* behind another number of views all move */
-            const int views = ssdgs__light_views(&frame->settings, &m->scene, lights + i,
-                                                 (double)frame->options.light_detail, i, NULL);
+            const int views = ssdgs__light_views(frame, i, NULL);
             cached[i].kept = cached[i].kept && !moved;
             moved |= views != cached[i].views;
             cached[i].views = views;
@@ -3239,10 +3560,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         frame->views[0].fy = camera->fy;
         frame->views[0].cx = camera->cx;
         frame->views[0].cy = camera->cy;
-        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane
-                                     : ssdgs__has_unit(&frame->settings)
-                                         ? (ssdgs_real)0.02 * frame->settings.length_unit
-                                         : (ssdgs_real)0.01;
+        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : frame->near_plane;
         frame->views[0].compensate = frame->options.antialias;
         frame->views[0].variance = frame->settings.pixel_variance;
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
@@ -3250,9 +3568,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     frame->views[0].cached = m->cache.camera_ready;
     for (int i = 0, j = 1; i < frame->light_count; i++) {
         if (!needs_light) continue;
-        if (!cached[i].kept)
-            ssdgs__light_views(&frame->settings, &m->scene, lights + i, (double)frame->options.light_detail,
-                               i, frame->views + j);
+        if (!cached[i].kept) ssdgs__light_views(frame, i, frame->views + j);
         for (const int end = j + cached[i].views; j < end; j++) frame->views[j].cached = cached[i].kept;
     }
     m->cache.camera_ready = m->cache.lights_ready = 0; /* again once the walks are done */
@@ -3260,11 +3576,16 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    if (frame->settings.transport && (frame->terms & SSDGS_SCATTERING_TERM))
-        SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    int deferred = 0, transport = 0;
+    for (int i = 0; i < frame->object_count; i++) {
+        const ssdgs_placed *o = frame->objects + i;
+        deferred |= o->settings.asg == SSDGS_ASG_DEFERRED && o->light_count;
+        transport |= o->settings.transport && (o->terms & SSDGS_SCATTERING_TERM);
+    }
+    if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
-    if (frame->settings.asg == SSDGS_ASG_DEFERRED && frame->light_count) {
+    if (deferred) {
         frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
         SSDGS__RESERVE(w->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
         if (components || training) {
@@ -3293,12 +3614,19 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_model *model, c
         SSDGS__RESERVE(w->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
         SSDGS__RESERVE(w->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
-        SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, model->global_count);
+        SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
-    ssdgs__lighting *lightings;
-    SSDGS__RESERVE(w->lightings, lightings, ssdgs__lighting, frame->light_count + 1);
-    for (int i = 0; i < frame->light_count; i++) lightings[i] = ssdgs__lighting_of(frame, i);
-    return SSDGS_OK;
+    result = ssdgs__light_table(frame);
+    return result ? result : ssdgs__materials(frame);
+}
+
+/* Of one model, where it was trained: memory is its own. */
+static ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
+                                          const ssdgs_light *lights, int light_count,
+                                          const ssdgs_render_options *options, int components, int training) {
+    const ssdgs_object object = ssdgs_object_default(model);
+    return ssdgs__frame_begin(frame, model->context, &model->frame, &object, 1, camera, lights, light_count,
+                              options, components, training);
 }
 
 /* ==== >>project  records, order, instances, tile lists ==== */
@@ -3313,14 +3641,31 @@ static ssdgs_real ssdgs__log2_threshold(const ssdgs_frame *frame) {
     return (ssdgs_real)(log(threshold > 1e-9 ? threshold : 1e-9) * 1.44269504088896341);
 }
 
-static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ssdgs_splat_view *v) {
+/* A view as an object sees it: all but depths in its own space, where a length is 1 / scale of the world's.
+ */
+static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ssdgs_placed *o,
+                                              const ssdgs_splat_view *v) {
+    const ssdgs_settings *s = &o->settings;
+    const double scale = (double)o->scale;
     ssdgs__projection p;
-    memcpy(p.view, v->view, sizeof p.view);
-    p.fx = v->fx;
-    p.fy = v->fy;
+    for (int i = 0; i < 3; i++) {
+        const ssdgs_real *row = v->view + 4 * i;
+        double to_origin = (double)row[3];
+        for (int j = 0; j < 3; j++) {
+            p.view[4 * i + j] = (ssdgs_real)((double)row[0] * (double)o->rotation[j] +
+                                             (double)row[1] * (double)o->rotation[3 + j] +
+                                             (double)row[2] * (double)o->rotation[6 + j]);
+            to_origin += (double)row[j] * (double)o->offset[j];
+        }
+        p.view[4 * i + 3] = (ssdgs_real)(to_origin / scale);
+    }
+    const ssdgs_real zoom = v->orthographic ? o->scale : 1;
+    p.fx = v->fx * zoom;
+    p.fy = v->fy * zoom;
     p.cx = v->cx;
     p.cy = v->cy;
-    p.near_plane = v->near_plane;
+    p.near_plane = v->near_plane / o->scale;
+    p.depth_scale = o->scale;
     p.log2_threshold = ssdgs__log2_threshold(frame);
     p.width = v->width;
     p.height = v->height;
@@ -3329,28 +3674,30 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.compensate = v->compensate;
     p.blur = v->blur;
     p.variance = v->variance;
+    if (v->light < 0) p.variance = s->pixel_variance;
+    else ssdgs__light_blur(s, &p.blur, &p.variance, &p.compensate);
     return p;
-}
-
-static int ssdgs__chunks(const ssdgs_frame *frame) {
-    return (frame->gaussians.count + SSDGS__CHUNK - 1) / SSDGS__CHUNK;
 }
 
 static void ssdgs__project_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int chunks = ssdgs__chunks(frame), chunk = index % chunks;
+    const int chunks = ssdgs__chunks(frame->count), chunk = index % chunks;
     ssdgs_splat_view *v = frame->views + index / chunks;
-    const ssdgs__projection p = ssdgs__projection_of(frame, v);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
-                 end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
+    ssdgs__piece piece;
     if (v->cached) return;
-    frame->context->k->project(&p, frame->gaussians.gaussians, frame->gaussians.stride, begin, end, v->record,
-                               v->depth);
+    for (int at = chunk * SSDGS__CHUNK;
+         ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
+        const ssdgs_placed *o = piece.object;
+        const ssdgs__projection p = ssdgs__projection_of(frame, o, v);
+        frame->context->k->project(&p, o->gaussians.gaussians, o->gaussians.stride, (size_t)piece.begin,
+                                   (size_t)piece.end, v->record + o->first, v->depth + o->first);
+        for (int i = 0; i < piece.gap; i++) v->depth[o->first + piece.end + i] = -1;
+    }
 }
 
 static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK;
+    const size_t n = (size_t)frame->count + SSDGS__BLOCK;
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
@@ -3359,7 +3706,7 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
         v->tiles_x = (v->width + 15) / 16;
         v->tiles_y = (v->height + 15) / 16;
     }
-    ssdgs__parallel(context, frame->view_count * ssdgs__chunks(frame), ssdgs__project_task, frame);
+    ssdgs__parallel(context, frame->view_count * ssdgs__chunks(frame->count), ssdgs__project_task, frame);
     return SSDGS_OK;
 }
 
@@ -3368,7 +3715,7 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
 static void ssdgs__sort_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     ssdgs_splat_view *v = frame->views + index;
-    const int n = frame->gaussians.count;
+    const int n = frame->count;
     uint64_t *from =
                  (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory,
              *to = from + n;
@@ -3404,7 +3751,7 @@ static void ssdgs__sort_task(void *data, int index) {
 
 static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const size_t n = (size_t)frame->gaussians.count;
+    const size_t n = (size_t)frame->count;
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         uint64_t *keys;
@@ -3445,7 +3792,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     uint64_t room = 0;
     if (v->cached) return;
     int begin, end;
-    ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
+    ssdgs__bin_range(frame->count, chunk, &begin, &end);
     for (int g = begin; g < end; g++) {
         uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
         if (v->depth[g] >= 0) {
@@ -3466,7 +3813,7 @@ static void ssdgs__bin_task(void *data, int index) {
     const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
     if (frame->views[view].cached) return;
     int begin, end;
-    ssdgs__bin_range(frame->gaussians.count, chunk, &begin, &end);
+    ssdgs__bin_range(frame->count, chunk, &begin, &end);
     frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
                            begin, end, (uint32_t)m->chunk_room[chunk]);
 }
@@ -3545,7 +3892,7 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
 
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const size_t n = (size_t)frame->gaussians.count;
+    const size_t n = (size_t)frame->count;
     const int tasks = frame->view_count * SSDGS__BIN_CHUNKS;
     for (int i = 0; i < frame->view_count; i++) {
         uint16_t *box;
@@ -3612,12 +3959,12 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.log2_threshold = ssdgs__log2_threshold(frame);
     t.stop = frame->options.stop;
     t.max_error = frame->options.max_error;
-    t.bias = frame->settings.light_map.bias * frame->settings.length_unit;
+    t.bias = frame->bias[0];
     t.depth_origin = ssdgs__nearest(v);
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
-    t.cue = (frame->terms & SSDGS_SCATTERING_TERM) && frame->settings.depth_cue;
+    t.cue = frame->cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
     t.light_map = v->light_map ? v->light_map + (size_t)index * 256 : NULL;
@@ -3625,6 +3972,8 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
         v->light >= 0 &&
         (v[-1].light == v->light || (v + 1 < frame->views + frame->view_count && v[1].light == v->light));
     t.of_gaussian = shared ? NULL : v->of_gaussian;
+    t.material_of = NULL;
+    t.material = 0;
     return t;
 }
 
@@ -3650,9 +3999,9 @@ typedef struct ssdgs__gather_job {
 static void ssdgs__gather_light_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
     const ssdgs_frame *frame = job->frame;
-    const size_t first = (size_t)frame->gaussians.count * (size_t)job->light;
+    const size_t first = (size_t)frame->count * (size_t)job->light;
     int begin, end;
-    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
+    ssdgs__bin_range(frame->count, index, &begin, &end);
     for (int g = begin; g < end; g++) {
         const size_t at = first + (size_t)g;
         ssdgs_real sum[4] = {0, 0, 0, 0};
@@ -3674,7 +4023,7 @@ static void ssdgs__gather_camera_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
     int begin, end;
-    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
+    ssdgs__bin_range(frame->count, index, &begin, &end);
     for (int g = begin; g < end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
         unsigned seen = 0, needed = 0;
@@ -3760,20 +4109,30 @@ static int ssdgs__levels(size_t n, size_t first[SSDGS__LEVELS + 1]) {
     return levels;
 }
 
-typedef struct ssdgs__node_job {
-    const ssdgs_frame *frame;
+/* Where light enters an object, in its space. */
+typedef struct ssdgs__tree {
+    const ssdgs_placed *object;
     ssdgs__node *nodes; /* (lights, count) */
     ssdgs_real *points; /* (lights, leaves, SSDGS__LEAF, 4) x, y, z, flux */
     size_t count, leaves;
+} ssdgs__tree;
+
+typedef struct ssdgs__node_job {
+    const ssdgs_frame *frame;
+    ssdgs__tree *trees;                /* (objects) those without transport have no leaves */
     const ssdgs__cached_light *lights; /* of those whose transport is ready nothing changes */
 } ssdgs__node_job;
 
 /* A Gaussian as a node of its own. */
-static ssdgs__node ssdgs__node_of(const ssdgs_frame *frame, int light, size_t i) {
-    const ssdgs_model_view *g = &frame->gaussians;
+static ssdgs__node ssdgs__node_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light, size_t i) {
+    const ssdgs_model_view *g = &o->gaussians;
     const ssdgs_real *x = g->gaussians + (size_t)SSDGS_POSITION * g->stride + i;
-    const ssdgs__node node = {
-        {x[0], x[g->stride], x[2 * g->stride]}, frame->flux[(size_t)g->count * (size_t)light + i], 0, 0, 1};
+    const ssdgs_real area = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL ? o->scale * o->scale : 1;
+    const ssdgs__node node = {{x[0], x[g->stride], x[2 * g->stride]},
+                              frame->flux[(size_t)frame->count * (size_t)light + (size_t)o->first + i] / area,
+                              0,
+                              0,
+                              1};
     return node;
 }
 
@@ -3804,26 +4163,49 @@ static ssdgs__node ssdgs__node_join(const ssdgs__node *parts, size_t count) {
 }
 
 /* The Gaussians of a lowest node; returns how many. */
-static size_t ssdgs__leaf_parts(const ssdgs_frame *frame, int light, size_t leaf, ssdgs__node *parts) {
-    const size_t n = (size_t)frame->gaussians.count, first = SSDGS__LEAF * leaf;
+static size_t ssdgs__leaf_parts(const ssdgs_frame *frame, const ssdgs_placed *o, int light, size_t leaf,
+                                ssdgs__node *parts) {
+    const size_t n = (size_t)o->gaussians.count, first = SSDGS__LEAF * leaf;
     const size_t count = n - first < SSDGS__LEAF ? n - first : SSDGS__LEAF;
-    for (size_t i = 0; i < count; i++) parts[i] = ssdgs__node_of(frame, light, first + i);
+    for (size_t i = 0; i < count; i++) parts[i] = ssdgs__node_of(frame, o, light, first + i);
     return count;
 }
 
 /* The lowest nodes of a chunk, all lights. */
 static void ssdgs__leaf_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
-    const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
-                 end = begin + SSDGS__CHUNK / SSDGS__LEAF;
-    for (int light = 0; light < job->frame->light_count; light++) {
-        if (job->lights[light].transport_ready) continue;
-        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
-            ssdgs__node parts[SSDGS__LEAF];
-            job->nodes[job->count * (size_t)light + leaf] =
-                ssdgs__node_join(parts, ssdgs__leaf_parts(job->frame, light, leaf, parts));
+    const ssdgs_frame *frame = job->frame;
+    ssdgs__piece piece;
+    for (int at = chunk * SSDGS__CHUNK;
+         ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
+        const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
+        for (int light = 0; light < frame->light_count; light++) {
+            if (job->lights[light].transport_ready) continue;
+            for (size_t leaf = (size_t)piece.begin / SSDGS__LEAF;
+                 SSDGS__LEAF * leaf < (size_t)piece.end && tree->leaves; leaf++) {
+                ssdgs__node parts[SSDGS__LEAF];
+                tree->nodes[tree->count * (size_t)light + leaf] =
+                    ssdgs__node_join(parts, ssdgs__leaf_parts(frame, piece.object, light, leaf, parts));
+            }
         }
     }
+}
+
+/* The higher nodes of an object, all lights. */
+static void ssdgs__join_task(void *data, int index) {
+    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
+    const ssdgs__tree *tree = job->trees + index;
+    size_t first[SSDGS__LEVELS + 1];
+    const int levels = ssdgs__levels((size_t)tree->object->gaussians.count, first);
+    for (int light = 0; light < job->frame->light_count && tree->leaves; light++)
+        for (int level = job->lights[light].transport_ready ? levels : 1; level < levels; level++) {
+            ssdgs__node *const nodes = tree->nodes + tree->count * (size_t)light, *const to =
+                                                                                      nodes + first[level];
+            const size_t below = first[level] - first[level - 1];
+            for (size_t i = 0; i < below; i += SSDGS__LEAF)
+                to[i / SSDGS__LEAF] = ssdgs__node_join(nodes + first[level - 1] + i,
+                                                       below - i < SSDGS__LEAF ? below - i : SSDGS__LEAF);
+        }
 }
 
 /* A node as a point: x, y, z, flux. */
@@ -3833,52 +4215,65 @@ static void ssdgs__point_put(ssdgs_real *point, const ssdgs__node *node) {
 }
 
 /* The points that stand for lowest nodes nearby: Gaussians of much flux, and one for all others. */
+static void ssdgs__points_of(const ssdgs_frame *frame, const ssdgs__tree *tree, int light, size_t leaf) {
+    const ssdgs_real compact = SSDGS__COMPACT * tree->object->settings.length_unit;
+    ssdgs__node *nodes = tree->nodes + tree->count * (size_t)light;
+    const ssdgs_real mean = nodes[tree->count - 1].flux / (ssdgs_real)tree->object->gaussians.count;
+    ssdgs_real *points = tree->points + (tree->leaves * (size_t)light + leaf) * SSDGS__LEAF * 4;
+    ssdgs__node parts[SSDGS__LEAF], others;
+    const size_t count = ssdgs__leaf_parts(frame, tree->object, light, leaf, parts);
+    const ssdgs_real dim = nodes[leaf].radius < compact ? SSDGS__DIM * mean : 0;
+    memset(&others, 0, sizeof others);
+    for (size_t i = 0; i < count; i++) {
+        if (parts[i].flux > dim) ssdgs__point_put(points + 4 * nodes[leaf].points++, parts + i);
+        else if (parts[i].flux > 0) ssdgs__node_add(&others, parts + i);
+    }
+    if (others.flux > 0) ssdgs__point_put(points + 4 * nodes[leaf].points++, &others);
+}
+
 static void ssdgs__points_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
-    const size_t begin = (size_t)chunk * (SSDGS__CHUNK / SSDGS__LEAF),
-                 end = begin + SSDGS__CHUNK / SSDGS__LEAF;
-    const ssdgs_real compact = SSDGS__COMPACT * job->frame->settings.length_unit;
-    for (int light = 0; light < job->frame->light_count; light++) {
-        if (job->lights[light].transport_ready) continue;
-        ssdgs__node *nodes = job->nodes + job->count * (size_t)light;
-        const ssdgs_real mean = nodes[job->count - 1].flux / (ssdgs_real)job->frame->gaussians.count;
-        for (size_t leaf = begin; leaf < end && leaf < job->leaves; leaf++) {
-            ssdgs_real *points = job->points + (job->leaves * (size_t)light + leaf) * SSDGS__LEAF * 4;
-            ssdgs__node parts[SSDGS__LEAF], others;
-            const size_t count = ssdgs__leaf_parts(job->frame, light, leaf, parts);
-            const ssdgs_real dim = nodes[leaf].radius < compact ? SSDGS__DIM * mean : 0;
-            memset(&others, 0, sizeof others);
-            for (size_t i = 0; i < count; i++) {
-                if (parts[i].flux > dim) ssdgs__point_put(points + 4 * nodes[leaf].points++, parts + i);
-                else if (parts[i].flux > 0) ssdgs__node_add(&others, parts + i);
-            }
-            if (others.flux > 0) ssdgs__point_put(points + 4 * nodes[leaf].points++, &others);
-        }
+    const ssdgs_frame *frame = job->frame;
+    ssdgs__piece piece;
+    for (int at = chunk * SSDGS__CHUNK;
+         ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
+        const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
+        for (int light = 0; light < frame->light_count && tree->leaves; light++)
+            for (int g = piece.begin; g < piece.end && !job->lights[light].transport_ready; g += SSDGS__LEAF)
+                ssdgs__points_of(frame, tree, light, (size_t)g / SSDGS__LEAF);
     }
 }
 
-static ssdgs_result ssdgs__nodes(ssdgs_frame *frame, ssdgs__node_job *job) {
+static ssdgs_result ssdgs__nodes(const ssdgs_frame *frame, ssdgs__node_job *job) {
     ssdgs_context *context = frame->context;
-    size_t first[SSDGS__LEVELS + 1];
-    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
     const size_t lights = (size_t)frame->light_count;
+    const int chunks = ssdgs__chunks(frame->count);
+    size_t nodes = 0, leaves = 0, first[SSDGS__LEVELS + 1];
+    ssdgs__node *node;
+    ssdgs_real *points;
     job->frame = frame;
-    job->count = first[levels];
-    job->leaves = first[1];
-    SSDGS__RESERVE(frame->memory->nodes, job->nodes, ssdgs__node, job->count * lights + 1);
-    SSDGS__RESERVE(frame->memory->points, job->points, ssdgs_real,
-                   job->leaves * SSDGS__LEAF * 4 * lights + 1);
     job->lights = ssdgs__cached_lights(frame);
-    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__leaf_task, job);
-    for (size_t light = 0; light < lights; light++)
-        for (int level = job->lights[light].transport_ready ? levels : 1; level < levels; level++) {
-            ssdgs__node *const nodes = job->nodes + job->count * light, *const to = nodes + first[level];
-            const size_t below = first[level] - first[level - 1];
-            for (size_t i = 0; i < below; i += SSDGS__LEAF)
-                to[i / SSDGS__LEAF] = ssdgs__node_join(nodes + first[level - 1] + i,
-                                                       below - i < SSDGS__LEAF ? below - i : SSDGS__LEAF);
-        }
-    ssdgs__parallel(context, ssdgs__chunks(frame), ssdgs__points_task, job);
+    SSDGS__RESERVE(frame->scratch->trees, job->trees, ssdgs__tree, frame->object_count + 1);
+    for (int i = 0; i < frame->object_count; i++) {
+        ssdgs__tree *tree = job->trees + i;
+        const ssdgs_placed *o = tree->object = frame->objects + i;
+        const int levels = ssdgs__levels((size_t)o->gaussians.count, first);
+        tree->count = ssdgs__has_transport(o) ? first[levels] : 0;
+        tree->leaves = ssdgs__has_transport(o) ? first[1] : 0;
+        nodes += tree->count;
+        leaves += tree->leaves;
+    }
+    SSDGS__RESERVE(frame->memory->nodes, node, ssdgs__node, nodes * lights + 1);
+    SSDGS__RESERVE(frame->memory->points, points, ssdgs_real, leaves * SSDGS__LEAF * 4 * lights + 1);
+    for (ssdgs__tree *tree = job->trees; tree < job->trees + frame->object_count; tree++) {
+        tree->nodes = node;
+        tree->points = points;
+        node += tree->count * lights;
+        points += tree->leaves * SSDGS__LEAF * 4 * lights;
+    }
+    ssdgs__parallel(context, chunks, ssdgs__leaf_task, job);
+    ssdgs__parallel(context, frame->object_count, ssdgs__join_task, job);
+    ssdgs__parallel(context, chunks, ssdgs__points_task, job);
     return SSDGS_OK;
 }
 
@@ -3990,7 +4385,7 @@ static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
 
 typedef struct ssdgs__transport_job {
     ssdgs__node_job tree; /* where the light enters */
-    int blocks; /* of SSDGS__BLOCK Gaussians, all of the model's: what is seen changes no Gaussian's light */
+    int blocks; /* of SSDGS__BLOCK Gaussians, all of the frame's: what is seen changes no Gaussian's light */
     ssdgs_real *sources; /* (slots, 5 remote + 4 nearby, SSDGS__SOURCES) */
     ssdgs_real *sums;    /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
     unsigned char
@@ -4000,17 +4395,17 @@ typedef struct ssdgs__transport_job {
 /* True dipole transport to some groups of a block, a mask: sum_k = sum over h of flux_h exp(-r / l_k) /
    (2 pi l_k r), r their distance. The profiles integrate to 1 over a plane. What is far from the block is
    one series around it. Each group of 16 takes the rest so, or point by point. */
-static void ssdgs__transport_block(const ssdgs__transport_job *job, int light, int slot, const ssdgs_real *x,
-                                   int groups, ssdgs_real *sums) {
+static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs__tree *tree, int light,
+                                   int slot, const ssdgs_real *x, int groups, ssdgs_real *sums) {
     const ssdgs_frame *frame = job->tree.frame;
-    const ssdgs_real unit = frame->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
+    const ssdgs_real unit = tree->object->settings.length_unit, soft = (ssdgs_real)SSDGS__SOFT * unit;
     size_t first[SSDGS__LEVELS + 1], stack[SSDGS__LEAF * SSDGS__LEVELS];
     int level_of[SSDGS__LEAF * SSDGS__LEVELS], depth = 0;
-    const int levels = ssdgs__levels((size_t)frame->gaussians.count, first);
+    const int levels = ssdgs__levels((size_t)tree->object->gaussians.count, first);
     ssdgs__transport_state t;
     t.k = frame->context->k;
-    t.nodes = job->tree.nodes + job->tree.count * (size_t)light;
-    t.points = job->tree.points + job->tree.leaves * (size_t)light * SSDGS__LEAF * 4;
+    t.nodes = tree->nodes + tree->count * (size_t)light;
+    t.points = tree->points + tree->leaves * (size_t)light * SSDGS__LEAF * 4;
     t.x = x;
     t.sums = sums;
     t.remote = job->sources + (size_t)slot * 9 * SSDGS__SOURCES;
@@ -4063,25 +4458,26 @@ static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)block
 static void ssdgs__transport_task(void *data, int slot) {
     const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
     const ssdgs_frame *frame = job->tree.frame;
-    const size_t n = (size_t)frame->gaussians.count, stride = frame->gaussians.stride;
-    const ssdgs_real *position = frame->gaussians.gaussians + (size_t)SSDGS_POSITION * stride;
     ssdgs_real x[3 * SSDGS__BLOCK];
     for (int block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
          block++) {
-        const size_t first = (size_t)block * SSDGS__BLOCK;
+        const ssdgs_placed *o = ssdgs__object_of(frame, block * SSDGS__BLOCK);
+        const ssdgs_model_view *g = &o->gaussians;
+        const int first = block * SSDGS__BLOCK - o->first;
         int seen = 0;
-        for (int s = 0; s < SSDGS__BLOCK; s++) {
-            const size_t at =
-                first + (size_t)s < n ? first + (size_t)s : n - 1; /* the last one fills the block up */
-            for (int k = 0; k < 3; k++) x[k * SSDGS__BLOCK + s] = position[(size_t)k * stride + at];
-            seen |= (frame->seen[at] == SSDGS_SEEN) << s / 16;
+        if (!job->tree.trees[o - frame->objects].leaves) continue;
+        for (int s = 0; s < SSDGS__BLOCK; s++) { /* the last one fills the block up */
+            const int at = first + s < g->count ? first + s : g->count - 1;
+            for (int k = 0; k < 3; k++)
+                x[k * SSDGS__BLOCK + s] = g->gaussians[(size_t)(SSDGS_POSITION + k) * g->stride + (size_t)at];
+            seen |= (frame->seen[o->first + at] == SSDGS_SEEN) << s / 16;
         }
         for (int light = 0; light < frame->light_count; light++) {
             const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
             const int groups = seen & ~job->known[at];
             if (!groups) continue;
             ssdgs_real sums[SSDGS__LENGTHS * SSDGS__BLOCK];
-            ssdgs__transport_block(job, light, slot, x, groups, sums);
+            ssdgs__transport_block(job, job->tree.trees + (o - frame->objects), light, slot, x, groups, sums);
             for (int k = 0; k < SSDGS__LENGTHS; k++)
                 for (int s = 0; s < SSDGS__BLOCK; s++)
                     if (groups >> s / 16 & 1)
@@ -4097,7 +4493,7 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     ssdgs_context *context = frame->context;
     ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
     ssdgs__transport_job job;
-    job.blocks = (frame->gaussians.count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    job.blocks = (frame->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
     SSDGS__RESERVE(frame->scratch->sources, job.sources, ssdgs_real,
                    (size_t)SSDGS__SOURCES * 9 * SSDGS__SLOTS);
@@ -4141,14 +4537,13 @@ static size_t ssdgs__output_rows(const int *sizes, int layers) {
     return rows;
 }
 
-static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
+static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_placed *o) {
     ssdgs__block_layout l;
     const size_t b = SSDGS__BLOCK;
     memset(&l, 0, sizeof l);
-    if (frame->terms & SSDGS_SCATTERING_TERM)
-        l.scattering_layers = ssdgs__network_sizes(&frame->settings, 0, l.scattering);
-    if (frame->terms & SSDGS_SHADOW_TERM)
-        l.shadow_layers = ssdgs__network_sizes(&frame->settings, 1, l.shadow);
+    if (o->terms & SSDGS_SCATTERING_TERM)
+        l.scattering_layers = ssdgs__network_sizes(&o->settings, 0, l.scattering);
+    if (o->terms & SSDGS_SHADOW_TERM) l.shadow_layers = ssdgs__network_sizes(&o->settings, 1, l.shadow);
     for (int i = 0; i <= SSDGS_MAX_LAYERS; i++) {
         l.widest = l.scattering[i] > l.widest ? l.scattering[i] : l.widest;
         l.widest = l.shadow[i] > l.widest ? l.shadow[i] : l.widest;
@@ -4156,7 +4551,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame) {
     l.visibility = SSDGS__ROWS * b;
     l.cue = l.visibility + b;
     l.transport = l.cue + b;
-    l.shadow_at = l.transport + (frame->settings.transport ? SSDGS__LENGTHS * b : 0);
+    l.shadow_at = l.transport + (o->settings.transport ? SSDGS__LENGTHS * b : 0);
     l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
     l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
     l.lights = b * SSDGS_CHANNELS;
@@ -4354,12 +4749,11 @@ typedef struct ssdgs__input {
     int of_gaussian;
 } ssdgs__input;
 
-static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
+static int ssdgs__inputs(const ssdgs_settings *s, const ssdgs__block_layout *l, int shadow,
                          ssdgs__input inputs[7]) {
     const size_t b = SSDGS__BLOCK;
-    const ssdgs_settings *s = &frame->settings;
     const int scaled = shadow ? s->residual_shadow : s->depth_cue || s->transport;
-    const ssdgs_real inverse_unit = 1 / frame->settings.length_unit;
+    const ssdgs_real inverse_unit = 1 / s->length_unit;
     int n = 0, row = 0;
 #define SSDGS__INPUT(width, depth, factor, place, own) \
     do { \
@@ -4369,49 +4763,49 @@ static int ssdgs__inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l,
         row += (width) * ((depth) < 0 ? 1 : 1 + 2 * (depth)); \
     } while (0)
     SSDGS__INPUT(3, shadow ? 3 : 4, scaled ? inverse_unit : 1, b * SSDGS_POSITION, 1);
-    if (!shadow) SSDGS__INPUT(3, frame->settings.octaves.view, 1, b * SSDGS__WO, 0);
-    SSDGS__INPUT(3, shadow ? 3 : frame->settings.octaves.light, 1, b * SSDGS__WI, 0);
+    if (!shadow) SSDGS__INPUT(3, s->octaves.view, 1, b * SSDGS__WO, 0);
+    SSDGS__INPUT(3, shadow ? 3 : s->octaves.light, 1, b * SSDGS__WI, 0);
     if (shadow) SSDGS__INPUT(1, -1, 1, l->visibility, 0);
     else SSDGS__INPUT(3, -1, 1, b * SSDGS__NORMAL, 0);
     SSDGS__INPUT(SSDGS_MATERIAL_COUNT, -1, 1, b * SSDGS_MATERIAL, 1);
-    if (!shadow && frame->settings.depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
-    if (!shadow && frame->settings.transport) SSDGS__INPUT(SSDGS__LENGTHS, -1, 1, l->transport, 0);
+    if (!shadow && s->depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
+    if (!shadow && s->transport) SSDGS__INPUT(SSDGS__LENGTHS, -1, 1, l->transport, 0);
 #undef SSDGS__INPUT
     return n;
 }
 
 /* How many of the scattering network's inputs pass a gradient on: all before the light pass's cues, which are
    held fixed. */
-static int ssdgs__inputs_asked(const ssdgs_frame *frame, const ssdgs__block_layout *l) {
+static int ssdgs__inputs_asked(const ssdgs_settings *s, const ssdgs__block_layout *l) {
     ssdgs__input in[7];
-    const int n = ssdgs__inputs(frame, l, 0, in);
+    const int n = ssdgs__inputs(s, l, 0, in);
     for (int i = 0; i < n; i++)
         if (!in[i].of_gaussian && in[i].from >= l->cue) return in[i].row;
     return l->scattering[0];
 }
 
-static void ssdgs__encode_inputs(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
-                                 const ssdgs_real *gauss, const ssdgs_real *part, ssdgs_real *activations) {
+static void ssdgs__encode_inputs(const ssdgs__kernels *k, const ssdgs_settings *settings,
+                                 const ssdgs__block_layout *l, int shadow, const ssdgs_real *gauss,
+                                 const ssdgs_real *part, ssdgs_real *activations) {
     ssdgs__input in[7];
-    const int n = ssdgs__inputs(frame, l, shadow, in);
+    const int n = ssdgs__inputs(settings, l, shadow, in);
     for (int i = 0; i < n; i++) {
         const ssdgs_real *from = (in[i].of_gaussian ? gauss : part) + in[i].from;
         ssdgs_real *to = activations + (size_t)in[i].row * SSDGS__BLOCK;
         const int centred = in[i].of_gaussian && in[i].levels >= 0;
         if (in[i].levels < 0) memcpy(to, from, (size_t)in[i].dims * SSDGS__BLOCK * sizeof *to);
-        else
-            frame->context->k->encode(to, from, centred ? frame->settings.centre : NULL, in[i].scale,
-                                      in[i].dims, in[i].levels);
+        else k->encode(to, from, centred ? settings->centre : NULL, in[i].scale, in[i].dims, in[i].levels);
     }
 }
 
 /* Gradients of the inputs go to dgauss, to drows (geometry) and to dvisibility; the light pass's cues are
    held fixed. */
-static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs__block_layout *l, int shadow,
+static void ssdgs__encode_inputs_backward(const ssdgs__kernels *k, const ssdgs_settings *s,
+                                          const ssdgs__block_layout *l, int shadow,
                                           const ssdgs_real *activations, const ssdgs_real *dinputs,
                                           ssdgs_real *dgauss, ssdgs_real *drows, ssdgs_real *dvisibility) {
     ssdgs__input in[7];
-    const int n = ssdgs__inputs(frame, l, shadow, in);
+    const int n = ssdgs__inputs(s, l, shadow, in);
     for (int i = 0; i < n; i++) {
         const size_t row = (size_t)in[i].row * SSDGS__BLOCK;
         ssdgs_real *to = in[i].of_gaussian             ? dgauss + in[i].from
@@ -4419,19 +4813,25 @@ static void ssdgs__encode_inputs_backward(const ssdgs_frame *frame, const ssdgs_
                                                        : drows + in[i].from;
         if (!in[i].of_gaussian && in[i].from >= l->cue) continue;
         if (in[i].levels >= 0)
-            frame->context->k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims,
-                                               in[i].levels);
+            k->encode_backward(to, dinputs + row, activations + row, in[i].scale, in[i].dims, in[i].levels);
         else
-            for (int s = 0; s < in[i].dims * SSDGS__BLOCK; s++) to[s] += dinputs[row + (size_t)s];
+            for (int at = 0; at < in[i].dims * SSDGS__BLOCK; at++) to[at] += dinputs[row + (size_t)at];
     }
 }
 
+/* Gaussians shaded together: shaded[first] and those behind it, of one object. */
+typedef struct ssdgs__shade_block {
+    const ssdgs_placed *object;
+    int first, live;
+} ssdgs__shade_block;
+
 typedef struct ssdgs__shade_job {
     ssdgs_frame *frame;
-    ssdgs__block_layout layout;
+    const ssdgs__block_layout *layouts; /* (objects) */
+    ssdgs__shade_block *block;
     int blocks;
+    size_t size, scratch_size;       /* of a block, and of a slot's scratch, for any object */
     size_t slot_stride, slot_shadow; /* slots: the scattering network's gradient, then the shadow network's */
-    const ssdgs__lighting *lightings; /* per light */
     ssdgs_real *shadow_logit; /* (lights, n) outputs of the shadow network kept for lights at rest, or NULL */
     unsigned char *shadow_known; /* (lights, n) which of them */
     uint64_t *counts;            /* per slot: multiplications done, those of all neurons, shadows kept */
@@ -4440,16 +4840,16 @@ typedef struct ssdgs__shade_job {
 } ssdgs__shade_job;
 
 /* The Gaussian in lane s of a block; the last one fills the block up. */
-static size_t ssdgs__block_lane(const ssdgs_frame *frame, int block, int s) {
-    const int i = block * SSDGS__BLOCK + s;
-    return frame->shaded[i < frame->shaded_count ? i : frame->shaded_count - 1];
+static size_t ssdgs__block_lane(const ssdgs__shade_job *job, int block, int s) {
+    const ssdgs__shade_block *b = job->block + block;
+    return job->frame->shaded[b->first + (s < b->live ? s : b->live - 1)];
 }
 
 /* The shadow network's outputs for the Gaussians of a block, if all of them are known; it does not see the
    camera. */
 static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                 ssdgs_real *shadow) {
-    const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
+    const size_t first = (size_t)job->frame->count * (size_t)light;
     if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return 0;
     for (int s = 0; s < SSDGS__BLOCK; s++)
         if (!job->shadow_known[first + at[s]]) return 0;
@@ -4459,7 +4859,7 @@ static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const si
 
 static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                const ssdgs_real *shadow) {
-    const size_t first = (size_t)job->frame->gaussians.count * (size_t)light;
+    const size_t first = (size_t)job->frame->count * (size_t)light;
     if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return;
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         job->shadow_known[first + at[s]] = 1;
@@ -4468,7 +4868,7 @@ static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const siz
 }
 
 static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
-    return frame->layers + (size_t)layer * 4 * (size_t)frame->gaussians.count;
+    return frame->layers + (size_t)layer * 4 * (size_t)frame->count;
 }
 
 /* Rows of a block into a layer. */
@@ -4479,36 +4879,76 @@ static void ssdgs__layer_store(const ssdgs_frame *frame, int layer, const size_t
         for (int c = 0; c < 3; c++) to[4 * at[s] + (size_t)c] = rows[c * SSDGS__BLOCK + s];
 }
 
-static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
-                               ssdgs_real *memory, ssdgs_real *scratch) {
+/* Q's rows and the normal, from the object's space to the world. */
+static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
+    static const int at[9] = {0, 3, 5, 3, 1, 4, 5, 4, 2}; /* rows xx, yy, zz, xy, yz, zx */
+    for (int s = 0; s < SSDGS__BLOCK; s++, lobe++) {
+        ssdgs_real q[9], n[3];
+        for (int i = 0; i < 9; i++) q[i] = lobe[at[i] * SSDGS__BLOCK];
+        for (int i = 0; i < 3; i++) ssdgs__turn(o, 0, q + 3 * i, q + 3 * i); /* Q R' */
+        for (int i = 0; i < 3; i++) {
+            const ssdgs_real column[3] = {q[i], q[3 + i], q[6 + i]};
+            ssdgs_real turned[3];
+            ssdgs__turn(o, 0, column, turned);
+            for (int c = 0; c <= i; c++) lobe[at[3 * c + i] * SSDGS__BLOCK] = turned[c];
+            n[i] = lobe[(6 + i) * SSDGS__BLOCK];
+        }
+        ssdgs__turn(o, 0, n, n);
+        for (int i = 0; i < 3; i++) lobe[(6 + i) * SSDGS__BLOCK] = n[i];
+    }
+}
+
+static void ssdgs__tint(const ssdgs_placed *o, int rows, ssdgs_real *outs) {
+    for (int i = 0; i < rows * SSDGS__BLOCK; i++) outs[i] *= o->tint[i / SSDGS__BLOCK % 3];
+}
+
+/* The colours of a plain splat file: as they are, or decoded where the frame blends linear light. */
+static void ssdgs__baked(const ssdgs_frame *frame, const ssdgs_placed *o, const ssdgs_real *gauss,
+                         ssdgs_real *outs) {
+    const int decode =
+        o->settings.transfer == SSDGS_TRANSFER_NONE && frame->settings.transfer == SSDGS_TRANSFER_SRGB;
+    for (int i = 0; i < 3 * SSDGS__BLOCK; i++)
+        outs[i] = ssdgs__softplus_scalar(gauss[SSDGS_DIFFUSE * SSDGS__BLOCK + i]);
+    if (decode) frame->context->k->srgb_decode(outs, outs, 3 * SSDGS__BLOCK);
+}
+
+static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
+                                  ssdgs_real *memory, ssdgs_real *scratch) {
     const ssdgs_frame *frame = job->frame;
-    const ssdgs__block_layout *l = &job->layout;
+    const ssdgs_placed *o = job->block[block].object;
+    const ssdgs_settings *settings = &o->settings;
+    const ssdgs__block_layout *l = job->layouts + (o - frame->objects);
     const ssdgs__kernels *k = frame->context->k;
-    const size_t n = (size_t)frame->gaussians.count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
+    const size_t n = (size_t)frame->count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
-    const int rest = frame->shaded_count - block * SSDGS__BLOCK,
-              live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
+    const int live = job->block[block].live;
     size_t at[SSDGS__BLOCK];
-    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(job, block, s);
     for (int i = 0; i < SSDGS_CHANNELS; i++) {
-        const ssdgs_real *plane = frame->gaussians.gaussians + (size_t)i * frame->gaussians.stride;
-        for (int s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s]];
+        const ssdgs_real *plane = o->gaussians.gaussians + (size_t)i * o->gaussians.stride;
+        for (int s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s] - (size_t)o->first];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
-    const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
-    const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
+    if (frame->layer_count && o->turned) ssdgs__lobe_turn(o, scratch + l->lobe);
+    const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, o->gaussians.scattering};
+    const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, o->gaussians.shadow};
     for (int light = 0; light < frame->light_count; light++) {
-        const ssdgs__lighting *lighting = job->lightings + light;
+        const ssdgs__lighting *lighting = ssdgs__lightings(frame, o) + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
                    *shadow = NULL, *scattering = NULL;
+        const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
+        for (int i = 0; frame->layer_count && !lighting->deferred && i < SSDGS__PER_LIGHT; i++)
+            for (int s = 0; s < live; s++)
+                memset(ssdgs__layer(frame, layer + i) + 4 * at[s], 0, 3 * sizeof(ssdgs_real));
+        if (!o->light_count) continue;
         k->reflect(lighting, gauss, part + l->rows);
         for (int s = 0; s < SSDGS__BLOCK; s++) {
             const size_t of_light = n * (size_t)light + at[s];
             part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
             part[l->cue + (size_t)s] =
-                lighting->scattering && frame->settings.depth_cue ? frame->depth_cue[of_light] : 0;
-            for (int i = 0; job->transport && i < SSDGS__LENGTHS;
+                lighting->scattering && settings->depth_cue ? frame->depth_cue[of_light] / o->scale : 0;
+            for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS;
                  i++) /* in units of the irradiance of its own */
                 part[l->transport + (size_t)(i * SSDGS__BLOCK + s)] =
                     job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS +
@@ -4520,20 +4960,20 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         if (l->shadow_layers) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;
             if (!ssdgs__shadow_recall(job, light, at, shadow)) {
-                ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
+                ssdgs__encode_inputs(k, settings, l, 1, gauss, part, inputs);
                 ssdgs__network_forward(k, &shadow_net, lists, inputs, part + l->shadow_at);
                 ssdgs__shadow_keep(job, light, at, shadow);
             } else lists->shadows_cached += SSDGS__BLOCK;
         }
         if (l->scattering_layers) {
-            ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
+            ssdgs__encode_inputs(k, settings, l, 0, gauss, part, inputs);
             ssdgs__network_forward(k, &scattering_net, lists, inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
         const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
         k->colour(lighting, &in, outs);
         if (lighting->deferred) {
-            const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
+            ssdgs__tint(o, 6, outs);
             ssdgs__layer_store(frame, layer, at, live, outs + 3 * SSDGS__BLOCK);
             ssdgs__layer_store(frame, layer + 1, at, live, outs);
             memset(outs, 0, 6 * SSDGS__BLOCK * sizeof *outs);
@@ -4545,6 +4985,8 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
             }
         }
     }
+    if (settings->baked) ssdgs__baked(frame, o, gauss, outs);
+    ssdgs__tint(o, 9, outs);
     if (frame->layer_count) {
         for (int i = 0; i < 3; i++)
             ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
@@ -4557,12 +4999,10 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
     }
     for (int s = 0; s < live; s++) {
         const size_t g = at[s];
-        ssdgs_real *o = outs + s, *color = frame->color + 4 * g;
-        int black = !ssdgs__finite(o[9 * SSDGS__BLOCK]);
+        ssdgs_real *to = outs + s, *color = frame->color + 4 * g;
+        int black = !ssdgs__finite(to[9 * SSDGS__BLOCK]);
         for (int c = 0; c < 3; c++) {
-            if (frame->settings.baked)
-                o[c * SSDGS__BLOCK] = ssdgs__softplus_scalar(gauss[(SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s]);
-            color[c] = o[c * SSDGS__BLOCK] + o[(3 + c) * SSDGS__BLOCK] + o[(6 + c) * SSDGS__BLOCK];
+            color[c] = to[c * SSDGS__BLOCK] + to[(3 + c) * SSDGS__BLOCK] + to[(6 + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
             for (int i = 0; i < frame->layer_count;
                  i++) { /* whose products with the lobes must be finite as well */
@@ -4573,40 +5013,39 @@ static void ssdgs__shade_block(const ssdgs__shade_job *job, int block, ssdgs__ro
         for (int i = 0; i < frame->layer_count && black; i++)
             memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
         for (int c = 0; c < SSDGS__OUTS && black; c++)
-            color[c % 3] = o[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
+            color[c % 3] = to[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
         color[3] = (ssdgs_real)black;
         if (!frame->diffuse) continue;
-        {
-            ssdgs_real raw[4];
-            for (int i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
-            ssdgs_real q[4], r[9];
-            ssdgs__rotation_scalar(raw, q, r);
-            for (int c = 0; c < 3; c++) {
-                frame->diffuse[4 * g + (size_t)c] = o[c * SSDGS__BLOCK];
-                frame->specular[4 * g + (size_t)c] = o[(3 + c) * SSDGS__BLOCK];
-                frame->scattering[4 * g + (size_t)c] = o[(6 + c) * SSDGS__BLOCK];
-                frame->normal[4 * g + (size_t)c] = ssdgs__finite(r[3 * c + 2]) ? r[3 * c + 2] : 0;
-            }
-            frame->shadow[4 * g] =
-                frame->light_count ? o[9 * SSDGS__BLOCK] / (ssdgs_real)frame->light_count : 1;
-            frame->shadow[4 * g + 1] = frame->views[0].depth[g];
-            frame->shadow[4 * g + 2] = 0;
+        ssdgs_real raw[4], q[4], r[9];
+        for (int i = 0; i < 4; i++) raw[i] = gauss[(SSDGS_FRAME + i) * SSDGS__BLOCK + s];
+        ssdgs__rotation_scalar(raw, q, r);
+        ssdgs_real normal[3] = {r[2], r[5], r[8]};
+        if (o->turned) ssdgs__turn(o, 0, normal, normal);
+        for (int c = 0; c < 3; c++) {
+            frame->diffuse[4 * g + (size_t)c] = to[c * SSDGS__BLOCK];
+            frame->specular[4 * g + (size_t)c] = to[(3 + c) * SSDGS__BLOCK];
+            frame->scattering[4 * g + (size_t)c] = to[(6 + c) * SSDGS__BLOCK];
+            frame->normal[4 * g + (size_t)c] = ssdgs__finite(normal[c]) ? normal[c] : 0;
         }
+        frame->shadow[4 * g] = o->light_count ? to[9 * SSDGS__BLOCK] / (ssdgs_real)o->light_count : 1;
+        frame->shadow[4 * g + 1] = frame->views[0].depth[g];
+        frame->shadow[4 * g + 2] = 0;
     }
 }
 
-/* Gaussians within max_error take the colour of the one shaded before them: a neighbour, as training leaves
-   them. */
-static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int slot) {
+/* Gaussians within max_error take the colour of the one of their object shaded before them: a neighbour, as
+   training leaves them. Those from a block's first on, up to the next block's; an object's first block has
+   those ahead of it too. */
+static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int block) {
     const ssdgs_frame *frame = job->frame;
+    const ssdgs__shade_block *b = job->block + block;
+    const ssdgs_placed *o = b->object;
     ssdgs_real *const planes[6] = {frame->color,      frame->diffuse, frame->specular,
                                    frame->scattering, frame->normal,  frame->shadow};
-    const int begin = ssdgs__slot_begin(job->blocks, slot), end = ssdgs__slot_begin(job->blocks, slot + 1);
-    const size_t n = (size_t)frame->gaussians.count,
-                 last = end < job->blocks ? frame->shaded[end * SSDGS__BLOCK] : n;
-    if (begin == end) return;
-    size_t from = frame->shaded[begin * SSDGS__BLOCK];
-    for (size_t g = begin ? from : 0; g < last; g++) {
+    const int opens = !block || b[-1].object != o, closes = block + 1 == job->blocks || b[1].object != o;
+    const size_t last = closes ? (size_t)(o->first + o->gaussians.count) : frame->shaded[b[1].first];
+    size_t from = frame->shaded[b->first];
+    for (size_t g = opens ? (size_t)o->first : from; g < last; g++) {
         if (frame->seen[g] == SSDGS_SEEN) from = g;
         if (frame->seen[g] != SSDGS_SKIPPED) continue;
         for (int p = 0; p < (frame->diffuse ? 6 : 1); p++)
@@ -4621,50 +5060,74 @@ static void ssdgs__shade_task(void *data, int slot) {
     ssdgs__row_lists lists;
     ssdgs__row_lists_fill(&lists);
     for (int block = ssdgs__slot_begin(job->blocks, slot); block < ssdgs__slot_begin(job->blocks, slot + 1);
-         block++)
-        ssdgs__shade_block(job, block, &lists,
-                           job->activations +
-                               job->layout.size * (size_t)(job->frame->training ? block : slot),
-                           job->scratch + job->layout.scratch * (size_t)slot);
-    if (job->frame->options.max_error > 0) ssdgs__shade_skipped(job, slot);
+         block++) {
+        ssdgs__shade_block_of(job, block, &lists,
+                              job->activations + job->size * (size_t)(job->frame->training ? block : slot),
+                              job->scratch + job->scratch_size * (size_t)slot);
+        if (job->frame->options.max_error > 0) ssdgs__shade_skipped(job, block);
+    }
     job->counts[3 * slot] = lists.multiplied;
     job->counts[3 * slot + 1] = lists.multipliable;
     job->counts[3 * slot + 2] = (uint64_t)lists.shadows_cached;
 }
 
+/* The objects' layouts, and the blocks of what is to be shaded. */
 static ssdgs_result ssdgs__shade_setup(ssdgs_frame *frame, ssdgs__shade_job *job) {
     ssdgs_context *context = frame->context;
+    ssdgs__block_layout *layout;
     memset(job, 0, sizeof *job);
     job->frame = frame;
-    job->layout = ssdgs__layout(frame);
-    job->blocks = (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
-    SSDGS__RESERVE(frame->scratch->scratch, job->scratch, ssdgs_real, job->layout.scratch * SSDGS__SLOTS);
-    job->lightings = ssdgs__lightings(frame);
+    SSDGS__RESERVE(frame->scratch->layouts, layout, ssdgs__block_layout, frame->object_count + 1);
+    job->layouts = layout;
+    for (int i = 0; i < frame->object_count; i++) {
+        layout[i] = ssdgs__layout(frame, frame->objects + i);
+        job->size = layout[i].size > job->size ? layout[i].size : job->size;
+        job->scratch_size = layout[i].scratch > job->scratch_size ? layout[i].scratch : job->scratch_size;
+    }
+    SSDGS__RESERVE(frame->scratch->blocks, job->block, ssdgs__shade_block,
+                   (frame->shaded_count + SSDGS__BLOCK - 1) / SSDGS__BLOCK + frame->object_count + 1);
+    const ssdgs_placed *o = frame->objects;
+    for (int first = 0; first < frame->shaded_count; job->blocks++) {
+        ssdgs__shade_block *b = job->block + job->blocks;
+        int g = (int)frame->shaded[first];
+        while (o + 1 < frame->objects + frame->object_count && o[1].first <= g) o++;
+        const int end = o->first + o->gaussians.count;
+        b->object = o;
+        b->first = first;
+        for (b->live = 0; b->live < SSDGS__BLOCK && g < end; b->live++)
+            g = ++first < frame->shaded_count ? (int)frame->shaded[first] : end;
+    }
+    SSDGS__RESERVE(frame->scratch->scratch, job->scratch, ssdgs_real, job->scratch_size * SSDGS__SLOTS);
     return SSDGS_OK;
 }
 
 static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    int skips = 0;
     frame->shaded_count = 0;
-    for (int i = 0; i < frame->gaussians.count; i++) {
-        if (frame->seen[i] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)i;
-        else skips |= frame->seen[i];
-    }
-    if (!frame->shaded_count && skips) { /* some colour is needed: the first's */
-        int i;
-        for (i = 0; !frame->seen[i]; i++) {}
-        frame->seen[i] = SSDGS_SEEN;
-        frame->shaded[frame->shaded_count++] = (uint32_t)i;
+    for (int i = 0; i < frame->object_count; i++) {
+        const ssdgs_placed *o = frame->objects + i;
+        const int before = frame->shaded_count;
+        int skipped = -1;
+        for (int g = o->first; g < o->first + o->gaussians.count; g++) {
+            if (frame->seen[g] == SSDGS_SEEN) frame->shaded[frame->shaded_count++] = (uint32_t)g;
+            else if (frame->seen[g] && skipped < 0) skipped = g;
+        }
+        if (frame->shaded_count > before || skipped < 0) continue;
+        frame->seen[skipped] = SSDGS_SEEN; /* some colour is needed: the first's */
+        frame->shaded[frame->shaded_count++] = (uint32_t)skipped;
     }
     ssdgs__shade_job job;
     ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
     SSDGS__RESERVE(frame->scratch->activations, job.activations, ssdgs_real,
-                   job.layout.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
-    if (job.layout.shadow_layers &&
-        !frame->training) { /* room from the first frame on, use from the second */
-        const size_t n = (size_t)frame->gaussians.count, pairs = n * (size_t)frame->light_count;
+                   job.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
+    int transport = 0, shadows = 0;
+    for (int i = 0; i < frame->object_count; i++) {
+        transport |= ssdgs__has_transport(frame->objects + i);
+        shadows |= job.layouts[i].shadow_layers > 0;
+    }
+    if (shadows && !frame->training) { /* room from the first frame on, use from the second */
+        const size_t n = (size_t)frame->count, pairs = n * (size_t)frame->light_count;
         ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
         SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
         SSDGS__RESERVE(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
@@ -4674,7 +5137,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         }
     }
     job.counts = frame->memory->cache.counts;
-    if (frame->flux && frame->settings.transport && frame->light_count) {
+    if (transport && frame->flux) {
         result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
     }
@@ -4683,7 +5146,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
 }
 
 static ssdgs_real *ssdgs__layer_gradient(const ssdgs_frame *frame, int layer) {
-    return frame->layer_gradient + (size_t)layer * 4 * (size_t)frame->gaussians.count;
+    return frame->layer_gradient + (size_t)layer * 4 * (size_t)frame->count;
 }
 
 /* (n, 4) of the Gaussians `at` -> rows (3, BLOCK), 0 where none is. */
@@ -4696,7 +5159,8 @@ static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__
 static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
                                         int slot) {
     const ssdgs_frame *frame = job->frame;
-    const ssdgs__block_layout *l = &job->layout;
+    const ssdgs_settings *settings = &frame->settings;
+    const ssdgs__block_layout *l = job->layouts;
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
     ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *inputs = scratch + l->inputs;
@@ -4707,11 +5171,10 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse,
                *dlobe = scratch + l->lobe;
     ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK;
-    const int rest = frame->shaded_count - block * SSDGS__BLOCK,
-              live = rest < SSDGS__BLOCK ? rest : SSDGS__BLOCK;
+    const int live = job->block[block].live;
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
     size_t at[SSDGS__BLOCK];
-    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(frame, block, s);
+    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(job, block, s);
     ssdgs__gradient_rows(frame->color_gradient, at, live, dcolor);
     if (frame->layer_count) {
         for (int c = 0; c < 3; c++)
@@ -4728,7 +5191,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
     const ssdgs__network_scratch backward = {dnet, dnet2, scratch + l->transposed};
     for (int light = 0; light < frame->light_count; light++) {
-        const ssdgs__lighting *lighting = job->lightings + light;
+        const ssdgs__lighting *lighting = ssdgs__lightings(frame, frame->objects) + light;
         const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
         const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
         const ssdgs_real *scattering =
@@ -4757,19 +5220,19 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         k->colour_backward(lighting, &in, &out);
         for (int s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
-            ssdgs__encode_inputs(frame, l, 0, gauss, part, inputs);
+            ssdgs__encode_inputs(k, settings, l, 0, gauss, part, inputs);
             ssdgs_real *dinputs = ssdgs__network_backward(k, &scattering_net, inputs, part + l->scattering_at,
-                                                          &backward, lists, ssdgs__inputs_asked(frame, l),
+                                                          &backward, lists, ssdgs__inputs_asked(settings, l),
                                                           frame->frozen[0] ? NULL : slot_gradient);
-            ssdgs__encode_inputs_backward(frame, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
+            ssdgs__encode_inputs_backward(k, settings, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (l->shadow_layers) {
             memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
-            ssdgs__encode_inputs(frame, l, 1, gauss, part, inputs);
+            ssdgs__encode_inputs(k, settings, l, 1, gauss, part, inputs);
             ssdgs_real *dinputs = ssdgs__network_backward(
                 k, &shadow_net, inputs, part + l->shadow_at, &backward, lists, l->shadow[0],
                 frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
-            ssdgs__encode_inputs_backward(frame, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
+            ssdgs__encode_inputs_backward(k, settings, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
@@ -4793,7 +5256,7 @@ static void ssdgs__shade_backward_task(void *data, int slot) {
 
 static void ssdgs__sum_slots_task(void *data, int part) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
-    const ssdgs__block_layout *l = &job->layout;
+    const ssdgs__block_layout *l = job->layouts;
     ssdgs_frame *frame = job->frame;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&frame->settings, first);
@@ -4821,9 +5284,9 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs__shade_job job;
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
-    job.slot_shadow = ssdgs__slot_gradient_size(job.layout.scattering, job.layout.scattering_layers);
-    job.slot_stride =
-        job.slot_shadow + ssdgs__slot_gradient_size(job.layout.shadow, job.layout.shadow_layers);
+    const ssdgs__block_layout *l = job.layouts;
+    job.slot_shadow = ssdgs__slot_gradient_size(l->scattering, l->scattering_layers);
+    job.slot_stride = job.slot_shadow + ssdgs__slot_gradient_size(l->shadow, l->shadow_layers);
     job.activations = (ssdgs_real *)frame->scratch->activations.memory;
     SSDGS__RESERVE(frame->scratch->slots, job.slots, ssdgs_real, job.slot_stride * SSDGS__SLOTS + 1);
     SSDGS__RESERVE(frame->scratch->lane_slots, job.lane_slots, ssdgs_real, lanes * 16 * SSDGS__SLOTS + 1);
@@ -4853,8 +5316,9 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
 /* Reads color, layers, tile lists and light maps. Writes pixels, layer_pixels, transmittance. Stages
    COMPOSITE, COMPOSITE_BACKWARD and PROJECT_BACKWARD. */
 
-/* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes or come from them. */
-static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count,
+/* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes, or are added there, or
+   come from them. */
+static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count, int add,
                               ssdgs_real *const planes[]) {
     for (int micro = 0; micro < 16; micro++)
         for (int row = 0; row < 4; row++) {
@@ -4864,8 +5328,11 @@ static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values,
             if (inside <= 0 || y >= tile->height) continue;
             for (int c = 0; c < count; c++) {
                 const ssdgs_real *from = values + micro * 64 + c * 16 + 4 * row;
-                if (inside >= 4) memcpy(planes[c] + at, from, 4 * sizeof *from);
-                else memcpy(planes[c] + at, from, (size_t)inside * sizeof *from);
+                const int many = inside < 4 ? inside : 4;
+                if (!add && many == 4) memcpy(planes[c] + at, from, 4 * sizeof *from);
+                else
+                    for (int i = 0; i < many; i++)
+                        planes[c][at + (size_t)i] = from[i] + (add ? planes[c][at + (size_t)i] : 0);
             }
         }
 }
@@ -4891,19 +5358,19 @@ static ssdgs_real *ssdgs__layer_plane(const ssdgs_frame *frame, int layer, int c
            (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)(3 * layer + c);
 }
 
-static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer,
+static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer, int add,
                                       const ssdgs_real *values) {
     if (!frame->layer_pixels) return;
     ssdgs_real *planes[3];
     for (int c = 0; c < 3; c++) planes[c] = ssdgs__layer_plane(frame, layer, c);
-    ssdgs__tile_store(tile, values, 3, planes);
+    ssdgs__tile_store(tile, values, 3, add, planes);
 }
 
 typedef struct ssdgs__composite_job {
     const ssdgs_frame *frame;
     const ssdgs_real *color;
-    ssdgs_real *planes[4];            /* colour, transmittance */
-    const ssdgs__lighting *lightings; /* NULL: without the layers */
+    ssdgs_real *planes[4]; /* colour, transmittance */
+    int deferred;          /* 1: with the layers and what they are lit to */
 } ssdgs__composite_job;
 
 /* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all
@@ -4960,8 +5427,6 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
                                     const ssdgs__tile *tile, const ssdgs_real *layers,
                                     ssdgs_real *visibility) {
-    const ssdgs_real rounding = (ssdgs_real)1e-5; /* casts no shadow */
-    const ssdgs_real bias = (frame->settings.light_map.bias + rounding) * frame->settings.length_unit;
     int first = 1; /* views are in the order of lights */
     while (first < frame->view_count && frame->views[first].light < light) first++;
     for (int i = 0; i < 256; i++) {
@@ -4979,73 +5444,126 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
             at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
         for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
              view++)
-            if (frame->views[view].light_map) passed = ssdgs__passed_to(frame->views + view, at, bias);
+            if (frame->views[view].light_map)
+                passed = ssdgs__passed_to(frame->views + view, at, frame->bias[1]);
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
     }
 }
 
+/* Of the materials that the tile's pixels blend the first after `material`; -1: there is none. */
+static int ssdgs__material_after(const ssdgs__tile *tile, int material) {
+    int first = -1;
+    for (uint32_t i = 0; tile->material_of && i < tile->count; i++) {
+        const int of = tile->material_of[tile->list[i].gaussian / SSDGS__BLOCK];
+        if (tile->seen[i] && of > material && (first < 0 || of < first)) first = of;
+    }
+    return first < 0 && material < 0 ? 0 : first; /* 0: with nothing to blend a tile still has its pixels */
+}
+
+/* Of several materials in a tile: joins the v and S of one, (2 of [micro-tile][4][16 lanes]), with those that
+   pixel_visibility and pixel_shadow hold of the ones before it, by their covers, and makes of D, which stands
+   alone so far, what gives the sum of both diffuse terms when it is multiplied by the joint S. Layers: the
+   material's depth layer, its cover third; the light's D. */
+static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *tile, int light,
+                                const ssdgs_real *depth, ssdgs_real *diffuse, ssdgs_real *visibility) {
+    const size_t plane = (size_t)tile->width * (size_t)tile->height * (size_t)light;
+    ssdgs_real before[SSDGS__TILE_LAYER], others[SSDGS__TILE_LAYER];
+    ssdgs__tile_load(tile, frame->pixel_visibility + plane, 0, before);
+    ssdgs__tile_load(tile, frame->pixel_shadow + plane, 1, before);
+    ssdgs__tile_load(tile, ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2), 2, before);
+    for (int c = 0; c < 3; c++)
+        ssdgs__tile_load(
+            tile, ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c), c, others);
+    for (int i = 0; i < 256; i++) {
+        const int at = i / 16 * 64 + i % 16;
+        const ssdgs_real cover = depth[at + 32], all = before[at + 32]; /* has this one's cover already */
+        const ssdgs_real share = all > SSDGS__THIN ? cover / all : 1, shadow = visibility[at + 16];
+        for (int j = 0; j < 2; j++) {
+            ssdgs_real *v = visibility + at + 16 * j;
+            *v = before[at + 16 * j] + share * (*v - before[at + 16 * j]);
+        }
+        for (int c = 0; c < 3; c++) {
+            const ssdgs_real sum = diffuse[at + 16 * c] * shadow + others[at + 16 * c] * before[at + 16];
+            diffuse[at + 16 * c] = visibility[at + 16] > 0 ? sum / visibility[at + 16] : 0;
+        }
+    }
+}
+
+/* Lights the pixels of a tile by one light; with layer_pixels, keeps what it found. later: other materials
+   have been here. */
+static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light, int later,
+                              ssdgs_real *pixels) {
+    const ssdgs__kernels *k = frame->context->k;
+    const ssdgs__lighting *lighting = ssdgs__pixel_lightings(frame, tile->material) + light;
+    const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light, empty = !tile->count;
+    const size_t plane = (size_t)tile->width * (size_t)tile->height * (size_t)light;
+    ssdgs_real visibility[SSDGS__TILE_LAYER], *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
+    if (!empty) {
+        const ssdgs_real *color[SSDGS__PER_LIGHT];
+        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+            color[layer] = ssdgs__layer(frame, first - 1 + layer);
+        if (light) k->composite(tile, SSDGS__PER_LIGHT, color, lit); /* the first's came with the others */
+        if (frame->visibility_given) ssdgs__tile_load(tile, frame->pixel_visibility + plane, 0, visibility);
+        else ssdgs__pixel_visibility(frame, lighting, light, tile, pixels, visibility);
+        k->highlight(lighting, tile, pixels, visibility);
+    } else memset(visibility, 0, sizeof visibility);
+    if (!frame->layer_pixels) return;
+    if (later)
+        ssdgs__join_shadows(frame, tile, light, pixels + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
+                            lit + SSDGS__TILE_LAYER, visibility);
+    for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+        ssdgs__layer_pixels_store(frame, tile, first + layer, later && layer != 1,
+                                  lit + layer * SSDGS__TILE_LAYER);
+    const int given = frame->visibility_given != 0;
+    ssdgs_real *planes[2];
+    planes[0] = frame->pixel_visibility + plane;
+    planes[1] = frame->pixel_shadow + plane;
+    ssdgs__tile_store(tile, visibility + 16 * given, 2 - given, 0, planes + given);
+}
+
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_frame *frame = job->frame;
-    const ssdgs__kernels *k = frame->context->k;
-    const ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
+    ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
     const int layers =
-        job->lightings && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
+        job->deferred && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER],
-        *lit = pixels + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER;
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
-    k->composite(&tile, layers, color, pixels);
-    if (job->lightings && layers == 1 && frame->layer_pixels)
-        memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
-    for (int layer = 0; job->lightings && layer < SSDGS__LAYERS; layer++)
-        ssdgs__layer_pixels_store(frame, &tile, layer, pixels + layer * SSDGS__TILE_LAYER);
-    ssdgs_real visibility[SSDGS__TILE_LAYER];
-    for (int light = 0; job->lightings && light < frame->light_count; light++) {
-        const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
-        const size_t plane = (size_t)tile.width * (size_t)tile.height * (size_t)light;
-        if (layers > 1) {
-            for (int layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
-                color[layer] = ssdgs__layer(frame, first - 1 + layer);
-            if (light) k->composite(&tile, SSDGS__PER_LIGHT, color, lit);
-            if (frame->visibility_given)
-                ssdgs__tile_load(&tile, frame->pixel_visibility + plane, 0, visibility);
-            else ssdgs__pixel_visibility(frame, job->lightings + light, light, &tile, pixels, visibility);
-        } else memset(visibility, 0, sizeof visibility);
-        for (int layer = 0; light && layer < SSDGS__PER_LIGHT; layer++)
-            ssdgs__layer_pixels_store(frame, &tile, first + layer, lit + layer * SSDGS__TILE_LAYER);
-        if (layers > 1) k->highlight(job->lightings + light, &tile, pixels, visibility);
-        if (frame->pixel_shadow) {
-            const int given = frame->visibility_given != 0;
-            ssdgs_real *planes[2];
-            planes[0] = frame->pixel_visibility + plane;
-            planes[1] = frame->pixel_shadow + plane;
-            ssdgs__tile_store(&tile, visibility + 16 * given, 2 - given, planes + given);
-        }
+    if (job->deferred) tile.material_of = frame->material_of;
+    tile.material = ssdgs__material_after(&tile, -1);
+    for (int later = 0; tile.material >= 0; later = 1) {
+        frame->context->k->composite(&tile, layers, color, pixels);
+        if (job->deferred && layers == 1)
+            memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
+        for (int layer = 0; job->deferred && layer < SSDGS__LIGHT_LAYER; layer++)
+            ssdgs__layer_pixels_store(frame, &tile, layer, later, pixels + layer * SSDGS__TILE_LAYER);
+        for (int light = 0; job->deferred && light < frame->light_count; light++)
+            ssdgs__light_tile(frame, &tile, light, later, pixels);
+        ssdgs__tile_store(&tile, pixels, later ? 3 : 4, later, job->planes);
+        tile.material = ssdgs__material_after(&tile, tile.material);
     }
-    ssdgs__tile_store(&tile, pixels, 4, job->planes);
 }
 
-/* Blends color, any triple per Gaussian; with lightings, the layers too and their highlights. */
+/* Blends color, any triple per Gaussian; where deferred, the layers too, and lights what they blend to. */
 static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels,
-                                   const ssdgs__lighting *lightings) {
+                                   int deferred) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
     ssdgs__composite_job job;
     job.frame = frame;
     job.color = color;
     for (int c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
     job.planes[3] = frame->transmittance;
-    job.lightings = lightings;
+    job.deferred = deferred;
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task,
                     &job);
 }
 
 static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
-    ssdgs__composite_tiles(frame, frame->color, frame->pixels,
-                           frame->layer_count ? ssdgs__lightings(frame) : NULL);
+    ssdgs__composite_tiles(frame, frame->color, frame->pixels, frame->layer_count > 0);
     return SSDGS_OK;
 }
 
@@ -5134,7 +5652,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     const ssdgs_splat_view *v = frame->views;
     const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
     int begin, end;
-    ssdgs__bin_range(frame->gaussians.count, index, &begin, &end);
+    ssdgs__bin_range(frame->count, index, &begin, &end);
     for (size_t g = (size_t)begin; g < (size_t)end; g++) {
         const ssdgs_instances of = v->of_gaussian[g];
         const ssdgs_record *r = v->record + g;
@@ -5192,15 +5710,14 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
     ssdgs_context *context = frame->context;
     ssdgs_splat_view *v = frame->views;
     ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory;
-    const size_t n = (size_t)frame->gaussians.count + SSDGS__BLOCK,
-                 tiles = (size_t)v->tiles_x * (size_t)v->tiles_y;
+    const size_t n = (size_t)frame->count + SSDGS__BLOCK, tiles = (size_t)v->tiles_x * (size_t)v->tiles_y;
     const size_t sums = tiles * (size_t)frame->light_count * SSDGS__HIGHLIGHT_SUMS;
     ssdgs__uncomposite_job job;
     memset(&job, 0, sizeof job);
     job.frame = frame;
     job.stride = 8 + 4 * (size_t)(1 + frame->layer_count);
     if (frame->layer_count) {
-        job.lightings = ssdgs__lightings(frame);
+        job.lightings = ssdgs__pixel_lightings(frame, 0);
         SSDGS__RESERVE(frame->scratch->highlight_sums, job.highlight_sums, ssdgs_real, sums);
         memset(job.highlight_sums, 0, sums * sizeof *job.highlight_sums);
         memset(frame->layer_gradient, 0, n * 4 * (size_t)frame->layer_count * sizeof(ssdgs_real));
@@ -5219,8 +5736,8 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
 
 static void ssdgs__project_backward_task(void *data, int chunk) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const ssdgs__projection p = ssdgs__projection_of(frame, frame->views);
-    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->gaussians.count,
+    const ssdgs__projection p = ssdgs__projection_of(frame, frame->objects, frame->views);
+    const size_t begin = (size_t)chunk * SSDGS__CHUNK, n = (size_t)frame->count,
                  end = begin + SSDGS__CHUNK < n ? begin + SSDGS__CHUNK : n;
     const ssdgs__project_gradient d = {frame->splat_gradient, frame->gradient, frame->gaussians.stride,
                                        (ssdgs_real *)frame->scratch->view_slots.memory + 12 * (size_t)chunk};
@@ -5230,7 +5747,7 @@ static void ssdgs__project_backward_task(void *data, int chunk) {
 
 static SSDGS__TRAINING ssdgs_result ssdgs__project_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
-    const int chunks = ssdgs__chunks(frame);
+    const int chunks = ssdgs__chunks(frame->count);
     ssdgs_real *slots;
     SSDGS__RESERVE(frame->scratch->view_slots, slots, ssdgs_real, 12 * (size_t)chunks + 12);
     ssdgs__parallel(context, chunks, ssdgs__project_backward_task, frame);
@@ -5345,82 +5862,94 @@ static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, s
     }
 }
 
-static ssdgs_result ssdgs__render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
-                                  int light_count, const ssdgs_render_options *options,
-                                  const ssdgs_image *image, ssdgs_render_stats *stats) {
-    ssdgs_context *context = model->context;
+static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stats *stats) {
     double done = 0, all = 0;
-    int finite = 1;
-    if (!camera || !image) return ssdgs__null(context, "ssdgs_render", camera ? "image" : "camera");
-    ssdgs_frame frame;
-    ssdgs_result result = ssdgs__frame_begin(&frame, model, camera, lights, light_count, options,
-                                             image->diffuse || image->specular || image->scattering ||
-                                                 image->normal || image->shadow || image->depth,
-                                             0);
-    if (result) return result;
+    stats->visible = frame->views[0].visible;
+    stats->shaded = frame->shaded_count;
+    stats->light_views = frame->view_count - 1;
+    stats->camera_cached = frame->views[0].cached;
+    for (int l = 0; frame->view_count > 1 && l < frame->light_count; l++)
+        stats->lights_cached += ssdgs__cached_lights(frame)[l].kept;
+    for (int i = 0; i < frame->count; i++) stats->skipped += frame->seen[i] == SSDGS_SKIPPED;
+    for (int c = 0; c < SSDGS__SLOTS; c++) {
+        const uint64_t *counts = frame->memory->cache.counts + 3 * c;
+        done += (double)counts[0];
+        all += (double)counts[1];
+        stats->shadows_cached += (int)counts[2];
+    }
+    stats->network_work = all > 0 ? done / all : 0;
+    stats->instances = frame->views[0].instances;
+    for (int i = 0; i < frame->shaded_count; i++)
+        stats->blackened += frame->color[4 * (size_t)frame->shaded[i] + 3] > 0;
+    for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
+        const ssdgs_model_view *g = &o->gaussians;
+        int finite = 1;
+        stats->gaussians += g->count;
+        for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+            finite = finite && frame->context->k->finite(g->gaussians + c * g->stride, (size_t)g->count);
+        for (size_t i = 0; i < (size_t)g->count && !finite; i++)
+            for (size_t c = 0; c < SSDGS_DIFFUSE; c++) {
+                const ssdgs_real value = g->gaussians[c * g->stride + i];
+                if (ssdgs__finite(value) || (c >= SSDGS_LOG_SCALE && ssdgs__finite(1 / value))) continue;
+                stats->rejected++;
+                break;
+            }
+    }
+}
+
+static int ssdgs__components_asked(const ssdgs_image *image) {
+    return image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
+           image->depth;
+}
+
+/* Runs the stages of a frame that has begun and fills the image. */
+static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, ssdgs_render_stats *stats) {
+    ssdgs_context *context = frame->context;
+    const ssdgs_camera *camera = &frame->camera;
     const int stride = image->stride ? image->stride : camera->width;
     if (stride < camera->width)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
                            camera->width);
-    result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
+    const ssdgs_result result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     if (image->color)
-        ssdgs__write_rows(&frame, frame.pixels, 3, stride, frame.options.background, image->color);
+        ssdgs__write_rows(frame, frame->pixels, 3, stride, frame->options.background, image->color);
     size_t i;
     int y;
     if (image->alpha)
         for (y = 0, i = 0; y < camera->height; y++)
             for (int x = 0; x < camera->width; x++, i++)
-                image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame.transmittance[i];
+                image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame->transmittance[i];
     ssdgs_real *planes;
-    SSDGS__RESERVE(frame.scratch->image, planes, ssdgs_real, pixels * 3);
+    SSDGS__RESERVE(frame->scratch->image, planes, ssdgs_real, pixels * 3);
     for (int c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
-        const ssdgs_real *const from[4] = {frame.diffuse, frame.specular, frame.scattering, frame.normal};
+        const ssdgs_real *const from[4] = {frame->diffuse, frame->specular, frame->scattering, frame->normal};
         if (!to[c]) continue;
-        if (frame.layer_count) ssdgs__deferred_component(&frame, c, planes);
-        else ssdgs__composite_tiles(&frame, from[c], planes, NULL);
-        ssdgs__write_rows(&frame, planes, 3, stride, NULL, to[c]);
+        if (frame->layer_count) ssdgs__deferred_component(frame, c, planes);
+        else ssdgs__composite_tiles(frame, from[c], planes, 0);
+        ssdgs__write_rows(frame, planes, 3, stride, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
-        if (frame.layer_count) ssdgs__deferred_component(&frame, 4, planes);
-        else ssdgs__composite_tiles(&frame, frame.shadow, planes, NULL);
-        if (image->shadow) ssdgs__write_rows(&frame, planes, 1, stride, NULL, image->shadow);
-        if (image->depth) ssdgs__write_rows(&frame, planes + pixels, 1, stride, NULL, image->depth);
+        if (frame->layer_count) ssdgs__deferred_component(frame, 4, planes);
+        else ssdgs__composite_tiles(frame, frame->shadow, planes, 0);
+        if (image->shadow) ssdgs__write_rows(frame, planes, 1, stride, NULL, image->shadow);
+        if (image->depth) ssdgs__write_rows(frame, planes + pixels, 1, stride, NULL, image->depth);
     }
-    if (stats) {
-        stats->gaussians = model->count;
-        stats->visible = frame.views[0].visible;
-        stats->shaded = frame.shaded_count;
-        stats->light_views = frame.view_count - 1;
-        stats->camera_cached = frame.views[0].cached;
-        for (int l = 0; frame.view_count > 1 && l < frame.light_count; l++)
-            stats->lights_cached += ssdgs__cached_lights(&frame)[l].kept;
-        for (i = 0; i < (size_t)model->count; i++) stats->skipped += frame.seen[i] == SSDGS_SKIPPED;
-        for (int c = 0; c < SSDGS__SLOTS; c++) {
-            const uint64_t *counts = frame.memory->cache.counts + 3 * c;
-            done += (double)counts[0];
-            all += (double)counts[1];
-            stats->shadows_cached += (int)counts[2];
-        }
-        stats->network_work = all > 0 ? done / all : 0;
-        stats->instances = frame.views[0].instances;
-        for (i = 0; i < (size_t)frame.shaded_count; i++)
-            stats->blackened += frame.color[4 * frame.shaded[i] + 3] > 0;
-        for (int c = 0; c < SSDGS_DIFFUSE; c++)
-            finite = finite &&
-                     context->k->finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
-        for (i = 0; i < (size_t)model->count && !finite; i++)
-            for (int c = 0; c < SSDGS_DIFFUSE; c++)
-                if (!ssdgs__finite(model->gaussians[(size_t)c * model->capacity + i]) &&
-                    !(c >= SSDGS_LOG_SCALE &&
-                      ssdgs__finite(1 / model->gaussians[(size_t)c * model->capacity + i]))) {
-                    stats->rejected++;
-                    break;
-                }
-    }
+    if (stats) ssdgs__render_statistics(frame, stats);
     return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__render_model(ssdgs_model *model, const ssdgs_camera *camera,
+                                        const ssdgs_light *lights, int light_count,
+                                        const ssdgs_render_options *options, const ssdgs_image *image,
+                                        ssdgs_render_stats *stats) {
+    ssdgs_frame frame;
+    if (!camera || !image) return ssdgs__null(model->context, "ssdgs_render", camera ? "image" : "camera");
+    const ssdgs_result result = ssdgs__frame_of_model(&frame, model, camera, lights, light_count, options,
+                                                      ssdgs__components_asked(image), 0);
+    return result ? result : ssdgs__render(&frame, image, stats);
 }
 
 SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *camera,
@@ -5431,13 +5960,68 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
     if (!model) return SSDGS_ERR_ARGUMENT;
     const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_render");
     return result ? result
-                  : ssdgs__leave(model->context,
-                                 ssdgs__render(model, camera, lights, light_count, options, image, stats));
+                  : ssdgs__leave(model->context, ssdgs__render_model(model, camera, lights, light_count,
+                                                                     options, image, stats));
 }
 
 SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
                                     int light_count, const ssdgs_image *image) {
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
+}
+
+/* ---- scenes ---- */
+
+struct ssdgs_scene {
+    ssdgs_context *context;
+    struct ssdgs__frame_memory *frame; /* of its frames */
+};
+
+SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
+    ssdgs_object object;
+    memset(&object, 0, sizeof object);
+    object.model = model;
+    for (int i = 0; i < 3; i++) object.to_world[5 * i] = object.tint[i] = 1;
+    return object;
+}
+
+SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **out) {
+    if (out) *out = NULL;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_scene_create");
+    if (result) return result;
+    if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_scene_create", "out"));
+    *out = (ssdgs_scene *)ssdgs__allocate(context, sizeof **out);
+    if (!*out) return ssdgs__leave(context, SSDGS_ERR_MEMORY);
+    (*out)->context = context;
+    context->references++;
+    return ssdgs__leave(context, SSDGS_OK);
+}
+
+SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene) {
+    if (!scene || ssdgs__enter(scene->context, "ssdgs_scene_destroy")) return;
+    ssdgs_context *context = scene->context;
+    ssdgs__frame_memory_destroy(context, scene->frame);
+    ssdgs__release(context, scene);
+    ssdgs__leave_and_drop(context);
+}
+
+SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
+                                          const ssdgs_camera *camera, const ssdgs_light *lights,
+                                          int light_count, const ssdgs_render_options *options,
+                                          const ssdgs_image *image, ssdgs_render_stats *stats) {
+    ssdgs_frame frame;
+    if (stats) memset(stats, 0, sizeof *stats);
+    if (!scene) return SSDGS_ERR_ARGUMENT;
+    ssdgs_context *context = scene->context;
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_scene_render");
+    if (result) return result;
+    if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
+    if (!result) result = ssdgs__objects_check(context, objects, object_count);
+    if (!result)
+        result = ssdgs__frame_begin(&frame, context, &scene->frame, objects, object_count, camera, lights,
+                                    light_count, options, ssdgs__components_asked(image), 0);
+    if (!result) result = ssdgs__render(&frame, image, stats);
+    return ssdgs__leave(context, result);
 }
 
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */
@@ -7276,7 +7860,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     options.terms = shot->terms;
     options.max_error = 0; /* all that a pixel blends gets a gradient */
-    ssdgs_result result = ssdgs__frame_begin(frame, model, camera, shot->light, 1, &options, 0, 1);
+    ssdgs_result result = ssdgs__frame_of_model(frame, model, camera, shot->light, 1, &options, 0, 1);
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     ssdgs__exposure_job job;
@@ -8049,7 +8633,7 @@ static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssd
             {(ssdgs_real)(r * cos(turn * view)), (ssdgs_real)(r * sin(turn * view)), (ssdgs_real)z},
             {1, 1, 1}};
         ssdgs_frame frame;
-        ssdgs_result result = ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0);
+        ssdgs_result result = ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 0);
         frame.flux = flux;
         for (int stage = SSDGS_STAGE_PROJECT; stage <= SSDGS_STAGE_WALK && !result; stage++)
             result = ssdgs_stage_cpu(&frame, (ssdgs_stage)stage);
@@ -9322,7 +9906,7 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     memset(&out, 0, sizeof out);
     out.color = rendered;
     out.alpha = planes;
-    result = ssdgs__render(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
+    result = ssdgs__render_model(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
         ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
         ssdgs__photo_planes(photo, background, 0, pixels, planes);
@@ -10197,7 +10781,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
         R lane[SSDGS__VW];
-        VSTORE(lane, VSEL(drawn, d, VSET(-1)));
+        VSTORE(lane, VSEL(drawn, VMUL(d, VSET(k->depth_scale)), VSET(-1)));
         for (int l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
         if (!VBITS(drawn)) continue;
         V field[8];
@@ -10691,6 +11275,11 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
     int which[SSDGS__BATCH];
     while (from < tile->count) {
         int n = F(batch_gather)(&batch, tile, &from);
+        uint64_t ours = tile->material_of ? 0 : ~(uint64_t)0; /* what leaves a colour: others only darken */
+        for (int i = 0; tile->material_of && i < n; i++)
+            ours |= (uint64_t)(tile->material_of[tile->list[batch.place[i]].gaussian / SSDGS__BLOCK] ==
+                               tile->material)
+                    << i;
         for (int layer = 0; layer < layers; layer++)
             for (int i = 0; i < n; i++)
                 memcpy(local[layer][i], color[layer] + (size_t)tile->list[batch.place[i]].gaussian * 4,
@@ -10706,8 +11295,8 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                 last[v] = VLOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
                 t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
             }
-            int used;
-            for (used = 0; left; left &= left - 1, used++) {
+            int used = 0;
+            for (; left; left &= left - 1) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw;
@@ -10718,6 +11307,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
                 }
+                used += (int)(ours >> index & 1);
             }
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 VSTORE(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW, last[v]);

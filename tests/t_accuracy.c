@@ -615,13 +615,17 @@ static double highlight(const double *p, const void *with) {
 /* The kernels' lighting, made as for a frame. */
 static ssdgs__lighting lighting(const lobes *l, const double *p) {
     ssdgs_frame frame;
-    memset(&frame, 0, sizeof frame);
+    ssdgs_placed object;
     ssdgs_light light;
+    memset(&frame, 0, sizeof frame);
     memset(&light, 0, sizeof light);
-    frame.settings = ssdgs_settings_default();
-    frame.settings.eta = (ssdgs_real)l->eta;
-    frame.settings.asg = SSDGS_ASG_GEOMETRIC;
-    frame.terms = SSDGS_SPECULAR_TERM;
+    memset(&object, 0, sizeof object);
+    object.settings = ssdgs_settings_default();
+    object.settings.eta = (ssdgs_real)l->eta;
+    object.settings.asg = SSDGS_ASG_GEOMETRIC;
+    object.terms = SSDGS_SPECULAR_TERM;
+    object.scale = 1;
+    for (int i = 0; i < 9; i += 4) object.rotation[i] = 1;
     frame.lights = &light;
     for (int i = 0; i < 3; i++)
         light.position[i] = (ssdgs_real)p[LIGHT + i], frame.eye[i] = (ssdgs_real)p[EYE + i];
@@ -630,8 +634,8 @@ static ssdgs__lighting lighting(const lobes *l, const double *p) {
         for (int i = 0; i < 4; i++) basis[4 * j + i] = (ssdgs_real)l->q[j][i];
         for (int i = 0; i < 2; i++) sharpness[2 * j + i] = (ssdgs_real)l->sharpness[j][i];
     }
-    frame.gaussians.asg_basis = basis, frame.gaussians.asg_sharpness = sharpness;
-    return ssdgs__lighting_of(&frame, 0);
+    object.gaussians.asg_basis = basis, object.gaussians.asg_sharpness = sharpness;
+    return ssdgs__lighting_of(&frame, &object, 0);
 }
 
 static int channel_of(int parameter) {

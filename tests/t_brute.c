@@ -611,7 +611,7 @@ static ssdgs_context *best(void) {
 /* The light's views and what the walk finds through them; the frame's arrays live as long as the model. */
 static ssdgs_frame light_frame(ssdgs_model *model) {
     ssdgs_frame frame;
-    if (!CHECK(!ssdgs__frame_begin(&frame, model, &s.camera, s.lights, s.light_count, &s.options, 0, 0)) ||
+    if (!CHECK(!ssdgs__frame_of_model(&frame, model, &s.camera, s.lights, s.light_count, &s.options, 0, 0)) ||
         !CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)))
         exit(1);
     return frame;
@@ -1155,7 +1155,7 @@ static void test_no_map(void) {
     full_scene(3000005, 60, 40);
     ssdgs_model *model = make_model(best());
     ssdgs_frame frame;
-    CHECK(!ssdgs__frame_begin(&frame, model, &s.camera, s.lights, 1, &s.options, 1, 0));
+    CHECK(!ssdgs__frame_of_model(&frame, model, &s.camera, s.lights, 1, &s.options, 1, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     for (int i = 1; i < frame.view_count; i++) frame.views[i].light_map = NULL;
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
@@ -1373,6 +1373,7 @@ static void test_conic(int step) {
                 p.view[0] = p.view[5] = p.view[10] = 1;
                 p.fx = p.fy = FOCAL, p.cx = p.cy = SCREEN / 2, p.near_plane = (ssdgs_real)0.01;
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
+                p.depth_scale = 1;
                 int n = fill_turned(pow(10, size), pow(10, aspect), step);
                 ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
                                            depth);

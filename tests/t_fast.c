@@ -321,7 +321,7 @@ static void test_max_error(void) {
             int glimpsed = 0;
             options.max_error = (ssdgs_real)bounds[b];
             ssdgs_frame frame;
-            CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 0));
+            CHECK(!ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 0));
             CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
             for (int i = 0; i < COUNT; i++) {
                 frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
@@ -361,7 +361,7 @@ static void test_spent_budget(void) {
             v.gaussians[(size_t)(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] = (ssdgs_real)-1.5;
     }
     ssdgs_frame frame;
-    CHECK(!ssdgs__frame_begin(&frame, model, &camera, NULL, 0, &options, 0, 0));
+    CHECK(!ssdgs__frame_of_model(&frame, model, &camera, NULL, 0, &options, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
     for (int i = 0; i < LAYERS; i++) {
         frame.color[4 * i] = frame.seen[i] == SSDGS_SKIPPED;
@@ -495,7 +495,7 @@ static void test_frozen(void) {
     const size_t n = model->capacity * SSDGS_CHANNELS;
     for (int part = 0; part < 4; part++) {
         ssdgs_frame frame;
-        CHECK(!ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1));
+        CHECK(!ssdgs__frame_of_model(&frame, model, &camera, &light, 1, NULL, 0, 1));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE));
         for (size_t i = 0; i < PIXELS * 4; i++) frame.pixel_gradient[i] = (ssdgs_real)(draw(i) - 0.5);
         frame.frozen[0] = part & 1;

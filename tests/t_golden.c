@@ -102,7 +102,7 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *ca
     ssdgs_render_options options = ssdgs_render_options_default();
     options.stop = 0;
     for (int i = 0; i < 3 && background; i++) options.background[i] = (ssdgs_real)background[i];
-    if (!CHECK(!ssdgs__frame_begin(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
+    if (!CHECK(!ssdgs__frame_of_model(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
 }
 
 static void test_raster(void) {
@@ -281,7 +281,7 @@ static void test_asg(void) {
     }
     ssdgs_frame frame;
     begin(&frame, run.model, &camera, &lamp, 1, NULL);
-    run.k = ssdgs__lighting_of(&frame, 0);
+    run.k = ssdgs__lighting_of(&frame, frame.objects, 0);
     run.gauss = reals(run.stride * SSDGS_CHANNELS);
     run.dgauss = reals(run.stride * SSDGS_CHANNELS);
     run.rows = reals(run.stride * SSDGS__ROWS);
@@ -345,13 +345,14 @@ static void test_network(const char *name, int shadow, int residual, int default
     settings.shadow.width = 32;
     settings.shadow.layers = 4;
     ssdgs_frame frame;
+    ssdgs_placed object;
     memset(&frame, 0, sizeof frame);
-    frame.context = context;
-    frame.settings = settings;
-    frame.terms = SSDGS_ALL_TERMS;
+    memset(&object, 0, sizeof object);
     frame.light_count = 1;
-    if (defaults || residual) frame.settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
-    ssdgs__block_layout l = ssdgs__layout(&frame);
+    object.settings = settings;
+    object.terms = SSDGS_ALL_TERMS;
+    if (defaults || residual) object.settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
+    ssdgs__block_layout l = ssdgs__layout(&frame, &object);
     ssdgs_real *memory = reals(l.size);
     ssdgs_real *gauss = memory + l.gauss;
     ssdgs_real *scratch = reals(l.scratch);
@@ -400,7 +401,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     {
         ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at),
                    *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
-        ssdgs__encode_inputs(&frame, &l, shadow, gauss, part, inputs);
+        ssdgs__encode_inputs(context->k, &object.settings, &l, shadow, gauss, part, inputs);
         const ssdgs__network net = {sizes, layers, weights};
         const ssdgs__colour_in in = {gauss, part, part + l.visibility, shadow ? head : NULL,
                                      shadow ? NULL : head};
@@ -442,7 +443,8 @@ static void test_network(const char *name, int shadow, int residual, int default
         ssdgs_real *dinputs =
             ssdgs__network_backward(context->k, &net, inputs, outputs, &backward, &lists, sizes[0], slot);
         ssdgs__sum_slots(sizes, layers, slot, 0, 1, 0, 1, dweights);
-        ssdgs__encode_inputs_backward(&frame, &l, shadow, inputs, dinputs, dgauss, drows, dvisibility);
+        ssdgs__encode_inputs_backward(context->k, &object.settings, &l, shadow, inputs, dinputs, dgauss,
+                                      drows, dvisibility);
     }
     snprintf(key, sizeof key, "%sgrad_weights", prefix);
     CHECK_L2(dweights, gold(&file, key, NULL), count, gradient_bound(), key);
@@ -559,6 +561,7 @@ static void test_needles(void) {
         memset(&view, 0, sizeof view);
         view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
         view.orthographic = 1;
+        view.depth_scale = 1;
         view.compensate = compensated;
         view.variance = (ssdgs_real)0.1;
         view.blur = SSDGS_BLUR_ADD;

@@ -53,7 +53,7 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
     const size_t pixels = SIDE * SIDE, n = COUNT * (size_t)s->light_count;
     static ssdgs_real normal_gradient[4 * SIDE * SIDE];
     double sum = 0;
-    if (ssdgs__frame_begin(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
+    if (ssdgs__frame_of_model(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
     if (ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
     if (fixed) { /* visibility, depth cue and flux are held fixed */
         if (frame->flux) memcpy(frame->flux, fixed->flux, n * sizeof(ssdgs_real));
@@ -279,7 +279,7 @@ static void test_shared_sums(void) {
                 (c < 3 ? 0.4 : 1) * (2 * draw(i * 40 + (size_t)c) - 1);
     ssdgs_frame frame;
     for (int part = 0; part < 3; part++) {
-        if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 0, 1)) exit(1);
+        if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, NULL, 0, 1)) exit(1);
         if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
         for (size_t i = 0; i < MANY; i++) frame.seen[i] = part == 2 || (int)(i & 1) == part;
         if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_SHADE)) exit(1);
@@ -315,7 +315,7 @@ static void test_moved_camera(void) {
                 -3 - draw(10000 + 3 * i + (size_t)c);
         }
     ssdgs_frame frame;
-    if (ssdgs__frame_begin(&frame, model, &camera, NULL, 0, NULL, 0, 1)) exit(1);
+    if (ssdgs__frame_of_model(&frame, model, &camera, NULL, 0, NULL, 0, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE)) exit(1);
     for (size_t i = 0; i < 4 * MANY; i++) frame.color[i] = draw(20000 + i);
     if (ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE)) exit(1);
@@ -349,7 +349,7 @@ static void test_edges(void) {
         -8; /* too faint for the light's map: nothing is known to be in its way */
     memset(v.shadow, 0, v.shadow_count * sizeof *v.shadow);
     ssdgs_frame frame;
-    if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, NULL, 1, 1)) exit(1);
+    if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, NULL, 1, 1)) exit(1);
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
     CHECK(frame.visibility[0] == 1);
     for (int i = 0; i < 2; i++) {
@@ -404,7 +404,7 @@ static void test_empty_tiles(void) {
     if (!CHECK(!ssdgs_model_create(context, &settings, 1, &model))) exit(1);
     for (size_t i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
     ssdgs_frame frame;
-    if (ssdgs__frame_begin(&frame, model, &camera, &light, 1, &options, 0, 1)) exit(1);
+    if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 1)) exit(1);
     const size_t count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
     for (size_t i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
@@ -488,16 +488,17 @@ static void test_compose(void) {
    light_octaves, n. */
 static void test_octaves(void) {
     ssdgs_frame frame;
+    ssdgs_placed object;
     int n = 0;
     memset(&frame, 0, sizeof frame);
-    frame.context = context;
-    frame.settings = ssdgs_settings_default();
-    frame.settings.length_unit = 1;
-    frame.settings.octaves.view = 2;
-    frame.settings.octaves.light = 1;
-    frame.terms = SSDGS_SCATTERING_TERM;
+    memset(&object, 0, sizeof object);
+    object.settings = ssdgs_settings_default();
+    object.settings.length_unit = 1;
+    object.settings.octaves.view = 2;
+    object.settings.octaves.light = 1;
+    object.terms = SSDGS_SCATTERING_TERM;
     frame.light_count = 1;
-    ssdgs__block_layout l = ssdgs__layout(&frame);
+    ssdgs__block_layout l = ssdgs__layout(&frame, &object);
     CHECK(l.scattering[0] == 27 + 15 + 9 + 3 + SSDGS_MATERIAL_COUNT + SSDGS__LENGTHS);
     ssdgs_real *gauss =
         (ssdgs_real *)calloc(l.lights + l.light_size + (size_t)l.scattering[0] * SSDGS__BLOCK, sizeof *gauss);
@@ -514,7 +515,7 @@ static void test_octaves(void) {
             want[n] = k < 3 * octaves[i] ? sin(angle) : cos(angle);
         }
     }
-    ssdgs__encode_inputs(&frame, &l, 0, gauss, part, rows);
+    ssdgs__encode_inputs(context->k, &object.settings, &l, 0, gauss, part, rows);
     for (int i = 0; i < n; i++) rows[i] = rows[i * SSDGS__BLOCK];
     CHECK_NEAR(rows, want, n, 1e-12, 0, "the scattering network's inputs");
     free(gauss);

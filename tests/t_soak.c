@@ -816,7 +816,7 @@ static hashes hash_all(ssdgs_context *context, const ssdgs_train_options *o, int
     h.render = fnv(FNV_START, color, bytes);
     truth->settings.transport = truth->settings.depth_cue = 1; /* the walk sums flux and depth too */
     ssdgs_frame frame;
-    CHECK(!ssdgs__frame_begin(&frame, truth, &photos[1].camera, &photos[3].light, 1, NULL, 0, 0));
+    CHECK(!ssdgs__frame_of_model(&frame, truth, &photos[1].camera, &photos[3].light, 1, NULL, 0, 0));
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
     h.light = fnv(fnv(FNV_START, frame.visibility, TRUTH * sizeof(ssdgs_real)), frame.depth_cue,
                   TRUTH * sizeof(ssdgs_real));

@@ -424,7 +424,7 @@ static void test_lights(void) {
         for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
         CHECK(finite);
         ssdgs_frame frame;
-        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
+        CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
         CHECK(frame.view_count == (distance < 1 ? 7 : 2));
         for (int i = 0; i < 300; i++) {
@@ -1113,7 +1113,7 @@ static void test_units(void) {
         CHECK(fabs((double)model->settings.length_unit - (kind == 1 ? 1 : 2)) < 1e-6 &&
               fabs(trainer->unit - 4) < 1e-12);
         ssdgs_frame frame;
-        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
+        CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, NULL, 0, NULL, 0, 0));
         CHECK(fabs((double)frame.views[0].near_plane - (kind == 1 ? 0.01 : 0.04)) < 1e-7);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -1159,7 +1159,7 @@ static void test_blur(void) {
             model->gaussians[(size_t)(SSDGS_LOG_SCALE + pass) * model->capacity] = (ssdgs_real)log(1e-4);
         model->gaussians[(size_t)SSDGS_OPACITY * model->capacity] = 4;
         ssdgs_frame frame;
-        CHECK(!ssdgs__frame_begin(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) &&
+        CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) &&
               frame.view_count > 1);
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_PROJECT));
         CHECK(fabs(-0.5 * 1.4426950408889634 / (double)frame.views[0].record->xx -

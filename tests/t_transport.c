@@ -17,7 +17,8 @@ static void begin_as(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *
     camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
     const ssdgs_render_options exact = ssdgs_render_options_exact();
     ssdgs_model_arrays(model);
-    if (!CHECK(!ssdgs__frame_begin(frame, model, &camera, lights, light_count, &exact, 0, training))) exit(1);
+    if (!CHECK(!ssdgs__frame_of_model(frame, model, &camera, lights, light_count, &exact, 0, training)))
+        exit(1);
     if (!CHECK(!ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK))) exit(1);
 }
 
@@ -55,7 +56,7 @@ static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_re
     for (int i = 0; i < frame->light_count; i++) ssdgs__cached_lights(frame)[i].transport_ready = 0;
     CHECK(!ssdgs__nodes(frame, &job.tree));
     job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 9 * sizeof *job.sources);
-    ssdgs__transport_block(&job, light, 0, x, 15, sums);
+    ssdgs__transport_block(&job, job.tree.trees, light, 0, x, 15, sums);
     free(job.sources);
 }
 
@@ -204,7 +205,7 @@ static void test_inputs(void) {
     ssdgs_frame frame;
     begin_as(&frame, model, lights, 2, 1);
     if (!CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_SHADE))) exit(1);
-    ssdgs__block_layout l = ssdgs__layout(&frame);
+    ssdgs__block_layout l = ssdgs__layout(&frame, frame.objects);
     const ssdgs_real *activations = (const ssdgs_real *)frame.scratch->activations.memory;
     CHECK(frame.shaded_count > COUNT / 4 && frame.shaded_count < COUNT);
     for (int j = 0; j < frame.shaded_count; j += 7)
@@ -268,9 +269,9 @@ static void test_flux(void) {
         if (part == 1) expected /= height * height;
         printf("flux %g of %g\n", sum, expected);
         CHECK(fabs(sum / expected - 1) < 0.06);
-        ssdgs__node_job tree;
-        CHECK(!ssdgs__nodes(&frame, &tree));
-        const ssdgs__node *root = tree.nodes + tree.count - 1;
+        ssdgs__node_job job;
+        CHECK(!ssdgs__nodes(&frame, &job));
+        const ssdgs__node *root = job.trees->nodes + job.trees->count - 1;
         CHECK(fabs((double)root->flux / sum - 1) < 1e-4);
         double square = 0;
         for (int i = 0; i < COUNT; i++) {

@@ -1,0 +1,758 @@
+/* Placed models in one frame, also as real64: one alone is ssdgs_render() to the bit; moved, turned, mirrored
+   and scaled ones look as the model does from where the camera would be; parts equal the whole; shadows fall
+   from one on another; what is refused, and what is kept. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "test.h"
+
+enum { SIDE = 64, PIXELS = SIDE * SIDE, PLANES = 18, VALUES = PLANES * PIXELS };
+static const int real64 = sizeof(ssdgs_real) == 8;
+static ssdgs_context *context;
+static ssdgs_scene *scene;
+
+/* A picture's planes: color, diffuse, specular, scattering, normal (3 each), alpha, depth, shadow. */
+typedef struct picture {
+    ssdgs_real value[VALUES];
+    ssdgs_render_stats stats;
+} picture;
+static picture shot[4];
+
+static double draw(uint64_t counter) { return test_uniform(34, counter); }
+
+static ssdgs_image planes_of(picture *p) {
+    ssdgs_image image = {0,
+                         p->value,
+                         p->value + 15 * PIXELS,
+                         p->value + 16 * PIXELS,
+                         p->value + 12 * PIXELS,
+                         p->value + 3 * PIXELS,
+                         p->value + 6 * PIXELS,
+                         p->value + 9 * PIXELS,
+                         p->value + 17 * PIXELS};
+    return image;
+}
+
+/* Networks that have something to say, none of them small. */
+static void stir_networks(ssdgs_model *model, uint64_t seed) {
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t i = 0; i < v.shadow_count; i++)
+        v.shadow[i] += (ssdgs_real)(0.3 * draw(seed + 2000000 + i) - 0.15);
+    for (size_t i = 0; i < v.scattering_count; i++)
+        v.scattering[i] += (ssdgs_real)(0.3 * draw(seed + 4000000 + i) - 0.15);
+}
+
+/* Gaussians from `first` on of an endless cloud in a ball of this radius. */
+static ssdgs_model *cloud(const ssdgs_settings *settings, int first, int count, double radius) {
+    ssdgs_model *model = NULL;
+    if (!CHECK(!ssdgs_model_create(context, settings, count, &model))) exit(1);
+    for (int i = 0; i < count; i++) {
+        const uint64_t at = 64 * (uint64_t)(first + i);
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        for (uint64_t c = 0; c < 4; c++) g.rotation[c] = (ssdgs_real)(2 * draw(at + c) - 1);
+        for (uint64_t c = 0; c < 3; c++) {
+            g.position[c] = (ssdgs_real)(radius * (2 * draw(at + 8 + c) - 1));
+            g.scale[c] = (ssdgs_real)(radius * (0.05 + 0.1 * draw(at + 16 + c)));
+            g.normal[c] = (ssdgs_real)(2 * draw(at + 24 + c) - 1);
+            g.diffuse[c] = (ssdgs_real)draw(at + 32 + c);
+            g.specular[c] = (ssdgs_real)draw(at + 40 + c);
+            g.scattering[c] = (ssdgs_real)draw(at + 48 + c);
+            g.material[c] = (ssdgs_real)draw(at + 56 + c);
+        }
+        g.opacity = (ssdgs_real)(0.2 + 0.6 * draw(at + 60));
+        g.sharpness[0] = (ssdgs_real)(2 + 6 * draw(at + 61));
+        g.sharpness[1] = (ssdgs_real)(2 + 6 * draw(at + 4));
+        g.f0 = (ssdgs_real)(0.02 + 0.1 * draw(at + 62));
+        g.softness = (ssdgs_real)draw(at + 63);
+        CHECK(!ssdgs_model_set(model, i, &g));
+    }
+    stir_networks(model, 0);
+    return model;
+}
+
+static ssdgs_settings small_settings(void) {
+    ssdgs_settings s = ssdgs_settings_default();
+    s.scattering.width = s.shadow.width = 16;
+    s.light_map.size = 96;
+    s.light_map.bias = (ssdgs_real)0.05;
+    s.depth_cue = 1;
+    return s;
+}
+
+static ssdgs_camera camera_from(double x, double y, double z) {
+    const ssdgs_real eye[3] = {(ssdgs_real)x, (ssdgs_real)y, (ssdgs_real)z}, target[3] = {0, 0, 0},
+                     up[3] = {0, 0, 1};
+    return ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
+}
+
+static ssdgs_light point_light(double x, double y, double z) {
+    ssdgs_light light = {SSDGS_LIGHT_POINT, {(ssdgs_real)x, (ssdgs_real)y, (ssdgs_real)z}, {9, 8, 7}};
+    return light;
+}
+
+static void alone(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
+                  const ssdgs_render_options *options, picture *p) {
+    const ssdgs_image image = planes_of(p);
+    CHECK(!ssdgs_render_ex(model, camera, lights, count, options, &image, &p->stats));
+}
+
+static void together(const ssdgs_object *objects, int count, const ssdgs_camera *camera,
+                     const ssdgs_light *lights, int light_count, const ssdgs_render_options *options,
+                     picture *p) {
+    const ssdgs_image image = planes_of(p);
+    if (!CHECK(!ssdgs_scene_render(scene, objects, count, camera, lights, light_count, options, &image,
+                                   &p->stats)))
+        printf("    %s\n", ssdgs_error_message(context));
+}
+
+static int same(const picture *a, const picture *b) { return !memcmp(a->value, b->value, sizeof a->value); }
+
+/* A third of a turn about (1 1 1) and some more about z, times scale; mirrored in x first. */
+static ssdgs_object placed(ssdgs_model *model, double turn, double scale, int mirror, double x, double y,
+                           double z) {
+    ssdgs_object o = ssdgs_object_default(model);
+    const double c = cos(turn), s = sin(turn), r[9] = {0, -s, c, 0, c, s, -1, 0, 0}, at[3] = {x, y, z};
+    for (int i = 0; i < 9; i++)
+        o.to_world[i / 3 * 4 + i % 3] = (ssdgs_real)(scale * (mirror && i % 3 == 0 ? -r[i] : r[i]));
+    for (int i = 0; i < 3; i++) o.to_world[4 * i + 3] = (ssdgs_real)at[i];
+    return o;
+}
+
+static void to_world(const ssdgs_object *o, const ssdgs_real from[3], int direction, ssdgs_real to[3]) {
+    for (int i = 0; i < 3; i++) {
+        const ssdgs_real *row = o->to_world + 4 * i;
+        to[i] = row[0] * from[0] + row[1] * from[1] + row[2] * from[2] + (direction ? 0 : row[3]);
+    }
+}
+
+/* ---- one object ---- */
+
+static void test_identity(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light lights[2] = {point_light(2, -2, 2), {SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 2, 1}}};
+    const ssdgs_render_options options[2] = {ssdgs_render_options_exact(), ssdgs_render_options_fast()};
+    for (int kind = 0; kind < 3; kind++) {
+        ssdgs_settings s = kind == 1 ? ssdgs_settings_published() : small_settings();
+        s.baked = kind == 2;
+        s.scattering.width = s.shadow.width = 16;
+        ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+        const ssdgs_object object = ssdgs_object_default(model);
+        for (int preset = 0; preset < 2; preset++) {
+            alone(model, &camera, lights, 2, options + preset, shot);
+            together(&object, 1, &camera, lights, 2, options + preset, shot + 1);
+            CHECK(same(shot, shot + 1) && shot->stats.visible > 100);
+            CHECK(!memcmp(&shot[0].stats, &shot[1].stats, sizeof shot->stats));
+        }
+        ssdgs_model_destroy(model);
+    }
+}
+
+/* A camera and a light moved along with an object: they must see what they saw of it where it was. */
+static void test_moved(void) {
+    static const struct {
+        double turn, scale, x, y, z;
+        int mirror;
+    } move[5] = {{0, 4, 1, -2, 0.5, 0},
+                 {0.7, 1, 0, 0, 0, 0},
+                 {2, 0.125, 3, 1, -2, 0},
+                 {0.7, 1, 0.5, -0.25, 0.125, 1},
+                 {1, 1e4, 5e4, 0, 0, 1}};
+    ssdgs_settings settings = small_settings();
+    for (int m = 0; m < 5; m++) {
+        if (m == 1) settings = ssdgs_settings_published(), settings.scattering.width = 16;
+        else settings = small_settings();
+        settings.light_map.size = m ? 512 : 0;
+        ssdgs_model *model = cloud(&settings, 0, 300, 0.5);
+        for (int part = 0; part < 3; part++) { /* without what a light's map finds; with it; one from afar */
+            ssdgs_render_options options = ssdgs_render_options_exact();
+            ssdgs_camera camera = camera_from(0.4, -2.2, 0.8), moved = camera;
+            ssdgs_light light = point_light(2, -2, 2), there;
+            ssdgs_object o =
+                placed(model, move[m].turn, move[m].scale, move[m].mirror, move[m].x, move[m].y, move[m].z);
+            const double scale = move[m].scale;
+            if (!m) { /* not turned: the map has the same pixels */
+                memset(o.to_world, 0, sizeof o.to_world);
+                for (int i = 0; i < 3; i++) o.to_world[5 * i] = (ssdgs_real)scale;
+                o.to_world[3] = (ssdgs_real)move[m].x, o.to_world[7] = (ssdgs_real)move[m].y;
+            }
+            if (part == 2) {
+                light.kind = SSDGS_LIGHT_DIRECTIONAL;
+                light.position[0] = light.position[2] = (ssdgs_real)0.6;
+                light.position[1] = (ssdgs_real)-sqrt(1 - 2 * 0.36);
+            }
+            there = light;
+            options.alpha_threshold = (ssdgs_real)1e-6; /* or rounding shows and hides faint rims */
+            options.stop = 0;
+            if (!part) options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+            to_world(&o, light.position, part == 2, there.position);
+            for (int i = 0; i < 3; i++) {
+                if (part == 2) there.position[i] /= (ssdgs_real)scale;
+                else there.intensity[i] *= (ssdgs_real)(scale * scale);
+            }
+            for (int i = 0; i < 3; i++) { /* its rows turn along; the first one of a mirrored one backwards */
+                double back = 0;
+                for (int j = 0; j < 3; j++) {
+                    double sum = 0;
+                    for (int k = 0; k < 3; k++)
+                        sum += (double)camera.view[4 * i + k] * (double)o.to_world[4 * j + k] / scale;
+                    moved.view[4 * i + j] = (ssdgs_real)(!i && move[m].mirror ? -sum : sum);
+                    back -= (double)moved.view[4 * i + j] * (double)o.to_world[4 * j + 3];
+                }
+                moved.view[4 * i + 3] =
+                    (ssdgs_real)(scale * (double)(!i && move[m].mirror ? -camera.view[3]
+                                                                       : camera.view[4 * i + 3]) +
+                                 back);
+            }
+            alone(model, &camera, &light, 1, &options, shot);
+            together(&o, 1, &moved, &there, 1, &options, shot + 1);
+            for (int plane = 0; plane < PLANES; plane++) { /* turn the picture to the first one's */
+                const int triple = plane < 15, size = triple ? 3 : 1;
+                for (int i = 0; i < PIXELS && plane % 3 * triple == 0; i++) {
+                    const int x = i % SIDE, from = move[m].mirror ? i - x + SIDE - 1 - x : i;
+                    ssdgs_real *to = shot[2].value + plane * PIXELS + i * size;
+                    memcpy(to, shot[1].value + plane * PIXELS + from * size, (size_t)size * sizeof *to);
+                    if (plane == 16) *to /= (ssdgs_real)scale; /* depth */
+                    if (plane != 12) continue;
+                    const ssdgs_real n[3] = {to[0], to[1], to[2]};
+                    for (int c = 0; c < 3; c++)
+                        to[c] = (n[0] * o.to_world[c] + n[1] * o.to_world[4 + c] + n[2] * o.to_world[8 + c]) /
+                                (ssdgs_real)scale;
+                }
+            }
+            const double tight = real64 ? 1e-9 : m == 4 ? 3e-3 : 3e-4;
+            for (int plane = 0; plane < PLANES; plane++)
+                if (part == 0 || !m)
+                    CHECK_L2(shot[2].value + plane * PIXELS, shot[0].value + plane * PIXELS, PIXELS, tight,
+                             "a moved object");
+            CHECK_L2(shot[2].value, shot[0].value, 3 * PIXELS, 0.03, "a moved object under a light's map");
+        }
+        ssdgs_model_destroy(model);
+    }
+}
+
+static void test_tint(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    for (int kind = 0; kind < 2; kind++) {
+        ssdgs_settings s = kind ? ssdgs_settings_published() : small_settings();
+        s.scattering.width = s.shadow.width = 16;
+        ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+        ssdgs_object object = ssdgs_object_default(model);
+        const ssdgs_render_options options = ssdgs_render_options_exact();
+        together(&object, 1, &camera, &light, 1, &options, shot);
+        for (int c = 0; c < 3; c++) object.tint[c] = (ssdgs_real)c / 2;
+        together(&object, 1, &camera, &light, 1, &options, shot + 1);
+        CHECK(shot[1].stats.camera_cached == 1 && shot[1].stats.lights_cached == 1);
+        for (int i = 0; i < 12 * PIXELS; i++) shot[0].value[i] *= (ssdgs_real)(i % 3) / 2;
+        CHECK_L2(shot[1].value, shot[0].value, 12 * PIXELS, 1e-6, "tinted light");
+        CHECK(!memcmp(shot[1].value + 12 * PIXELS, shot[0].value + 12 * PIXELS,
+                      6 * PIXELS * sizeof(ssdgs_real)));
+        ssdgs_model_destroy(model);
+    }
+}
+
+/* ---- several ---- */
+
+/* A cloud in two parts equals the whole: sorting, blending, light maps, both networks. */
+static void test_parts(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light lights[2] = {point_light(2, -2, 2), point_light(-1, -2, 3)};
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    for (int kind = 0; kind < 2; kind++) {
+        ssdgs_settings s = kind ? ssdgs_settings_published() : small_settings();
+        s.transport = 0; /* light scatters within each part alone */
+        s.scattering.width = s.shadow.width = 16;
+        s.light_map.size = 96;
+        ssdgs_model *whole = cloud(&s, 0, 300, 0.5), *part[2];
+        part[0] = cloud(&s, 0, 130, 0.5);
+        part[1] = cloud(&s, 130, 170, 0.5);
+        ssdgs_object object[2] = {ssdgs_object_default(part[0]), ssdgs_object_default(part[1])};
+        alone(whole, &camera, lights, 2, &options, shot);
+        together(object, 2, &camera, lights, 2, &options, shot + 1);
+        CHECK(same(shot, shot + 1));
+        CHECK(shot[1].stats.gaussians == 300 && shot[1].stats.visible == shot->stats.visible);
+        together(object, 1, &camera, lights, 2, &options, shot + 1);
+        CHECK(!same(shot, shot + 1) && shot[1].stats.gaussians == 130);
+        ssdgs_model_destroy(whole);
+        for (int i = 0; i < 2; i++) ssdgs_model_destroy(part[i]);
+    }
+}
+
+/* Light that scatters within one of two that have it: as if the other, out of sight, were not there. */
+static void test_transport(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = {SSDGS_LIGHT_DIRECTIONAL, {(ssdgs_real)0.6, 0, (ssdgs_real)0.8}, {2, 2, 2}};
+    ssdgs_settings s = small_settings();
+    s.transport = 1;
+    s.light_map.size = 512;
+    ssdgs_model *far_one = cloud(&s, 0, 100, 0.05), *near_one = cloud(&s, 100, 300, 0.5);
+    ssdgs_object object[2] = {placed(far_one, 0, 1, 0, 0, -3, 1), ssdgs_object_default(near_one)};
+    together(object + 1, 1, &camera, &light, 1, NULL, shot);
+    together(object, 2, &camera, &light, 1, NULL, shot + 1);
+    CHECK(shot[1].stats.visible == shot[0].stats.visible && shot[1].stats.gaussians == 400);
+    CHECK_L2(shot[1].value + 9 * PIXELS, shot[0].value + 9 * PIXELS, 3 * PIXELS, 0.03,
+             "scattering in one of two");
+    ssdgs_model_destroy(far_one), ssdgs_model_destroy(near_one);
+}
+
+/* With every Gaussian within max_error each takes a colour, of its own object. */
+static void test_skipped(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_settings s = small_settings();
+    s.terms = SSDGS_DIFFUSE_TERM;
+    ssdgs_object object[3];
+    for (int i = 0; i < 3; i++) {
+        object[i] = ssdgs_object_default(cloud(&s, 100 * i, 100, 0.2));
+        object[i].to_world[3] = (ssdgs_real)(0.5 * i - 0.5);
+        for (int k = 0; k < 100; k++) { /* faint, turned to the light */
+            ssdgs_gaussian g;
+            CHECK(!ssdgs_model_get(object[i].model, k, &g));
+            g.opacity = (ssdgs_real)(k == 50 ? 0.9 : 0.02);
+            for (int c = 0; c < 3; c++) g.normal[c] = light.position[c];
+            CHECK(!ssdgs_model_set(object[i].model, k, &g));
+        }
+        for (int c = 0; c < 3; c++) object[i].tint[c] = (ssdgs_real)(c == i);
+    }
+    options.max_error = 1;
+    together(object, 3, &camera, &light, 1, &options, shot);
+    CHECK(shot->stats.shaded < 60 && shot->stats.skipped > 150);
+    options.max_error = 0;
+    together(object, 3, &camera, &light, 1, &options, shot + 1);
+    for (int i = 0; i < 3 * PIXELS; i++) CHECK((shot->value[i] > 0) == (shot[1].value[i] > 0));
+    for (int i = 0; i < 3; i++) ssdgs_model_destroy(object[i].model);
+}
+
+/* The product of two quaternions w x y z. */
+static void multiply(const double a[4], const ssdgs_real b[4], ssdgs_real out[4]) {
+    const double w = (double)b[0], x = (double)b[1], y = (double)b[2], z = (double)b[3];
+    out[0] = (ssdgs_real)(a[0] * w - a[1] * x - a[2] * y - a[3] * z);
+    out[1] = (ssdgs_real)(a[0] * x + a[1] * w + a[2] * z - a[3] * y);
+    out[2] = (ssdgs_real)(a[0] * y - a[1] * z + a[2] * w + a[3] * x);
+    out[3] = (ssdgs_real)(a[0] * z + a[1] * y - a[2] * x + a[3] * w);
+}
+
+/* Two placed clouds equal one model in which their Gaussians were moved. */
+static void test_merged(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_settings s = small_settings();
+    s.terms = SSDGS_ALL_TERMS & ~SSDGS_SCATTERING_TERM; /* networks see an object's own space */
+    s.shadow.layers = 0;
+    options.alpha_threshold = (ssdgs_real)1e-6;
+    options.stop = 0;
+    ssdgs_model *first = cloud(&s, 0, 200, 0.3), *second = cloud(&s, 200, 150, 0.3), *both = NULL;
+    /* a quarter of a turn about z, half the size */
+    const double root = sqrt(0.5), turn[4] = {root, 0, 0, root};
+    ssdgs_object object[2] = {ssdgs_object_default(first), ssdgs_object_default(second)};
+    memset(object[1].to_world, 0, sizeof object[1].to_world);
+    object[1].to_world[1] = (ssdgs_real)-0.5;
+    object[1].to_world[4] = object[1].to_world[10] = (ssdgs_real)0.5;
+    object[1].to_world[3] = (ssdgs_real)0.35, object[1].to_world[7] = (ssdgs_real)-0.5;
+    if (!CHECK(!ssdgs_model_create(context, &s, 350, &both))) exit(1);
+    for (int i = 0; i < 350; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(i < 200 ? first : second, i < 200 ? i : i - 200, &g));
+        if (i >= 200) {
+            const ssdgs_gaussian was = g;
+            to_world(object + 1, was.position, 0, g.position);
+            to_world(object + 1, was.normal, 1, g.normal);
+            multiply(turn, was.rotation, g.rotation);
+            for (int c = 0; c < 3; c++) g.scale[c] = was.scale[c] / 2;
+        }
+        CHECK(!ssdgs_model_set(both, i, &g));
+    }
+    /* the highlights' frames turn too, which setting a normal leaves to chance */
+    const ssdgs_model_view to = ssdgs_model_arrays(both),
+                           from[2] = {ssdgs_model_peek(first), ssdgs_model_peek(second)};
+    for (size_t i = 0; i < 350; i++) {
+        const ssdgs_model_view *v = from + (i >= 200);
+        ssdgs_real q[4], turned[4];
+        for (size_t c = 0; c < 4; c++)
+            q[c] = v->gaussians[(SSDGS_FRAME + c) * v->stride + i - (i < 200 ? 0 : 200)];
+        multiply(turn, q, turned);
+        for (size_t c = 0; c < 4; c++)
+            to.gaussians[(SSDGS_FRAME + c) * to.stride + i] = i < 200 ? q[c] : turned[c];
+    }
+    alone(both, &camera, &light, 1, &options, shot);
+    together(object, 2, &camera, &light, 1, &options, shot + 1);
+    for (int plane = 0; plane < PLANES; plane++)
+        CHECK_L2(shot[1].value + plane * PIXELS, shot[0].value + plane * PIXELS, PIXELS, real64 ? 1e-5 : 2e-3,
+                 "two objects in one model");
+    object[1] = ssdgs_object_default(second);
+    together(object, 2, &camera, &light, 1, &options, shot + 2);
+    double moved = 0, norm = 0;
+    for (int i = 0; i < 3 * PIXELS; i++) {
+        const double d = (double)(shot[2].value[i] - shot[0].value[i]);
+        moved += d * d, norm += (double)(shot[0].value[i] * shot[0].value[i]);
+    }
+    CHECK(moved > 0.01 * norm); /* which a wrong transform would show */
+    ssdgs_model_destroy(first), ssdgs_model_destroy(second), ssdgs_model_destroy(both);
+}
+
+/* Objects whose highlights differ are lit one by one: behind the first, what the second sends is dimmed by
+   what the first lets through. Components still add up, and diffuse is what it is alone. */
+static void test_materials(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light lights[2] = {point_light(2, -2, 2), point_light(-2, -1, 1)};
+    ssdgs_settings s = small_settings(), published = ssdgs_settings_published();
+    published.transfer = s.transfer;
+    published.scattering.width = published.shadow.width = 16;
+    for (int kind = 0; kind < 2; kind++) { /* two deferred ones, or one that shades its Gaussians */
+        ssdgs_render_options options = ssdgs_render_options_exact();
+        options.stop = 0;
+        if (!kind) { /* three, of which no two overlap: the sum of each alone */
+            ssdgs_object three[3];
+            ssdgs_image image = planes_of(shot + 1);
+            memset(shot[0].value, 0, sizeof shot[0].value);
+            options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+            for (int i = 0; i < 3; i++) {
+                three[i] = ssdgs_object_default(cloud(&s, 10 * i, 10, 0.03));
+                three[i].to_world[3] = (ssdgs_real)(0.25 - 0.1 * (i - 1));
+                three[i].to_world[11] = (ssdgs_real)0.2; /* in the middle of a tile */
+                ssdgs_model_arrays(three[i].model).asg_sharpness[0] += (ssdgs_real)i;
+                CHECK(!ssdgs_scene_render(scene, three + i, 1, &camera, lights, 2, &options, &image, NULL));
+                for (int v = 0; v < 3 * PIXELS; v++) shot[0].value[v] += shot[1].value[v];
+            }
+            CHECK(!ssdgs_scene_render(scene, three, 3, &camera, lights, 2, &options, &image, NULL));
+            CHECK_L2(shot[1].value, shot[0].value, 3 * PIXELS, 0.01, "three materials");
+            for (int i = 0; i < 3; i++) ssdgs_model_destroy(three[i].model);
+        }
+        ssdgs_model *front = cloud(&s, 0, 60, 0.2), *back = cloud(kind ? &published : &s, 500, 200, 0.3);
+        ssdgs_object object[2] = {ssdgs_object_default(back), ssdgs_object_default(front)};
+        ssdgs_model_view v = ssdgs_model_arrays(back);
+        for (size_t i = 0; i < SSDGS_ASG_COUNT; i++) v.asg_sharpness[2 * i] -= 1;
+        object[1].to_world[3] = (ssdgs_real)0.2, object[1].to_world[7] = (ssdgs_real)-1;
+        options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+        together(object, 1, &camera, lights, 2, &options, shot);
+        together(object + 1, 1, &camera, lights, 2, &options, shot + 1);
+        together(object, 2, &camera, lights, 2, &options, shot + 2);
+        double mixed = 0;
+        for (int i = 0; i < 3 * PIXELS; i++) {
+            const ssdgs_real through = 1 - shot[1].value[15 * PIXELS + i / 3];
+            mixed += (double)(through * (1 - through) * shot[0].value[i]);
+            shot[0].value[i] = shot[1].value[i] + through * shot[0].value[i];
+        }
+        CHECK(mixed > 1);
+        CHECK_L2(shot[2].value, shot[0].value, 3 * PIXELS, real64 ? 1e-12 : 1e-5, "one behind another");
+        options.terms = SSDGS_ALL_TERMS;
+        if (!kind) { /* where one alone is seen, its shadow is what it is when both are of one material */
+            const ssdgs_object twins[2] = {ssdgs_object_default(cloud(&s, 500, 200, 0.3)), object[1]};
+            together(object + 1, 1, &camera, lights, 2, &options, shot);
+            together(twins, 2, &camera, lights, 2, &options, shot + 1);
+            together(object, 2, &camera, lights, 2, &options, shot + 2);
+            double seen = 0;
+            for (int i = 0; i < PIXELS; i++) {
+                const ssdgs_real *alpha = shot[0].value + 15 * PIXELS + i;
+                if (*alpha > 0 && *alpha < shot[1].value[15 * PIXELS + i]) continue;
+                const double d = (double)(shot[2].value[17 * PIXELS + i] - shot[1].value[17 * PIXELS + i]);
+                CHECK(fabs(d) < (real64 ? 1e-9 : 1e-4));
+                seen += (double)(*alpha > 0);
+            }
+            CHECK(seen > 20);
+            ssdgs_model_destroy(twins[0].model);
+        }
+        together(object, 2, &camera, lights, 2, &options, shot);
+        for (int i = 0; i < 3 * PIXELS; i++)
+            shot[1].value[i] =
+                shot[0].value[3 * PIXELS + i] + shot[0].value[6 * PIXELS + i] + shot[0].value[9 * PIXELS + i];
+        CHECK_L2(shot[1].value, shot[0].value, 3 * PIXELS, real64 ? 1e-12 : 1e-5, "the components' sum");
+        ssdgs_image image = planes_of(shot + 2);
+        image.diffuse = image.specular = image.scattering = image.normal = image.shadow = image.depth = NULL;
+        CHECK(!ssdgs_scene_render(scene, object, 2, &camera, lights, 2, &options, &image, NULL));
+        CHECK(!memcmp(shot[2].value, shot[0].value, 3 * PIXELS * sizeof(ssdgs_real)));
+        options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+        together(object, 2, &camera, lights, 2, &options, shot + 1);
+        if (!kind)
+            CHECK_L2(shot[0].value + 3 * PIXELS, shot[1].value, 3 * PIXELS, real64 ? 1e-9 : 1e-4,
+                     "the diffuse component");
+        CHECK_L2(shot[0].value + 17 * PIXELS, shot[1].value + 17 * PIXELS, PIXELS, real64 ? 1e-9 : 1e-4,
+                 "the shadow component");
+        for (int i = 0; i < PIXELS; i++)
+            CHECK(shot[0].value[17 * PIXELS + i] <= shot[0].value[15 * PIXELS + i] + (ssdgs_real)1e-5);
+        ssdgs_model_destroy(front), ssdgs_model_destroy(back);
+    }
+}
+
+/* A plate between the light and a ball of another model takes the ball's light. */
+static void test_shadows(void) {
+    const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
+    const ssdgs_light light = point_light(0, 0, 4);
+    ssdgs_settings s = small_settings();
+    s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    s.shadow.layers = 0;
+    ssdgs_model *ball = cloud(&s, 0, 200, 0.3), *plate = NULL;
+    if (!CHECK(!ssdgs_model_create(context, &s, 1, &plate))) exit(1);
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    g.scale[0] = g.scale[1] = (ssdgs_real)0.6;
+    g.opacity = (ssdgs_real)0.999;
+    for (int c = 0; c < 3; c++) g.diffuse[c] = 0; /* it darkens the picture in no other way */
+    CHECK(!ssdgs_model_set(plate, 0, &g));
+    ssdgs_object object[2] = {ssdgs_object_default(ball), ssdgs_object_default(plate)};
+    object[1].to_world[11] = 1;
+    double lit[2] = {0, 0};
+    for (int count = 1; count <= 2; count++) {
+        together(object, count, &camera, &light, 1, NULL, shot);
+        for (int i = SIDE * SIDE / 3; i < PIXELS; i++) lit[count - 1] += (double)shot->value[3 * i];
+    }
+    CHECK(lit[0] > 1 && lit[1] < 0.05 * lit[0]);
+    object[1].to_world[3] = 3; /* aside */
+    together(object, 2, &camera, &light, 1, NULL, shot);
+    lit[1] = 0;
+    for (int i = SIDE * SIDE / 3; i < PIXELS; i++) lit[1] += (double)shot->value[3 * i];
+    CHECK(fabs(lit[1] / lit[0] - 1) < 0.1);
+    ssdgs_model_destroy(ball), ssdgs_model_destroy(plate);
+}
+
+/* A plain splat file's colours among linear ones are decoded. */
+static void test_baked(void) {
+    const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
+    const ssdgs_light light = point_light(0, -3, 1);
+    ssdgs_settings s = small_settings();
+    s.baked = 1;
+    s.transfer = SSDGS_TRANSFER_NONE;
+    ssdgs_model *plain = NULL;
+    if (!CHECK(!ssdgs_model_create(context, &s, 1, &plain))) exit(1);
+    s.baked = 0;
+    s.transfer = SSDGS_TRANSFER_SRGB;
+    ssdgs_model *lit = cloud(&s, 0, 100, 0.1);
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)0.1, g.diffuse[c] = (ssdgs_real)(0.25 * (c + 1));
+    g.opacity = (ssdgs_real)0.9;
+    CHECK(!ssdgs_model_set(plain, 0, &g));
+    ssdgs_object object[2] = {ssdgs_object_default(plain), ssdgs_object_default(lit)};
+    object[1].to_world[3] = (ssdgs_real)0.6;
+    together(object, 1, &camera, &light, 1, NULL, shot);
+    together(object, 2, &camera, &light, 1, NULL, shot + 1);
+    const int middle = SIDE / 2 * SIDE + SIDE / 2;
+    for (int c = 0; c < 3; c++) {
+        const ssdgs_real alpha = shot->value[15 * PIXELS + middle],
+                         stored = shot->value[3 * middle + c] / alpha,
+                         linear = shot[1].value[3 * middle + c] / alpha;
+        CHECK(fabs((double)(stored - (ssdgs_real)(0.25 * (c + 1)))) < 1e-5);
+        CHECK(fabs((double)(linear - ssdgs_srgb_decode((ssdgs_real)(0.25 * (c + 1))))) < 1e-5);
+    }
+    ssdgs_model_destroy(plain), ssdgs_model_destroy(lit);
+}
+
+/* ---- what is kept, and what is not ---- */
+
+static void test_kept(void) {
+    ssdgs_settings s = small_settings();
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_light lights[2] = {point_light(2, -2, 2), point_light(-2, -1, 1)};
+    ssdgs_model *model[2] = {cloud(&s, 0, 200, 0.3), cloud(&s, 200, 100, 0.3)};
+    ssdgs_object object[3] = {ssdgs_object_default(model[0]), placed(model[1], 1, 0.5, 0, 0.5, 0, 0),
+                              placed(model[0], 2, 0.5, 1, -0.5, 0, 0)};
+    const ssdgs_render_options options = ssdgs_render_options_default();
+    together(object, 3, &camera, lights, 2, &options, shot);
+    CHECK(!shot->stats.camera_cached && !shot->stats.lights_cached && shot->stats.gaussians == 500);
+    for (int frame = 0; frame < 2; frame++) {
+        together(object, 3, &camera, lights, 2, &options, shot + 1);
+        CHECK(same(shot, shot + 1) && shot[1].stats.camera_cached && shot[1].stats.lights_cached == 2);
+    }
+    CHECK(shot[1].stats.shadows_cached > 0);
+    lights[1].position[0] += (ssdgs_real)0.1;
+    together(object, 3, &camera, lights, 2, &options, shot + 1);
+    CHECK(shot[1].stats.camera_cached && shot[1].stats.lights_cached == 1);
+    /* of each change, what a new scene makes of it */
+    for (int change = 0; change < 5; change++) {
+        if (change == 0) object[2].to_world[3] += (ssdgs_real)0.01;
+        if (change == 1) ssdgs_model_arrays(model[1]).gaussians[0] += (ssdgs_real)0.01;
+        if (change == 4) {
+            object[1] = placed(model[1], 1.5, 0.5, 0, 0.5, 0, 0);
+            together(object, 2, &camera, lights, 2, &options, shot + 1);
+            object[1] = placed(model[1], 1.6, 0.5, 0, 0.5, 0, 0);
+        }
+        if (change == 2) {
+            const ssdgs_object swap = object[0];
+            object[0] = object[2];
+            object[2] = swap;
+        }
+        together(object, change > 2 ? 2 : 3, &camera, lights, 2, &options, shot + 1);
+        CHECK(!shot[1].stats.camera_cached && !shot[1].stats.lights_cached);
+        ssdgs_scene *other = NULL;
+        const ssdgs_image image = planes_of(shot + 2);
+        CHECK(!ssdgs_scene_create(context, &other));
+        CHECK(!ssdgs_scene_render(other, object, change > 2 ? 2 : 3, &camera, lights, 2, &options, &image,
+                                  NULL));
+        CHECK(same(shot + 1, shot + 2) && !same(shot, shot + 1));
+        ssdgs_scene_destroy(other);
+    }
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(model[i]);
+    together(NULL, 0, &camera, lights, 2, &options, shot); /* and of models that are gone nothing is asked */
+    CHECK(shot->stats.gaussians == 0 && shot->value[15 * PIXELS] == 0);
+}
+
+static size_t held, most;
+static void *count_allocate(void *user, size_t bytes) {
+    size_t *memory = (size_t *)malloc(bytes + 16);
+    (void)user;
+    if (!memory) return NULL;
+    *memory = bytes;
+    held += bytes;
+    most = held > most ? held : most;
+    return memory + 16 / sizeof *memory;
+}
+static void count_release(void *user, void *memory) {
+    size_t *from = (size_t *)memory - 16 / sizeof *from;
+    (void)user;
+    held -= *from;
+    free(from);
+}
+
+/* Any number of threads; nothing allocated from the second frame on, though things move; a model that stands
+   in many places is there once. */
+static void test_threads_and_memory(void) {
+    ssdgs_settings s = small_settings();
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    ssdgs_context *was = context;
+    ssdgs_scene *was_scene = scene;
+    for (int threads = 1; threads <= 5; threads += 4) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.threads = threads;
+        desc.allocator.allocate = count_allocate;
+        desc.allocator.release = count_release;
+        CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene));
+        ssdgs_model *model[2] = {cloud(&s, 0, 1500, 0.3), cloud(&s, 200, 100, 0.3)};
+        const size_t models = held;
+        ssdgs_object object[6];
+        for (int i = 0; i < 6; i++)
+            object[i] = placed(model[i % 2], i, 0.3 + 0.1 * i, i & 1, 0.2 * i - 0.5, 0.1 * i, 0);
+        together(object, 6, &camera, &light, 1, NULL, shot + threads / 5);
+        const size_t after = held;
+        for (int i = 0; i < 6; i++) object[i].tint[0] = (ssdgs_real)0.5;
+        together(object, 6, &camera, &light, 1, NULL, shot + 2);
+        CHECK(held == after && most == after && models > 0);
+        ssdgs_scene_destroy(scene);
+        ssdgs_model_destroy(model[0]), ssdgs_model_destroy(model[1]);
+        ssdgs_context_destroy(context);
+        CHECK(held == 0);
+        most = 0;
+    }
+    CHECK(same(shot, shot + 1));
+    context = was, scene = was_scene;
+}
+
+/* ---- extremes ---- */
+
+static int finite_picture(const picture *p) {
+    int ok = 1;
+    for (int i = 0; i < VALUES; i++) ok &= test_finite((double)p->value[i]);
+    return ok;
+}
+
+static void refused(const ssdgs_object *objects, int count, const char *word) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_image image = planes_of(shot);
+    CHECK(ssdgs_scene_render(scene, objects, count, &camera, NULL, 0, NULL, &image, NULL) != SSDGS_OK);
+    if (!CHECK(strstr(ssdgs_error_message(context), word) != NULL))
+        printf("    %s\n", ssdgs_error_message(context));
+}
+
+static void test_refused(void) {
+    ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 10, 0.3);
+    s.transfer = SSDGS_TRANSFER_NONE;
+    ssdgs_model *stored = cloud(&s, 0, 10, 0.3), *foreign = NULL;
+    ssdgs_context *other = NULL;
+    CHECK(!ssdgs_context_create(NULL, &other) && !ssdgs_model_create(other, NULL, 1, &foreign));
+    const ssdgs_object good = ssdgs_object_default(model);
+    ssdgs_object object[2] = {good, good};
+    refused(NULL, 1, "1 objects, but the array is NULL");
+    refused(object, -1, "-1 objects");
+    object[1].model = NULL, refused(object, 2, "object 1: its model is NULL");
+    object[1].model = foreign, refused(object, 2, "object 1: its model is of another context");
+    object[1].model = stored, refused(object, 2, "object 1: its settings.transfer");
+    object[1] = good, object[1].to_world[3] = (ssdgs_real)NAN;
+    refused(object, 2, "object 1: to_world[3] is not finite");
+    object[1] = good, memset(object[1].to_world, 0, sizeof good.to_world);
+    refused(object, 2, "object 1: to_world's scale is 0");
+    object[1] = good, object[1].to_world[0] = (ssdgs_real)1.01;
+    refused(object, 2, "object 1: to_world is not a rotation times one scale");
+    object[1] = good, object[1].to_world[1] = (ssdgs_real)0.01;
+    refused(object, 2, "object 1: to_world is not a rotation times one scale");
+    object[1] = good, object[1].tint[2] = -1, refused(object, 2, "object 1: tint[2] = -1");
+    object[1] = good;
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_image image = planes_of(shot);
+    CHECK(ssdgs_scene_render(NULL, object, 2, &camera, NULL, 0, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_render(scene, object, 2, NULL, NULL, 0, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_render(scene, object, 2, &camera, NULL, 0, NULL, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_create(NULL, &scene) == SSDGS_ERR_ARGUMENT && !scene);
+    CHECK(ssdgs_scene_create(context, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(!ssdgs_scene_create(context, &scene));
+    ssdgs_scene_destroy(NULL);
+    ssdgs_model_arrays(stored).shadow[0] = (ssdgs_real)NAN;
+    object[0] = ssdgs_object_default(stored);
+    refused(object, 1, "the shadow network is not finite");
+    ssdgs_model_destroy(model), ssdgs_model_destroy(stored), ssdgs_model_destroy(foreign);
+    ssdgs_context_destroy(other);
+}
+
+static void test_extremes(void) {
+    ssdgs_settings s = small_settings();
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_light lights[60];
+    ssdgs_model *model = cloud(&s, 0, 100, 0.3), *empty = NULL;
+    CHECK(!ssdgs_model_create(context, &s, 0, &empty));
+    for (int i = 0; i < 60; i++) lights[i] = point_light(2 * cos(0.1 * i), 2 * sin(0.1 * i), 1 + 0.02 * i);
+    ssdgs_object object[3] = {ssdgs_object_default(model), ssdgs_object_default(empty),
+                              ssdgs_object_default(model)};
+    together(object, 1, &camera, lights, 1, NULL, shot);
+    together(object, 2, &camera, lights, 1, NULL, shot + 1);
+    CHECK(same(shot, shot + 1)); /* nobody misses an empty one */
+    together(object + 1, 1, &camera, lights, 1, NULL, shot + 1);
+    CHECK(finite_picture(shot + 1) && shot[1].value[15 * PIXELS] == 0);
+    object[1] = object[2];
+    for (int i = 0; i < 5; i++) { /* behind the camera, far away, tiny, huge, at the same place */
+        static const double scale[5] = {1, 1, 1e-9, 1e9, 1}, away[5] = {9, 1e6, 0, 0, 0};
+        object[1] = placed(model, 0.3, scale[i], 0, 0.4 * away[i], -2.2 * away[i], 0.8 * away[i]);
+        together(object, 2, &camera, lights, 2, NULL, shot + 1);
+        CHECK(finite_picture(shot + 1) && (i == 3 || shot[1].stats.visible >= shot->stats.visible));
+        if (i == 0) CHECK(shot[1].stats.visible == shot->stats.visible);
+    }
+    /* a tiny one close by, beside which the others are far: cameras that name no near plane serve the least
+     */
+    object[0] = placed(model, 0.3, 1e-3, 0, 0, 0, 0);
+    object[1] = placed(model, 0.3, 1, 0, 0, 9, 0);
+    const ssdgs_camera close = camera_from(4e-4, -2.2e-3, 8e-4);
+    together(object, 2, &close, lights, 1, NULL, shot + 1);
+    CHECK(shot[1].value[15 * PIXELS + PIXELS / 2 + SIDE / 2] > (ssdgs_real)0.1);
+    object[0] = ssdgs_object_default(model);
+    object[1] = placed(model, 0.3, 0.5, 0, 0.3, 0, 0);
+    for (int count = 0; count <= 60; count += 60) {
+        together(object, 2, &camera, lights, count, NULL, shot + 1);
+        CHECK(finite_picture(shot + 1) && (shot[1].value[3 * (PIXELS + SIDE) / 2] > 0) == (count > 0));
+    }
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t i = 0; i < 10; i++) v.gaussians[i % 3 * v.stride + i] = (ssdgs_real)NAN;
+    together(object, 2, &camera, lights, 2, NULL, shot + 1);
+    CHECK(finite_picture(shot + 1) && shot[1].stats.rejected == 20);
+    ssdgs_model_destroy(model), ssdgs_model_destroy(empty);
+}
+
+int main(void) {
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_scene_create(context, &scene)))
+        return 1;
+    test_identity();
+    test_moved();
+    test_tint();
+    test_parts();
+    test_transport();
+    test_skipped();
+    test_merged();
+    test_materials();
+    test_shadows();
+    test_baked();
+    test_kept();
+    test_threads_and_memory();
+    test_refused();
+    test_extremes();
+    ssdgs_scene_destroy(scene);
+    ssdgs_context_destroy(context);
+    TEST_END();
+}
