@@ -18,12 +18,13 @@ DO THIS
         static ssdgs_real color[64 * 64 * 3], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 64, 64);
         ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}};
-        ssdgs_image image = {0, color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+        static ssdgs_image image;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
         ssdgs_result result = ssdgs_context_create(NULL, &context);
         if (!result && argc > 1) result = ssdgs_model_load(context, argv[1], &model, NULL);
         if (!result && argc <= 1) result = ssdgs_model_create(context, NULL, 1, &model);
+        image.color = color;
         if (!result) result = ssdgs_render(model, &camera, &light, 1, &image);
         if (result) printf("%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(context));
         ssdgs_model_destroy(model);
@@ -390,18 +391,23 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
 
 /* ---- render ---- */
 
-/* Where results go. Planes are the caller's; NULL = not computed. Colours are linear, not clamped
-   (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background = color. */
+/* Where results go. Set all to 0 first. Planes are the caller's; NULL = not computed. Colours are linear, not
+   clamped (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background =
+   color. */
 typedef struct ssdgs_image {
-    int stride;             /* pixels from row to row; 0 = camera width */
-    ssdgs_real *color;      /* (h,w,3) */
-    ssdgs_real *alpha;      /* (h,w) */
-    ssdgs_real *depth;      /* (h,w) sum of weight x camera depth: divide by alpha */
-    ssdgs_real *normal;     /* (h,w,3) sum of weight x normal, world */
-    ssdgs_real *diffuse;    /* (h,w,3) */
-    ssdgs_real *specular;   /* (h,w,3) */
-    ssdgs_real *scattering; /* (h,w,3) */
-    ssdgs_real *shadow;     /* (h,w) sum of weight x S, averaged over the lights */
+    int stride;               /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;        /* (h,w,3) */
+    ssdgs_real *alpha;        /* (h,w) */
+    ssdgs_real *depth;        /* (h,w) sum of weight x camera depth: divide by alpha */
+    ssdgs_real *normal;       /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;      /* (h,w,3) */
+    ssdgs_real *specular;     /* (h,w,3) */
+    ssdgs_real *scattering;   /* (h,w,3) */
+    ssdgs_real *shadow;       /* (h,w) sum of weight x S, averaged over the lights */
+    ssdgs_real *median_depth; /* (h,w) camera depth at which half of what is behind is hidden; 0: nowhere */
+    const ssdgs_real
+        *scene_depth; /* (h,w), read: camera depth of what else is in the picture; Gaussians whose
+                         centres are not nearer are not blended there. NULL: nothing else */
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
@@ -478,12 +484,16 @@ SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 /* Clamps, encodes by transfer and rounds (count) values to bytes, at most one level off. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
-typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8 } ssdgs_format;
-/* color and alpha of a rendering without background as 4-byte pixels of straight alpha; without image->alpha
-   opaque. pitch: bytes from row to row, negative where `pixels` is the first row of an image stored bottom
-   row first. */
+typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8, SSDGS_RGBA16F, SSDGS_RGBA32F } ssdgs_format;
+/* color and alpha of a rendering without background as pixels of straight alpha; without image->alpha opaque.
+   Bytes are encoded by transfer, halves and floats stay linear. pitch: bytes from row to row, negative where
+   `pixels` is the first row of an image stored bottom row first. */
 SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
                                ssdgs_format format, void *pixels, ptrdiff_t pitch);
+/* Lays such a rendering over a framebuffer: pixels become color + (1 - alpha) x what they hold, by light, so
+   bytes are decoded and encoded again. Where alpha is 0 they stay as they are. */
+SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                                  ssdgs_format format, void *pixels, ptrdiff_t pitch);
 /* Stored values (pixels,3) of such a rendering laid over `background`, stored values too. stored may be
    color. */
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
@@ -834,10 +844,13 @@ typedef struct ssdgs_frame {
     ssdgs_real *diffuse, *specular, *scattering, *normal,
         *shadow; /* (n, 4) each; shadow: S, depth; NULL: light is deferred */
     /* SSDGS_STAGE_COMPOSITE */
-    ssdgs_real *pixels;        /* (3, h, w) without background */
-    ssdgs_real *layer_pixels;  /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
-                                  nothing is; for  components and training */
-    ssdgs_real *transmittance; /* (h, w) */
+    ssdgs_real *pixels;            /* (3, h, w) without background */
+    ssdgs_real *layer_pixels;      /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
+                                      nothing is; for  components and training */
+    ssdgs_real *transmittance;     /* (h, w) */
+    ssdgs_real *median_depth;      /* (h, w) as in ssdgs_image; NULL: not asked for */
+    const ssdgs_real *scene_depth; /* (h, stride) as in ssdgs_image; for WALK and COMPOSITE */
+    int stride;
     ssdgs_real *pixel_visibility,
         *pixel_shadow;    /* (lights, h, w) v, S where light is deferred; as layer_pixels */
     int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
@@ -1111,7 +1124,9 @@ typedef struct ssdgs__tile {
     int cue, flux, orthographic;        /* whether the light pass finds them */
     ssdgs_light_pixel *light_map;       /* of the tile, or NULL */
     const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
-    const uint16_t *material_of;        /* NULL: layers are those of all; else of `material` alone */
+    const ssdgs_real *scene_depth;      /* [micro-tile][16 lanes] entries must be nearer, or NULL */
+    ssdgs_real *median;          /* [micro-tile][16 lanes] where transmittance falls below 1/2, or NULL */
+    const uint16_t *material_of; /* NULL: layers are those of all; else of `material` alone */
     int material;
 } ssdgs__tile;
 
@@ -2702,7 +2717,7 @@ typedef struct ssdgs__cache {
     int objects; /* how many; -1: nothing is kept */
     ssdgs_camera camera;
     ssdgs_render_options options;
-    int terms, light_count;
+    int terms, light_count, hidden; /* hidden: by scene_depth */
     int camera_ready, lights_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
 } ssdgs__cache;
@@ -2730,7 +2745,7 @@ typedef struct ssdgs__frame_memory {
 /* Of a context: every frame writes it anew. */
 typedef struct ssdgs__scratch {
     ssdgs__buffer shaded, color, component[5], pixels, transmittance, layers, layer_pixels, pixel_visibility,
-        pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, activations, scratch;
+        pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, activations, scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
         splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals;
 } ssdgs__scratch;
@@ -3272,7 +3287,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
     cache->bounds_ready = cache->bounds_ready && known;
     known = known && !memcmp(&now->stop, &old->stop, sizeof now->stop);
-    cache->camera_ready = cache->camera_ready && known && a->width == b->width && a->height == b->height &&
+    cache->camera_ready = cache->camera_ready && known && !frame->scene_depth && !cache->hidden &&
+                          a->width == b->width && a->height == b->height &&
                           now->antialias == old->antialias &&
                           !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
                           !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
@@ -3294,6 +3310,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
         lights[i].light = *light;
     }
     cache->camera = *a;
+    cache->hidden = frame->scene_depth != NULL;
     cache->options = *now;
     cache->terms = frame->terms;
     cache->light_count = frame->light_count;
@@ -3488,12 +3505,30 @@ static ssdgs_result ssdgs__materials(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
+/* What a frame is to show. */
+typedef struct ssdgs__request {
+    const ssdgs_object *objects;
+    int object_count;
+    const ssdgs_camera *camera;
+    const ssdgs_light *lights;
+    int light_count;
+    const ssdgs_render_options *options; /* NULL: default */
+    const ssdgs_image *image;            /* NULL: nothing but pixels */
+    int components, training;
+} ssdgs__request;
+
+static int ssdgs__components_asked(const ssdgs_image *image) {
+    return image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
+           image->depth;
+}
+
 /* Points the frame's arrays of size n, its image planes and its views at memory. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *context,
-                                       ssdgs__frame_memory **memory, const ssdgs_object *objects,
-                                       int object_count, const ssdgs_camera *camera,
-                                       const ssdgs_light *lights, int light_count,
-                                       const ssdgs_render_options *options, int components, int training) {
+                                       ssdgs__frame_memory **memory, const ssdgs__request *request) {
+    const ssdgs_camera *camera = request->camera;
+    const ssdgs_image *image = request->image;
+    const int light_count = request->light_count, training = request->training;
+    const int components = request->components || (image && ssdgs__components_asked(image));
     ssdgs__frame_memory *m;
     ssdgs__scratch *w;
     if (!*memory) *memory = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
@@ -3502,11 +3537,16 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     m = *memory;
     w = context->scratch;
     memset(frame, 0, sizeof *frame);
-    frame->options = options ? *options : ssdgs_render_options_default();
+    frame->options = request->options ? *request->options : ssdgs_render_options_default();
     ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
     if (!result) result = ssdgs__camera_check(context, camera);
-    if (!result) result = ssdgs__lights_check(context, lights, light_count);
+    if (!result) result = ssdgs__lights_check(context, request->lights, light_count);
     if (result) return result;
+    frame->stride = image && image->stride ? image->stride : camera->width;
+    if (frame->stride < camera->width)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d",
+                           frame->stride, camera->width);
+    frame->scene_depth = image ? image->scene_depth : NULL;
     for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
@@ -3514,13 +3554,13 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->memory = m;
     frame->scratch = w;
     frame->camera = *camera;
-    frame->lights = lights;
+    frame->lights = request->lights;
     frame->training = training;
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
     int same;
-    result = ssdgs__place_all(frame, objects, object_count, light_count, &same);
+    result = ssdgs__place_all(frame, request->objects, request->object_count, light_count, &same);
     if (result) return result;
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
@@ -3609,6 +3649,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     }
     SSDGS__RESERVE(w->pixels, frame->pixels, ssdgs_real, pixels * 3);
     SSDGS__RESERVE(w->transmittance, frame->transmittance, ssdgs_real, pixels);
+    if (image && image->median_depth) SSDGS__RESERVE(w->median, frame->median_depth, ssdgs_real, pixels);
     if (training) {
         SSDGS__RESERVE(w->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 4);
         SSDGS__RESERVE(w->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
@@ -3625,8 +3666,9 @@ static ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ssdgs_model *model
                                           const ssdgs_light *lights, int light_count,
                                           const ssdgs_render_options *options, int components, int training) {
     const ssdgs_object object = ssdgs_object_default(model);
-    return ssdgs__frame_begin(frame, model->context, &model->frame, &object, 1, camera, lights, light_count,
-                              options, components, training);
+    const ssdgs__request request = {&object, 1,    camera,     lights,  light_count,
+                                    options, NULL, components, training};
+    return ssdgs__frame_begin(frame, model->context, &model->frame, &request);
 }
 
 /* ==== >>project  records, order, instances, tile lists ==== */
@@ -3972,9 +4014,22 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
         v->light >= 0 &&
         (v[-1].light == v->light || (v + 1 < frame->views + frame->view_count && v[1].light == v->light));
     t.of_gaussian = shared ? NULL : v->of_gaussian;
+    t.scene_depth = NULL;
     t.material_of = NULL;
+    t.median = NULL;
     t.material = 0;
     return t;
+}
+
+/* The tile's part of scene_depth, if there is one, into 256 values. */
+static void ssdgs__tile_scene_depth(const ssdgs_frame *frame, ssdgs__tile *tile, ssdgs_real *values) {
+    if (!frame->scene_depth) return;
+    for (int i = 0; i < 256; i++) {
+        const int x = tile->x + (i / 16 & 3) * 4 + (i & 3), y = tile->y + i / 64 * 4 + (i % 16 >> 2);
+        const int inside = x < tile->width && y < tile->height;
+        values[i] = inside ? frame->scene_depth[(size_t)y * (size_t)frame->stride + (size_t)x] : 0;
+    }
+    tile->scene_depth = values;
 }
 
 static void ssdgs__walk_task(void *data, int index) {
@@ -3984,10 +4039,12 @@ static void ssdgs__walk_task(void *data, int index) {
         index -= v->cached ? 0 : v->tiles_x * v->tiles_y;
     ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
-    if (v->light < 0)
+    ssdgs_real scene_depth[256];
+    if (v->light < 0) {
+        ssdgs__tile_scene_depth(frame, &tile, scene_depth);
         frame->context->k->walk_camera(&tile, v->tile_seen + v->tile_start[index],
                                        v->tile_needed ? v->tile_needed + v->tile_start[index] : NULL);
-    else frame->context->k->walk_light(&tile, v->tile_sums + (size_t)v->tile_start[index] * 4);
+    } else frame->context->k->walk_light(&tile, v->tile_sums + (size_t)v->tile_start[index] * 4);
 }
 
 typedef struct ssdgs__gather_job {
@@ -5523,6 +5580,14 @@ static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile,
     ssdgs__tile_store(tile, visibility + 16 * given, 2 - given, 0, planes + given);
 }
 
+/* [micro-tile][16 lanes] to the plane. */
+static void ssdgs__median_store(const ssdgs_frame *frame, const ssdgs__tile *tile) {
+    ssdgs_real values[SSDGS__TILE_LAYER], *const planes[1] = {frame->median_depth};
+    for (int micro = 0; micro < 16; micro++)
+        memcpy(values + 64 * micro, tile->median + 16 * micro, 16 * sizeof *values);
+    ssdgs__tile_store(tile, values, 1, 0, planes);
+}
+
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -5533,10 +5598,18 @@ static void ssdgs__composite_task(void *data, int index) {
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
+    ssdgs_real scene_depth[256], median[256];
+    ssdgs__tile_scene_depth(frame, &tile, scene_depth);
+    if (job->color == frame->color && frame->median_depth) {
+        memset(median, 0, sizeof median);
+        tile.median = median;
+    }
     if (job->deferred) tile.material_of = frame->material_of;
     tile.material = ssdgs__material_after(&tile, -1);
     for (int later = 0; tile.material >= 0; later = 1) {
         frame->context->k->composite(&tile, layers, color, pixels);
+        if (tile.median) ssdgs__median_store(frame, &tile);
+        tile.median = NULL;
         if (job->deferred && layers == 1)
             memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
         for (int layer = 0; job->deferred && layer < SSDGS__LIGHT_LAYER; layer++)
@@ -5897,19 +5970,11 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     }
 }
 
-static int ssdgs__components_asked(const ssdgs_image *image) {
-    return image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
-           image->depth;
-}
-
 /* Runs the stages of a frame that has begun and fills the image. */
 static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_context *context = frame->context;
     const ssdgs_camera *camera = &frame->camera;
-    const int stride = image->stride ? image->stride : camera->width;
-    if (stride < camera->width)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d", stride,
-                           camera->width);
+    const int stride = frame->stride;
     const ssdgs_result result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
@@ -5917,6 +5982,8 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
         ssdgs__write_rows(frame, frame->pixels, 3, stride, frame->options.background, image->color);
     size_t i;
     int y;
+    if (image->median_depth)
+        ssdgs__write_rows(frame, frame->median_depth, 1, stride, NULL, image->median_depth);
     if (image->alpha)
         for (y = 0, i = 0; y < camera->height; y++)
             for (int x = 0; x < camera->width; x++, i++)
@@ -5947,8 +6014,9 @@ static ssdgs_result ssdgs__render_model(ssdgs_model *model, const ssdgs_camera *
                                         ssdgs_render_stats *stats) {
     ssdgs_frame frame;
     if (!camera || !image) return ssdgs__null(model->context, "ssdgs_render", camera ? "image" : "camera");
-    const ssdgs_result result = ssdgs__frame_of_model(&frame, model, camera, lights, light_count, options,
-                                                      ssdgs__components_asked(image), 0);
+    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs__request request = {&object, 1, camera, lights, light_count, options, image, 0, 0};
+    const ssdgs_result result = ssdgs__frame_begin(&frame, model->context, &model->frame, &request);
     return result ? result : ssdgs__render(&frame, image, stats);
 }
 
@@ -6017,9 +6085,8 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     if (result) return result;
     if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
     if (!result) result = ssdgs__objects_check(context, objects, object_count);
-    if (!result)
-        result = ssdgs__frame_begin(&frame, context, &scene->frame, objects, object_count, camera, lights,
-                                    light_count, options, ssdgs__components_asked(image), 0);
+    const ssdgs__request request = {objects, object_count, camera, lights, light_count, options, image, 0, 0};
+    if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
     return ssdgs__leave(context, result);
 }
@@ -6085,25 +6152,108 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
     }
 }
 
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                               ssdgs_format format, void *pixels, ptrdiff_t pitch) {
-    const int red = format == SSDGS_BGRA8 ? 2 : 0;
+/* IEEE half precision, to the nearest, ties to even. */
+static uint16_t ssdgs__half(float value) {
+    uint32_t bits, small;
+    memcpy(&bits, &value, sizeof bits);
+    const uint32_t sign = bits >> 16 & 0x8000u, rest = bits & 0x7FFFFFFFu;
+    if (rest >= 0x47800000u) return (uint16_t)(sign | (rest > 0x7F800000u ? 0x7E00u : 0x7C00u));
+    if (rest >= 0x38800000u)
+        return (uint16_t)(sign | ((rest + 0xFFF + (rest >> 13 & 1) - 0x38000000u) >> 13));
+    const float shifted =
+        (value < 0 ? -value : value) + 0.5f; /* which leaves the bits that a subnormal has */
+    memcpy(&small, &shifted, sizeof small);
+    return (uint16_t)(sign | (small - 0x3F000000u));
+}
+
+static float ssdgs__from_half(uint16_t half) {
+    const uint32_t exponent = half >> 10 & 31, rest = half & 1023;
+    const float small = (float)rest / 16777216;
+    const uint32_t bits = (exponent + (exponent < 31 ? 112u : 224u)) << 23 | rest << 13;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    if (!exponent) value = small;
+    return half & 0x8000 ? -value : value;
+}
+
+/* Linear colour and alpha of a framebuffer's pixel, and back. */
+typedef struct ssdgs__framebuffer {
+    int format, red, size;       /* where in a pixel of bytes red is; bytes of a pixel */
+    const unsigned char *encode; /* NULL: bytes are linear */
     unsigned char bytes[SSDGS__PARTS];
-    const unsigned char *table = transfer == SSDGS_TRANSFER_SRGB ? bytes : NULL;
+    ssdgs_real decode[256];
+} ssdgs__framebuffer;
+
+static void ssdgs__framebuffer_make(ssdgs__framebuffer *f, int transfer, ssdgs_format format) {
+    f->format = (int)format;
+    f->red = format == SSDGS_BGRA8 ? 2 : 0;
+    f->size = format == SSDGS_RGBA32F ? 16 : format == SSDGS_RGBA16F ? 8 : 4;
+    f->encode = transfer == SSDGS_TRANSFER_SRGB ? f->bytes : NULL;
+    if (f->size > 4) return;
+    if (f->encode) ssdgs__bytes_make(f->bytes);
+    for (int i = 0; i < 256; i++) f->decode[i] = (ssdgs_real)(i / 255.0);
+    if (f->encode) ssdgs__srgb_decode_scalar(f->decode, f->decode, 256);
+}
+
+static void ssdgs__pixel_get(const ssdgs__framebuffer *f, const unsigned char *from, ssdgs_real rgba[4]) {
+    uint16_t half[4];
+    float wide[4];
+    if (f->size == 4) {
+        for (int c = 0; c < 3; c++) rgba[c] = f->decode[from[c == 1 ? 1 : c ? 2 - f->red : f->red]];
+        rgba[3] = (ssdgs_real)from[3] / 255;
+        return;
+    }
+    if (f->size == 8) memcpy(half, from, sizeof half);
+    else memcpy(wide, from, sizeof wide);
+    for (int c = 0; c < 4; c++) rgba[c] = (ssdgs_real)(f->size == 8 ? ssdgs__from_half(half[c]) : wide[c]);
+}
+
+static void ssdgs__pixel_put(const ssdgs__framebuffer *f, const ssdgs_real rgba[4], unsigned char *to) {
+    uint16_t half[4];
+    float wide[4];
+    if (f->size == 4) {
+        for (int c = 0; c < 3; c++)
+            to[c == 1 ? 1 : c ? 2 - f->red : f->red] = ssdgs__byte(f->encode, rgba[c]);
+        to[3] = ssdgs__byte(NULL, rgba[3]);
+        return;
+    }
+    for (int c = 0; c < 4; c++) {
+        wide[c] = (float)rgba[c];
+        half[c] = f->size == 8 ? ssdgs__half(wide[c]) : 0;
+    }
+    if (f->size == 8) memcpy(to, half, sizeof half);
+    else memcpy(to, wide, sizeof wide);
+}
+
+static void ssdgs__pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format,
+                          int blend, void *pixels, ptrdiff_t pitch) {
+    ssdgs__framebuffer f;
     if (!image || !image->color || !pixels) return;
-    if (table) ssdgs__bytes_make(bytes);
+    ssdgs__framebuffer_make(&f, transfer, format);
     for (int y = 0; y < height; y++) {
         const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
         const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
         unsigned char *to = (unsigned char *)pixels + y * pitch;
-        for (int x = 0; x < width; x++, color += 3, to += 4) {
+        for (int x = 0; x < width; x++, color += 3, to += f.size) {
             const ssdgs_real a = alpha ? alpha[x] : 1, by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-            to[red] = ssdgs__byte(table, color[0] * by);
-            to[1] = ssdgs__byte(table, color[1] * by);
-            to[2 - red] = ssdgs__byte(table, color[2] * by);
-            to[3] = ssdgs__byte(NULL, a);
+            ssdgs_real rgba[4] = {0, 0, 0, 0};
+            if (blend && !(a > 0)) continue;
+            if (blend) ssdgs__pixel_get(&f, to, rgba);
+            for (int c = 0; c < 3; c++) rgba[c] = blend ? color[c] + (1 - a) * rgba[c] : color[c] * by;
+            rgba[3] = blend ? a + (1 - a) * rgba[3] : a;
+            ssdgs__pixel_put(&f, rgba, to);
         }
     }
+}
+
+SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                               ssdgs_format format, void *pixels, ptrdiff_t pitch) {
+    ssdgs__pixels(image, width, height, transfer, format, 0, pixels, pitch);
+}
+
+SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int height, int transfer,
+                                  ssdgs_format format, void *pixels, ptrdiff_t pitch) {
+    ssdgs__pixels(image, width, height, transfer, format, 1, pixels, pitch);
 }
 
 /* The sRGB curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most
@@ -10972,7 +11122,8 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
 
 typedef struct F(batch) {
     ssdgs_record record[SSDGS__BATCH];
-    R distance[SSDGS__BATCH];     /* a light's walk: of the Gaussian, less the nearest one's */
+    R distance[SSDGS__BATCH];     /* a light's walk: of the Gaussian, less the nearest one's; the camera's
+                                     depth, where it matters */
     uint32_t place[SSDGS__BATCH]; /* in the tile's lists */
     uint16_t mask[SSDGS__BATCH];
     uint64_t entries[16]; /* per micro-tile, which of the batch touch it */
@@ -11018,7 +11169,9 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
     int n = 0;
     for (; n < SSDGS__BATCH && *from < tile->count; ++*from) {
         const unsigned mask = tile->seen ? tile->seen[*from] : tile->list[*from].mask;
-        if (mask) F(batch_add)(batch, n++, tile, *from, mask);
+        if (!mask) continue;
+        if (tile->scene_depth || tile->median) batch->distance[n] = tile->depth[tile->list[*from].gaussian];
+        F(batch_add)(batch, n++, tile, *from, mask);
     }
     F(batch_transpose)(batch, n);
     return n;
@@ -11036,6 +11189,13 @@ SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V
     *drawn = VGE(p, log2_threshold);
     *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
+}
+
+/* 0, and not drawn, where something else in the picture is not behind the entry. */
+SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, R depth, V alpha, VM *drawn) {
+    const VM nearer = VLT(VSET(depth), VLOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
+    *drawn = VAND(*drawn, nearer);
+    return VSEL(nearer, alpha, VSET(0));
 }
 
 /* Within a batch a transmittance runs on below the stop, which keeps the chain of products short; between
@@ -11087,8 +11247,9 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw;
                     VM drawn;
-                    const V alpha =
-                        F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    if (tile->scene_depth)
+                        alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
                     const VM blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
                     if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget
@@ -11301,11 +11462,18 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V dx, dy, raw;
                     VM drawn, live = VGE(t[v], stop);
-                    const V alpha =
-                        F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    if (tile->scene_depth)
+                        alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
                     VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
+                    const V before = t[v];
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     last[v] = VSEL(live, t[v], last[v]);
+                    if (tile->median) {
+                        R *to = tile->median + micro * 16 + v * SSDGS__VW;
+                        const VM fell = VAND(VAND(live, VGE(before, VSET(0.5))), VLT(t[v], VSET(0.5)));
+                        VSTORE(to, VSEL(fell, VSET(batch.distance[index]), VLOAD(to)));
+                    }
                 }
                 used += (int)(ours >> index & 1);
             }

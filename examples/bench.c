@@ -454,7 +454,7 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
     const ssdgs_photo *seen = b->photos + (j->fixed_camera ? 0 : view * b->photo_count / j->views);
     const ssdgs_photo *lit = b->photos + (j->fixed_light ? 0 : view * b->photo_count / j->views);
     ssdgs_camera camera = scaled_camera(&seen->camera, j->width, j->height);
-    ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     for (int i = 0; j->turned_away && i < 4; i++) { /* half a turn about the camera's y */
         camera.view[i] = -camera.view[i];
         camera.view[8 + i] = -camera.view[8 + i];
@@ -534,7 +534,7 @@ static const ssdgs_real black[3] = {0, 0, 0};
 /* Stored values within [0,1] of a photograph's view, left in color. */
 static void render_stored(bench *b, session *s, const ssdgs_photo *photo,
                           const ssdgs_render_options *options) {
-    ssdgs_image image = {0, b->color, b->alpha, NULL, NULL, NULL, NULL, NULL, NULL};
+    ssdgs_image image = {0, b->color, b->alpha, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     check(s->context, ssdgs_render_ex(s->model, &photo->camera, &photo->light, 1, options, &image, NULL));
     ssdgs_compose(b->color, b->alpha, pixels, s->model->settings.transfer, black, b->color);

@@ -59,6 +59,7 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_render_options_preview),
                                          ADDRESS(ssdgs_compose),
                                          ADDRESS(ssdgs_to_pixels),
+                                         ADDRESS(ssdgs_blend_pixels),
                                          ADDRESS(ssdgs_model_adopt),
                                          ADDRESS(ssdgs_checkpoint_iteration)};
 

@@ -69,7 +69,9 @@ static ssdgs_result render(ssdgs_model *model, uint64_t *hash) {
                                planes + 8 * PIXELS,
                                planes + 11 * PIXELS,
                                planes + 14 * PIXELS,
-                               planes + 17 * PIXELS};
+                               planes + 17 * PIXELS,
+                               NULL,
+                               NULL};
     const ssdgs_light lights[2] = {photos[2].light, photos[5].light};
     const ssdgs_render_options options[2] = {ssdgs_render_options_exact(), ssdgs_render_options_fast()};
     ssdgs_result result = SSDGS_OK;

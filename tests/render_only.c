@@ -10,7 +10,7 @@ int main(void) {
                                                                   up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
     ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}};
-    ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL};
+    ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_settings settings[2];
     uint64_t hash = 1;
     settings[0] = ssdgs_settings_default();

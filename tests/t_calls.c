@@ -438,6 +438,110 @@ static void test_bytes(void) {
     }
 }
 
+/* The value of a half, by its definition. */
+static double half_value(unsigned half) {
+    const int exponent = (int)(half >> 10 & 31);
+    const double rest = half & 1023, sign = half & 0x8000 ? -1 : 1;
+    return sign * (exponent ? ldexp(1024 + rest, exponent - 25) : ldexp(rest, -24));
+}
+
+/* Every finite half comes back, and what lies between two goes to the nearer one, or the even one. */
+static void test_halves(void) {
+    int wrong = 0;
+    for (unsigned half = 0; half < 0xFC00; half++) {
+        if ((half & 0x7FFF) >= 0x7C00) continue;
+        const double value = half_value(half), next = half_value(half + 1);
+        ssdgs_real linear[9];
+        ssdgs_image from;
+        uint16_t out[12];
+        for (int i = 0; i < 9; i++)
+            linear[i] = (ssdgs_real)(value + (next - value) * (i / 3 == 0 ? 0 : i / 3 == 1 ? 0.5 : 0.75));
+        memset(&from, 0, sizeof from);
+        from.color = linear;
+        ssdgs_to_pixels(&from, 3, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 24);
+        const int last =
+            (half & 0x7FFF) == 0x7BFF; /* half_value() of what follows is the number infinity is for */
+        wrong += out[0] != half || out[4] != (half & 1 ? half + 1 : half) || out[8] != half + 1;
+        wrong += out[3] != 0x3C00 || (last && (out[4] & 0x7FFF) != 0x7C00);
+    }
+    CHECK(wrong == 0);
+    ssdgs_real linear[3] = {(ssdgs_real)NAN, (ssdgs_real)1e9, (ssdgs_real)-1e9};
+    ssdgs_image from;
+    uint16_t out[4];
+    memset(&from, 0, sizeof from);
+    from.color = linear;
+    ssdgs_to_pixels(&from, 1, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 8);
+    ssdgs_image veil;
+    memset(&veil, 0, sizeof veil);
+    ssdgs_real black[3] = {0, 0, 0}, cover = (ssdgs_real)0.5;
+    veil.color = black, veil.alpha = &cover;
+    for (uint16_t small = 2; small < 0x800; small = (uint16_t)(small + 2)) { /* subnormal and a little more */
+        uint16_t under[4] = {small, (uint16_t)(small | 0x8000), 0, 0};
+        ssdgs_blend_pixels(&veil, 1, 1, SSDGS_TRANSFER_NONE, SSDGS_RGBA16F, under, 8);
+        wrong += half_value(under[0]) != half_value(small) / 2 || under[1] != (under[0] | 0x8000);
+    }
+    CHECK(wrong == 0);
+    CHECK((out[0] & 0x7FFF) > 0x7C00 && out[1] == 0x7C00 && out[2] == 0xFC00);
+}
+
+/* color + (1 - alpha) x what is there, by light, in every format; nothing where alpha is 0. */
+static void test_blended(void) {
+    enum { N = 400 };
+    static ssdgs_real linear[3 * N], cover[N];
+    ssdgs_image from;
+    memset(&from, 0, sizeof from);
+    from.color = linear, from.alpha = cover;
+    for (uint64_t i = 0; i < N; i++) {
+        cover[i] = (ssdgs_real)(i % 5) / 4;
+        for (uint64_t c = 0; c < 3; c++)
+            linear[3 * i + c] = cover[i] * (ssdgs_real)test_uniform(5, 3 * i + c);
+    }
+    for (int format = SSDGS_RGBA8; format <= SSDGS_RGBA32F; format++)
+        for (int transfer = 0; transfer < 2; transfer++) {
+            static unsigned char bytes[4 * N];
+            static uint16_t halves[4 * N];
+            static float floats[4 * N];
+            double worst = 0;
+            for (uint64_t i = 0; i < 4 * N; i++) {
+                floats[i] = (float)test_uniform(6, i);
+                bytes[i] = (unsigned char)(255 * test_uniform(6, i));
+                halves[i] = (uint16_t)(0x3C00 * test_uniform(7, i));
+            }
+            void *to = format == SSDGS_RGBA32F   ? (void *)floats
+                       : format == SSDGS_RGBA16F ? (void *)halves
+                                                 : (void *)bytes;
+            static unsigned char bytes_before[4 * N];
+            static uint16_t halves_before[4 * N];
+            static float floats_before[4 * N];
+            memcpy(bytes_before, bytes, sizeof bytes);
+            memcpy(halves_before, halves, sizeof halves);
+            memcpy(floats_before, floats, sizeof floats);
+            ssdgs_blend_pixels(&from, N / 4, 4, transfer, (ssdgs_format)format, to,
+                               N * (format == SSDGS_RGBA32F   ? 4
+                                    : format == SSDGS_RGBA16F ? 2
+                                                              : 1));
+            for (int i = 0; i < 4 * N; i++) {
+                const int c = i % 4 == 3 ? 3 : format == SSDGS_BGRA8 ? 2 - i % 4 : i % 4;
+                const double a = (double)cover[i / 4], add = c == 3 ? a : (double)linear[3 * (i / 4) + c];
+                double error;
+                if (format == SSDGS_RGBA32F)
+                    error = (double)floats[i] - (add + (1 - a) * (double)floats_before[i]);
+                else if (format == SSDGS_RGBA16F)
+                    error = (half_value(halves[i]) - (add + (1 - a) * half_value(halves_before[i]))) / 16;
+                else {
+                    const double was = bytes_before[i] / 255.0;
+                    const int bend = c < 3 && transfer == SSDGS_TRANSFER_SRGB;
+                    const double light = bend ? (double)ssdgs_srgb_decode((ssdgs_real)was) : was;
+                    const double now = add + (1 - a) * light;
+                    error = (bytes[i] - 255 * (bend ? curve(now) : now)) / 1e4;
+                    if (!(a > 0)) CHECK(bytes[i] == bytes_before[i]);
+                }
+                worst = fabs(error) > worst ? fabs(error) : worst;
+            }
+            CHECK(worst < (format == SSDGS_RGBA32F ? 1e-6 : 1.1e-4));
+        }
+}
+
 /* Rows, strides and orders of ssdgs_to_pixels(), and straight colours; ssdgs_compose() to 2e-5 of the
    formula, beyond 1 too. */
 static void test_pixels(void) {
@@ -479,6 +583,8 @@ static void test_pixels(void) {
                     }
                 CHECK(wrong == 0);
             }
+    test_halves();
+    test_blended();
     for (int x = 0; x < 3000; x++) {
         const double a = (x % 7 + 1) / 7.0, v = pow(10, -6 + 8.0 * x / 3000);
         const ssdgs_real color3[3] = {(ssdgs_real)(a * v), (ssdgs_real)(-a * v), 0}, one = (ssdgs_real)a;

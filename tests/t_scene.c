@@ -28,7 +28,9 @@ static ssdgs_image planes_of(picture *p) {
                          p->value + 3 * PIXELS,
                          p->value + 6 * PIXELS,
                          p->value + 9 * PIXELS,
-                         p->value + 17 * PIXELS};
+                         p->value + 17 * PIXELS,
+                         NULL,
+                         NULL};
     return image;
 }
 
@@ -536,6 +538,93 @@ static void test_baked(void) {
     ssdgs_model_destroy(plain), ssdgs_model_destroy(lit);
 }
 
+/* ---- other things in the picture ---- */
+
+/* Behind the depth of a pixel a Gaussian is not blended there: as if it were not in the model. */
+static void test_scene_depth(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    static ssdgs_real depth[PIXELS], median[PIXELS];
+    static const double plane[2] = {2.2, 2.6};
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_settings s = small_settings();
+    s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_image image = planes_of(shot + 2);
+    options.stop = 0;
+    for (int part = 0; part < 2; part++) {
+        ssdgs_model *nearer = cloud(&s, 0, 300, 0.5);
+        int hidden = 0;
+        for (int i = 0; i < 300; i++) {
+            ssdgs_gaussian g;
+            CHECK(!ssdgs_model_get(model, i, &g));
+            const ssdgs_real *p = g.position, *v = camera.view + 8;
+            if (v[0] * p[0] + v[1] * p[1] + v[2] * p[2] + v[3] < (ssdgs_real)plane[part]) continue;
+            ssdgs_model_view view = ssdgs_model_arrays(nearer);
+            view.gaussians[SSDGS_OPACITY * view.stride + (size_t)i] = -20;
+            hidden++;
+        }
+        CHECK(hidden > 20 && hidden < 280);
+        alone(nearer, &camera, &light, 1, &options, shot + part);
+        ssdgs_model_destroy(nearer);
+    }
+    for (int i = 0; i < PIXELS; i++) depth[i] = (ssdgs_real)plane[(i + i / SIDE) % 2];
+    depth[0] = (ssdgs_real)NAN; /* hides all */
+    image.scene_depth = depth;
+    for (int frame = 0; frame < 2; frame++) { /* the second one keeps nothing that the depths may change */
+        if (frame)
+            for (int i = 0; i < PIXELS; i++) depth[i] = (ssdgs_real)plane[(i + i / SIDE + 1) % 2];
+        CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, &shot[2].stats));
+        for (int i = !frame; i < PIXELS; i++) {
+            const ssdgs_real *want = shot[(i + i / SIDE + frame) % 2].value;
+            int equal = 1;
+            for (int triple = 0; triple < 5; triple++)
+                for (int c = 0; c < 3; c++) {
+                    const int at = 3 * triple * PIXELS + 3 * i + c;
+                    equal &= fabs((double)(shot[2].value[at] - want[at])) < 1e-5;
+                }
+            CHECK(equal && fabs((double)(shot[2].value[15 * PIXELS + i] - want[15 * PIXELS + i])) < 1e-6);
+        }
+        if (!frame) CHECK(shot[2].value[15 * PIXELS] == 0);
+    }
+    CHECK(shot[2].stats.shaded < 300);
+    enum { STRIDE = SIDE + 5 }; /* rows of the caller's */
+    static ssdgs_real wide_depth[SIDE * STRIDE], wide_alpha[SIDE * STRIDE];
+    ssdgs_image wide;
+    memset(&wide, 0, sizeof wide);
+    wide.stride = STRIDE, wide.alpha = wide_alpha, wide.scene_depth = wide_depth;
+    for (int i = 0; i < PIXELS; i++) wide_depth[i / SIDE * STRIDE + i % SIDE] = depth[i];
+    CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &wide, NULL));
+    for (int i = 0; i < PIXELS; i++)
+        CHECK(wide_alpha[i / SIDE * STRIDE + i % SIDE] >= shot[2].value[15 * PIXELS + i] &&
+              wide_alpha[i / SIDE * STRIDE + i % SIDE] <= shot[2].value[15 * PIXELS + i]);
+    /* where half is hidden: with all from there on left out a pixel lets more through, with that one less */
+    image.scene_depth = NULL;
+    image.median_depth = median;
+    CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, &shot[0].stats));
+    CHECK(shot[0].stats.camera_cached == 0);
+    int crossed = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        const int half = shot[2].value[15 * PIXELS + i] > (ssdgs_real)0.5;
+        crossed += half;
+        CHECK((median[i] > 0) == half);
+        depth[i] = median[i];
+    }
+    CHECK(crossed > 300);
+    image.median_depth = NULL;
+    image.scene_depth = depth;
+    for (int behind = 0; behind < 2; behind++) {
+        CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, NULL));
+        for (int i = 0; i < PIXELS; i++) {
+            const double alpha = (double)shot[2].value[15 * PIXELS + i];
+            CHECK(behind ? alpha > 0.5 - 1e-6 || !(median[i] > 0) : alpha <= 0.5 + 1e-6);
+            depth[i] = median[i] * (ssdgs_real)(1 + 1e-6);
+        }
+    }
+    ssdgs_model_destroy(model);
+}
+
 /* ---- what is kept, and what is not ---- */
 
 static void test_kept(void) {
@@ -748,6 +837,7 @@ int main(void) {
     test_materials();
     test_shadows();
     test_baked();
+    test_scene_depth();
     test_kept();
     test_threads_and_memory();
     test_refused();
