@@ -17,7 +17,7 @@ DO THIS
     int main(int argc, char **argv) {
         static ssdgs_real color[64 * 64 * 3], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 64, 64);
-        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}};
+        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}};
         static ssdgs_image image;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
@@ -378,16 +378,32 @@ typedef struct ssdgs_camera {  /* a pinhole */
     ssdgs_real near_plane;     /* world units: nearer Gaussians are not drawn; 0 = 0.02 length units */
 } ssdgs_camera;
 
-typedef enum ssdgs_light_kind { SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL } ssdgs_light_kind;
+/* clang-format off */
+typedef enum ssdgs_light_kind {
+    SSDGS_LIGHT_POINT = 0, SSDGS_LIGHT_DIRECTIONAL, SSDGS_LIGHT_SPOT
+} ssdgs_light_kind;
+/* clang-format on */
 typedef struct ssdgs_light {
     ssdgs_light_kind kind;
     ssdgs_real position[3];  /* world; directional: unit vector towards the light */
     ssdgs_real intensity[3]; /* RGB, 0 or more, in the training data's units; directional: irradiance */
+    ssdgs_real direction[3]; /* spot, not in photographs: unit vector along which it shines */
+    ssdgs_real cone[2]; /* spot: angles to it in radians, full inside the first, 0 outside the second; between
+                           them as in glTF. No light scatters across its rim */
 } ssdgs_light;
 
 /* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. */
 SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
                                             const ssdgs_real up[3], ssdgs_real fov_x, int width, int height);
+/* A camera of an engine's matrices, (4,4) each: clip = projection x view x point. flags: SSDGS_COLUMN_MAJOR
+   where their columns lie one after the other, as in OpenGL, SSDGS_CLIP_Y_DOWN where clip y points down, as
+   in Vulkan. Off-centre is fine, and so is any range of depths, reversed or infinite: it is not read. In a
+   left-handed world the view mirrors: scenes alone take it, with models placed by a reflection. Set
+   near_plane after that. ERR_ARGUMENT: view is no rotation and translation, projection no perspective. */
+enum { SSDGS_COLUMN_MAJOR = 1, SSDGS_CLIP_Y_DOWN = 2 };
+SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
+                                                  const ssdgs_real projection[16], int flags, int width,
+                                                  int height, ssdgs_camera *out);
 
 /* ---- render ---- */
 
@@ -479,6 +495,27 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
                                           const ssdgs_camera *camera, const ssdgs_light *lights,
                                           int light_count, const ssdgs_render_options *options,
                                           const ssdgs_image *image, ssdgs_render_stats *stats);
+
+/* What else takes light from the objects, meshes for instance. Multiplies fraction (count) by what of light
+   number `light` passes it on the way to points (count,3), world. Several threads call it at once. */
+typedef struct ssdgs_occluder {
+    void (*shadow)(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction);
+    void *user;
+    uint64_t revision; /* another one whenever an answer may differ; until then what was found is kept */
+} ssdgs_occluder;
+/* For the frames from now on: Gaussians, what scatters in them and pixels get what it leaves. NULL: nothing
+   else. Copied. */
+SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder);
+/* Makes the lights' maps of a frame ahead of it, for ssdgs_scene_shadow(). ssdgs_scene_render() with the same
+   objects, lights and options finds them made. */
+SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
+                                         const ssdgs_light *lights, int light_count,
+                                         const ssdgs_render_options *options);
+/* What of a light passes the scene's objects on the way to points (count,3), world: fraction (count), 0 .. 1.
+   By the maps of the last ssdgs_scene_light(), which take note once a tenth is gone. ERR_ARGUMENT: there is
+   none of that light. */
+SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
+                                          ssdgs_real *fraction);
 
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
@@ -852,7 +889,9 @@ typedef struct ssdgs_frame {
     const ssdgs_real *scene_depth; /* (h, stride) as in ssdgs_image; for WALK and COMPOSITE */
     int stride;
     ssdgs_real *pixel_visibility,
-        *pixel_shadow;    /* (lights, h, w) v, S where light is deferred; as layer_pixels */
+        *pixel_shadow;              /* (lights, h, w) v, S where light is deferred; as layer_pixels */
+    const ssdgs_occluder *occluder; /* NULL: none; for WALK and COMPOSITE */
+    int maps;                       /* 1: light maps are asked for, whoever needs them */
     int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
                              means */
     /* backward */
@@ -2717,7 +2756,9 @@ typedef struct ssdgs__cache {
     int objects; /* how many; -1: nothing is kept */
     ssdgs_camera camera;
     ssdgs_render_options options;
-    int terms, light_count, hidden; /* hidden: by scene_depth */
+    ssdgs_occluder occluder;
+    ssdgs_real bias;                      /* of pixels */
+    int terms, light_count, maps, hidden; /* hidden: by scene_depth */
     int camera_ready, lights_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
 } ssdgs__cache;
@@ -2850,6 +2891,90 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     camera.cx = (ssdgs_real)width / 2;
     camera.cy = (ssdgs_real)height / 2;
     return camera;
+}
+
+static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c, int mirrored) {
+    if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
+    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
+        !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
+        !ssdgs__finite(c->near_plane))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
+                           "lengths must be positive, near_plane not negative, all finite",
+                           (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
+    for (int i = 0; i < 12; i++)
+        if (!ssdgs__finite(c->view[i]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
+            const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+            if (fabs(dot - (i == j)) > 1e-3)
+                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                   "camera: the rows of view are not orthonormal");
+        }
+    const double determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
+                                        c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
+                                        c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
+    if (determinant < 0 && !mirrored)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: view is a mirror image");
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ssdgs_real *view,
+                                                const ssdgs_real *projection, int flags, int width,
+                                                int height, ssdgs_camera *out) {
+    double v[16], p[16];
+    if (!view || !projection || !out)
+        return ssdgs__null(context, "ssdgs_camera_from_matrices",
+                           !view         ? "view"
+                           : !projection ? "projection"
+                                         : "out");
+    for (int i = 0; i < 16; i++) {
+        const int from = flags & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i / 4 : i;
+        v[i] = (double)view[from];
+        p[i] = (double)projection[from];
+        if (!ssdgs__finite(view[from]) || !ssdgs__finite(projection[from]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
+                               "camera: row %d, column %d of view or projection is not finite", i / 4, i % 4);
+    }
+    if (fabs(v[12]) + fabs(v[13]) + fabs(v[14]) > 1e-6 || fabs(v[15] - 1) > 1e-6)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "camera: the last row of view is not 0 0 0 1: is it the other order of elements?");
+    const double w = p[14], size = fabs(w);
+    if (!(size > 0) || fabs(p[12]) + fabs(p[13]) + fabs(p[15]) > 1e-6 * size)
+        return ssdgs__fail(
+            context, SSDGS_ERR_ARGUMENT,
+            "camera: the last row of projection is not 0 0 +-1 0: it is no perspective, or its "
+            "elements are in the other order");
+    if (p[0] == 0 || p[5] == 0 || fabs(p[1]) + fabs(p[3]) > 1e-6 * fabs(p[0]) ||
+        fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: projection shears, shifts or is flat");
+    const double down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
+    const double sign[3] = {p[0] > 0 ? 1 : -1, p[5] * down > 0 ? 1 : -1, w > 0 ? 1 : -1};
+    ssdgs_camera camera;
+    memset(&camera, 0, sizeof camera);
+    camera.width = width;
+    camera.height = height;
+    camera.fx = (ssdgs_real)(0.5 * width * fabs(p[0]) / size);
+    camera.fy = (ssdgs_real)(0.5 * height * fabs(p[5]) / size);
+    camera.cx = (ssdgs_real)(0.5 * width * (1 + p[2] / w));
+    camera.cy = (ssdgs_real)(0.5 * height * (1 + down * p[6] / w));
+    for (int i = 0; i < 12; i++) camera.view[i] = (ssdgs_real)(sign[i / 4] * v[i]);
+    const ssdgs_result result = ssdgs__camera_check(context, &camera, 1);
+    if (!result) *out = camera;
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
+                                                  const ssdgs_real projection[16], int flags, int width,
+                                                  int height, ssdgs_camera *out) {
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(context, "ssdgs_camera_from_matrices");
+    return result ? result
+                  : ssdgs__leave(context, ssdgs__camera_from_matrices(context, view, projection, flags, width,
+                                                                      height, out));
 }
 
 /* ---- objects: models placed in a frame ---- */
@@ -3151,41 +3276,14 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     return faces;
 }
 
-static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c) {
-    if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
-    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
-        !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
-        !ssdgs__finite(c->near_plane))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
-                           "lengths must be positive, near_plane not negative, all finite",
-                           (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
-    for (int i = 0; i < 12; i++)
-        if (!ssdgs__finite(c->view[i]))
-            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j <= i; j++) {
-            const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
-            const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-            if (fabs(dot - (i == j)) > 1e-3)
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "camera: the rows of view are not orthonormal");
-        }
-    const double determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
-                                        c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
-                                        c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
-    if (determinant < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: view is a mirror image");
-    return SSDGS_OK;
-}
-
 static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
     if (light_count < 0 || (light_count && !lights))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
     for (int i = 0; i < light_count; i++) {
+        const ssdgs_real *cone = lights[i].cone, *along = lights[i].direction;
         double norm2 = 0;
-        if (lights[i].kind != SSDGS_LIGHT_POINT && lights[i].kind != SSDGS_LIGHT_DIRECTIONAL)
+        if ((int)lights[i].kind < 0 || lights[i].kind > SSDGS_LIGHT_SPOT)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
         for (int j = 0; j < 3; j++) {
             if (!ssdgs__finite(lights[i].position[j]))
@@ -3196,9 +3294,17 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
                                    (double)lights[i].intensity[j]);
             norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
-        if (lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && fabs(norm2 - 1) > 1e-3)
+        if (lights[i].kind == SSDGS_LIGHT_SPOT)
+            norm2 = (double)(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+        if (lights[i].kind != SSDGS_LIGHT_POINT && !(fabs(norm2 - 1) <= 1e-3))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
                                i);
+        if (lights[i].kind == SSDGS_LIGHT_SPOT &&
+            !(cone[0] >= 0 && cone[1] > cone[0] && cone[1] <= (ssdgs_real)3.1416))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                               "light %d: the angles of its cone are %g and %g, where 0 <= first < second <= "
+                               "pi is needed",
+                               i, (double)cone[0], (double)cone[1]);
     }
     return SSDGS_OK;
 }
@@ -3260,6 +3366,7 @@ static int ssdgs__has_transport(const ssdgs_placed *o) {
 
 /* Whether the lights' maps serve these terms. */
 static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
+    if (frame->maps) return 1;
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_settings *s = &frame->objects[i].settings;
         const int asked = s->baked ? 0 : s->terms & terms;
@@ -3292,7 +3399,12 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
                           now->antialias == old->antialias &&
                           !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
                           !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+    ssdgs_occluder occluder;
+    memset(&occluder, 0, sizeof occluder);
+    if (frame->occluder) occluder = *frame->occluder;
     known = known && cache->lights_ready && frame->light_count == cache->light_count &&
+            occluder.shadow == cache->occluder.shadow && occluder.user == cache->occluder.user &&
+            occluder.revision == cache->occluder.revision && frame->maps <= cache->maps &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
             ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
             !(frame->terms & ~cache->terms &
@@ -3311,6 +3423,9 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
     }
     cache->camera = *a;
     cache->hidden = frame->scene_depth != NULL;
+    cache->occluder = occluder;
+    cache->maps = frame->maps;
+    cache->bias = frame->bias[1];
     cache->options = *now;
     cache->terms = frame->terms;
     cache->light_count = frame->light_count;
@@ -3515,6 +3630,9 @@ typedef struct ssdgs__request {
     const ssdgs_render_options *options; /* NULL: default */
     const ssdgs_image *image;            /* NULL: nothing but pixels */
     int components, training;
+    int maps;                       /* 1: light maps are made, though nothing in the frame needs them */
+    int mirrored;                   /* 1: the view may mirror */
+    const ssdgs_occluder *occluder; /* NULL: none */
 } ssdgs__request;
 
 static int ssdgs__components_asked(const ssdgs_image *image) {
@@ -3539,7 +3657,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     memset(frame, 0, sizeof *frame);
     frame->options = request->options ? *request->options : ssdgs_render_options_default();
     ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
-    if (!result) result = ssdgs__camera_check(context, camera);
+    if (!result) result = ssdgs__camera_check(context, camera, request->mirrored);
     if (!result) result = ssdgs__lights_check(context, request->lights, light_count);
     if (result) return result;
     frame->stride = image && image->stride ? image->stride : camera->width;
@@ -3555,6 +3673,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->scratch = w;
     frame->camera = *camera;
     frame->lights = request->lights;
+    frame->occluder = request->occluder;
+    frame->maps = request->maps;
+    frame->light_count = request->maps ? light_count : 0;
     frame->training = training;
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
@@ -3662,12 +3783,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
 }
 
 /* Of one model, where it was trained: memory is its own. */
-static ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *camera,
-                                          const ssdgs_light *lights, int light_count,
-                                          const ssdgs_render_options *options, int components, int training) {
+static SSDGS__TRAINING ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ssdgs_model *model,
+                                                          const ssdgs_camera *camera,
+                                                          const ssdgs_light *lights, int light_count,
+                                                          const ssdgs_render_options *options, int components,
+                                                          int training) {
     const ssdgs_object object = ssdgs_object_default(model);
-    const ssdgs__request request = {&object, 1,    camera,     lights,  light_count,
-                                    options, NULL, components, training};
+    const ssdgs__request request = {&object, 1,          camera,   lights, light_count, options,
+                                    NULL,    components, training, 0,      0,           NULL};
     return ssdgs__frame_begin(frame, model->context, &model->frame, &request);
 }
 
@@ -4047,6 +4170,8 @@ static void ssdgs__walk_task(void *data, int index) {
     } else frame->context->k->walk_light(&tile, v->tile_sums + (size_t)v->tile_start[index] * 4);
 }
 
+#define SSDGS__POINTS 256 /* that an occluder is asked for at once */
+
 typedef struct ssdgs__gather_job {
     const ssdgs_frame *frame;
     int light, first_view, end_view; /* the light's */
@@ -4074,6 +4199,45 @@ static void ssdgs__gather_light_task(void *data, int index) {
         frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
         if (frame->flux) frame->flux[at] = sum[3];
     }
+}
+
+/* What the occluder leaves of what comes to so many Gaussians, at points (count,3). */
+static void ssdgs__occlude(const ssdgs_frame *frame, int light, const int *which, const ssdgs_real *points,
+                           int count) {
+    const size_t first = (size_t)frame->count * (size_t)light;
+    ssdgs_real fraction[SSDGS__POINTS];
+    for (int i = 0; i < count; i++) fraction[i] = 1;
+    if (count) frame->occluder->shadow(frame->occluder->user, light, points, count, fraction);
+    for (int i = 0; i < count; i++) {
+        frame->visibility[first + (size_t)which[i]] *= fraction[i];
+        if (frame->flux) frame->flux[first + (size_t)which[i]] *= fraction[i];
+    }
+}
+
+static void ssdgs__occlude_task(void *data, int index) {
+    const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
+    const ssdgs_frame *frame = job->frame;
+    ssdgs_real points[3 * SSDGS__POINTS];
+    int at, end, which[SSDGS__POINTS], count = 0;
+    ssdgs__piece piece;
+    ssdgs__bin_range(frame->count, index, &at, &end);
+    while (ssdgs__piece_next(frame, &at, end, &piece)) {
+        const ssdgs_placed *o = piece.object;
+        const ssdgs_model_view *g = &o->gaussians;
+        for (int i = piece.begin; i < piece.end; i++) {
+            ssdgs_real local[3], *to = points + 3 * count;
+            for (size_t c = 0; c < 3; c++)
+                local[c] = g->gaussians[(SSDGS_POSITION + c) * g->stride + (size_t)i];
+            ssdgs__turn(o, 0, local, to);
+            for (int c = 0; c < 3; c++) to[c] = to[c] * o->scale + o->offset[c];
+            which[count] = o->first + i;
+            count += ssdgs__finite(to[0]) && ssdgs__finite(to[1]) && ssdgs__finite(to[2]);
+            if (count < SSDGS__POINTS) continue;
+            ssdgs__occlude(frame, job->light, which, points, count);
+            count = 0;
+        }
+    }
+    ssdgs__occlude(frame, job->light, which, points, count);
 }
 
 static void ssdgs__gather_camera_task(void *data, int index) {
@@ -4109,7 +4273,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         } else {
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->light_map = NULL;
-            if (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))
+            if (frame->maps || (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM)))
                 SSDGS__RESERVE(m->light_map, v->light_map, ssdgs_light_pixel,
                                (size_t)(v->tiles_x * v->tiles_y) * 256);
         }
@@ -4123,8 +4287,9 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         job.first_view = job.end_view;
         while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light)
             job.end_view++;
-        if (!frame->views[job.first_view].cached)
-            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
+        if (frame->views[job.first_view].cached) continue;
+        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
+        if (frame->occluder) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
     }
     frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
     return SSDGS_OK;
@@ -4955,6 +5120,26 @@ static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
     }
 }
 
+/* Of a block's irradiance what a spot's cone gives its Gaussians, as in glTF's KHR_lights_punctual. */
+static void ssdgs__spot_row(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
+                            const ssdgs_real *gauss, ssdgs_real *irradiance) {
+    const ssdgs_light *spot = frame->lights + light;
+    const ssdgs_real *from = ssdgs__lightings(frame, o)[light].light;
+    const double inner = cos((double)spot->cone[0]), outer = cos((double)spot->cone[1]);
+    ssdgs_real direction[3];
+    ssdgs__turn(o, 1, spot->direction, direction);
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
+        double along = 0, distance2 = 0;
+        for (int c = 0; c < 3; c++) {
+            const double d = (double)gauss[(SSDGS_POSITION + c) * SSDGS__BLOCK + s] - (double)from[c];
+            along += d * (double)direction[c];
+            distance2 += d * d;
+        }
+        const double t = (along / sqrt(distance2 > 0 ? distance2 : 1) - outer) / (inner - outer);
+        irradiance[s] *= (ssdgs_real)(t > 0 ? t < 1 ? t * t : 1 : 0);
+    }
+}
+
 static void ssdgs__tint(const ssdgs_placed *o, int rows, ssdgs_real *outs) {
     for (int i = 0; i < rows * SSDGS__BLOCK; i++) outs[i] *= o->tint[i / SSDGS__BLOCK % 3];
 }
@@ -5027,6 +5212,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             ssdgs__network_forward(k, &scattering_net, lists, inputs, part + l->scattering_at);
             scattering = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         }
+        if (frame->lights[light].kind == SSDGS_LIGHT_SPOT)
+            ssdgs__spot_row(frame, o, light, gauss, part + l->rows + SSDGS__IRRADIANCE * SSDGS__BLOCK);
         const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
         k->colour(lighting, &in, outs);
         if (lighting->deferred) {
@@ -5484,6 +5671,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
                                     const ssdgs__tile *tile, const ssdgs_real *layers,
                                     ssdgs_real *visibility) {
+    ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
+    int lanes[SSDGS__POINTS], points_count = 0;
     int first = 1; /* views are in the order of lights */
     while (first < frame->view_count && frame->views[first].light < light) first++;
     for (int i = 0; i < 256; i++) {
@@ -5506,7 +5695,14 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
+        if (!frame->occluder || passed < 0) continue; /* the Gaussians' has it already */
+        memcpy(points + 3 * points_count, at, sizeof at);
+        fraction[points_count] = 1;
+        lanes[points_count++] = lane;
     }
+    if (!points_count) return;
+    frame->occluder->shadow(frame->occluder->user, light, points, points_count, fraction);
+    while (points_count--) visibility[lanes[points_count]] *= fraction[points_count];
 }
 
 /* Of the materials that the tile's pixels blend the first after `material`; -1: there is none. */
@@ -6015,7 +6211,8 @@ static ssdgs_result ssdgs__render_model(ssdgs_model *model, const ssdgs_camera *
     ssdgs_frame frame;
     if (!camera || !image) return ssdgs__null(model->context, "ssdgs_render", camera ? "image" : "camera");
     const ssdgs_object object = ssdgs_object_default(model);
-    const ssdgs__request request = {&object, 1, camera, lights, light_count, options, image, 0, 0};
+    const ssdgs__request request = {&object, 1, camera, lights, light_count, options,
+                                    image,   0, 0,      0,      0,           NULL};
     const ssdgs_result result = ssdgs__frame_begin(&frame, model->context, &model->frame, &request);
     return result ? result : ssdgs__render(&frame, image, stats);
 }
@@ -6042,7 +6239,13 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 struct ssdgs_scene {
     ssdgs_context *context;
     struct ssdgs__frame_memory *frame; /* of its frames */
+    ssdgs_occluder occluder;
+    int maps; /* 1: light maps have been asked for, so every frame makes them */
 };
+
+static const ssdgs_occluder *ssdgs__occluder_of(const ssdgs_scene *scene) {
+    return scene->occluder.shadow ? &scene->occluder : NULL;
+}
 
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
     ssdgs_object object;
@@ -6085,10 +6288,100 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     if (result) return result;
     if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
     if (!result) result = ssdgs__objects_check(context, objects, object_count);
-    const ssdgs__request request = {objects, object_count, camera, lights, light_count, options, image, 0, 0};
+    const ssdgs__request request = {objects,     object_count, camera, lights,
+                                    light_count, options,      image,  0,
+                                    0,           scene->maps,  1,      ssdgs__occluder_of(scene)};
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
     return ssdgs__leave(context, result);
+}
+
+SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder) {
+    if (!scene || ssdgs__enter(scene->context, "ssdgs_scene_occlude")) return;
+    memset(&scene->occluder, 0, sizeof scene->occluder);
+    if (occluder) scene->occluder = *occluder;
+    (void)ssdgs__leave(scene->context, SSDGS_OK);
+}
+
+/* Projects, sorts, bins and walks what the lights see; the camera's view stays as it is. */
+static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request *request) {
+    ssdgs_frame frame;
+    ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
+    if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
+    if (result) return result;
+    const int kept = frame.views[0].cached;
+    frame.views[0].cached = 1;
+    result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
+    scene->frame->cache.camera_ready = kept && !result;
+    return result;
+}
+
+SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
+                                         const ssdgs_light *lights, int light_count,
+                                         const ssdgs_render_options *options) {
+    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
+    if (!scene) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_light");
+    if (result) return result;
+    const int seen = scene->frame && scene->frame->cache.camera.width > 0; /* else by no camera so far */
+    const ssdgs_camera camera =
+        seen ? scene->frame->cache.camera : ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
+    const ssdgs__request request = {objects,     object_count,
+                                    &camera,     lights,
+                                    light_count, options,
+                                    NULL,        0,
+                                    0,           1,
+                                    1,           ssdgs__occluder_of(scene)};
+    scene->maps = 1;
+    return ssdgs__leave(scene->context, ssdgs__scene_light(scene, &request));
+}
+
+typedef struct ssdgs__shadow_job {
+    const ssdgs_splat_view *view, *end; /* the light's */
+    const ssdgs_real *points;
+    ssdgs_real *fraction, bias;
+    int count;
+} ssdgs__shadow_job;
+
+static void ssdgs__shadow_task(void *data, int chunk) {
+    const ssdgs__shadow_job *job = (const ssdgs__shadow_job *)data;
+    for (int i = chunk * SSDGS__CHUNK; i < job->count && i / SSDGS__CHUNK == chunk; i++) {
+        ssdgs_real passed = -1;
+        for (const ssdgs_splat_view *v = job->view; v < job->end && passed < 0; v++)
+            passed = ssdgs__passed_to(v, job->points + 3 * (size_t)i, job->bias);
+        job->fraction[i] = passed < 0 ? 1 : passed; /* beside all objects */
+    }
+}
+
+static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
+                                        ssdgs_real *fraction) {
+    ssdgs_context *context = scene->context;
+    const ssdgs__frame_memory *m = scene->frame;
+    ssdgs__shadow_job job;
+    if (count < 0 || (count && (!points || !fraction)))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           count < 0 ? "%d points" : "%d points, but an array is NULL", count);
+    if (!m || !m->cache.lights_ready || !m->cache.maps || light < 0 || light >= m->cache.light_count)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
+                           light);
+    const ssdgs__cached_light *lights = (const ssdgs__cached_light *)m->cached_lights.memory;
+    job.view = (const ssdgs_splat_view *)m->views.memory + 1; /* behind the camera's */
+    for (int i = 0; i < light; i++) job.view += lights[i].views;
+    job.end = job.view + lights[light].views;
+    job.points = points;
+    job.fraction = fraction;
+    job.bias = m->cache.bias;
+    job.count = count;
+    ssdgs__parallel(context, ssdgs__chunks(count), ssdgs__shadow_task, &job);
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
+                                          ssdgs_real *fraction) {
+    if (!scene) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_shadow");
+    return result ? result
+                  : ssdgs__leave(scene->context, ssdgs__scene_shadow(scene, light, points, count, fraction));
 }
 
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */
@@ -6154,7 +6447,7 @@ SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transf
 
 /* IEEE half precision, to the nearest, ties to even. */
 static uint16_t ssdgs__half(float value) {
-    uint32_t bits, small;
+    uint32_t bits, low;
     memcpy(&bits, &value, sizeof bits);
     const uint32_t sign = bits >> 16 & 0x8000u, rest = bits & 0x7FFFFFFFu;
     if (rest >= 0x47800000u) return (uint16_t)(sign | (rest > 0x7F800000u ? 0x7E00u : 0x7C00u));
@@ -6162,17 +6455,16 @@ static uint16_t ssdgs__half(float value) {
         return (uint16_t)(sign | ((rest + 0xFFF + (rest >> 13 & 1) - 0x38000000u) >> 13));
     const float shifted =
         (value < 0 ? -value : value) + 0.5f; /* which leaves the bits that a subnormal has */
-    memcpy(&small, &shifted, sizeof small);
-    return (uint16_t)(sign | (small - 0x3F000000u));
+    memcpy(&low, &shifted, sizeof low);
+    return (uint16_t)(sign | (low - 0x3F000000u));
 }
 
 static float ssdgs__from_half(uint16_t half) {
     const uint32_t exponent = half >> 10 & 31, rest = half & 1023;
-    const float small = (float)rest / 16777216;
     const uint32_t bits = (exponent + (exponent < 31 ? 112u : 224u)) << 23 | rest << 13;
     float value;
     memcpy(&value, &bits, sizeof value);
-    if (!exponent) value = small;
+    if (!exponent) value = (float)rest / 16777216;
     return half & 0x8000 ? -value : value;
 }
 
@@ -8781,7 +9073,9 @@ static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssd
         const ssdgs_light light = {
             SSDGS_LIGHT_DIRECTIONAL,
             {(ssdgs_real)(r * cos(turn * view)), (ssdgs_real)(r * sin(turn * view)), (ssdgs_real)z},
-            {1, 1, 1}};
+            {1, 1, 1},
+            {0, 0, 0},
+            {0, 0}};
         ssdgs_frame frame;
         ssdgs_result result = ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 0);
         frame.flux = flux;
@@ -9103,8 +9397,10 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
                                        const ssdgs_real background[3]) {
     context->subject = "photograph";
     context->subject_number = index;
-    ssdgs_result result = ssdgs__camera_check(context, &photo->camera);
+    ssdgs_result result = ssdgs__camera_check(context, &photo->camera, 0);
     if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
+    if (!result && photo->light.kind == SSDGS_LIGHT_SPOT)
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a photograph's light is a point or a direction");
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && photo->format != SSDGS_PIXELS_RGBA8 && photo->format != SSDGS_PIXELS_RGBA16)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);

@@ -1113,7 +1113,8 @@ static void test_veil(void) {
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, PX, PX);
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_light light = {SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}};
+    ssdgs_light light = {
+        SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}, {0, 0, 0}, {0, 0}};
     ssdgs_image out = {0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_model *model = NULL;
     out.color = values;

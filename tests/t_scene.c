@@ -87,7 +87,16 @@ static ssdgs_camera camera_from(double x, double y, double z) {
 }
 
 static ssdgs_light point_light(double x, double y, double z) {
-    ssdgs_light light = {SSDGS_LIGHT_POINT, {(ssdgs_real)x, (ssdgs_real)y, (ssdgs_real)z}, {9, 8, 7}};
+    ssdgs_light light = {
+        SSDGS_LIGHT_POINT, {(ssdgs_real)x, (ssdgs_real)y, (ssdgs_real)z}, {9, 8, 7}, {0, 0, 0}, {0, 0}};
+    return light;
+}
+
+/* From so far away in that direction. */
+static ssdgs_light parallel_light(double x, double y, double z) {
+    ssdgs_light light = point_light(x, y, z);
+    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    for (int c = 0; c < 3; c++) light.intensity[c] = (ssdgs_real)(1 + c % 2);
     return light;
 }
 
@@ -130,7 +139,7 @@ static void to_world(const ssdgs_object *o, const ssdgs_real from[3], int direct
 
 static void test_identity(void) {
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
-    const ssdgs_light lights[2] = {point_light(2, -2, 2), {SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 2, 1}}};
+    const ssdgs_light lights[2] = {point_light(2, -2, 2), parallel_light(0, 0, 1)};
     const ssdgs_render_options options[2] = {ssdgs_render_options_exact(), ssdgs_render_options_fast()};
     for (int kind = 0; kind < 3; kind++) {
         ssdgs_settings s = kind == 1 ? ssdgs_settings_published() : small_settings();
@@ -282,7 +291,7 @@ static void test_parts(void) {
 /* Light that scatters within one of two that have it: as if the other, out of sight, were not there. */
 static void test_transport(void) {
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
-    const ssdgs_light light = {SSDGS_LIGHT_DIRECTIONAL, {(ssdgs_real)0.6, 0, (ssdgs_real)0.8}, {2, 2, 2}};
+    const ssdgs_light light = parallel_light(0.6, 0, 0.8);
     ssdgs_settings s = small_settings();
     s.transport = 1;
     s.light_map.size = 512;
@@ -625,6 +634,353 @@ static void test_scene_depth(void) {
     ssdgs_model_destroy(model);
 }
 
+/* ---- shadows from and on other things ---- */
+
+static ssdgs_model *plate_of(const ssdgs_settings *s, double width, double opacity) {
+    ssdgs_model *plate = NULL;
+    if (!CHECK(!ssdgs_model_create(context, s, 1, &plate))) exit(1);
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    g.scale[0] = g.scale[1] = (ssdgs_real)width;
+    g.scale[2] = (ssdgs_real)0.001;
+    g.opacity = (ssdgs_real)opacity;
+    for (int c = 0; c < 3; c++) g.diffuse[c] = 0;
+    CHECK(!ssdgs_model_set(plate, 0, &g));
+    return plate;
+}
+
+/* Behind one Gaussian the light is 1 - its alpha, by its formula; before it and beside it nothing is missing.
+ */
+static void test_query(void) {
+    enum { POINTS = 3000 };
+    static ssdgs_real points[3 * POINTS], fraction[POINTS];
+    ssdgs_settings s = small_settings();
+    s.light_map.size = 256;
+    for (int baked = 0; baked < 2; baked++)
+        for (int kind = 0; kind < 2; kind++) {
+            s.baked = baked; /* whose frames need no light themselves */
+            ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
+            ssdgs_object object = ssdgs_object_default(plate);
+            ssdgs_light lights[2] = {point_light(5, 0, 1), point_light(0.2, 0.1, 3)};
+            if (kind) {
+                lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
+                lights[1].position[0] = lights[1].position[1] = 0, lights[1].position[2] = 1;
+            }
+            object.to_world[11] = (ssdgs_real)0.5; /* lifted */
+            CHECK(!ssdgs_scene_light(scene, &object, 1, lights, 2, NULL));
+            double worst = 0, mean = 0;
+            for (uint64_t i = 0; i < 3 * POINTS; i++) points[i] = (ssdgs_real)(2 * draw(i) - 1);
+            CHECK(!ssdgs_scene_shadow(scene, 1, points, POINTS, fraction));
+            for (int i = 0; i < POINTS; i++) {
+                const double x = (double)points[3 * i], y = (double)points[3 * i + 1],
+                             z = (double)points[3 * i + 2], t = kind ? 0 : (3 - 0.5) / (3 - z);
+                const double px = kind ? x : 0.2 + (x - 0.2) * t, py = kind ? y : 0.1 + (y - 0.1) * t;
+                const double want = z > 0.5 ? 1 : 1 - 0.8 * exp(-(px * px + py * py) / 2 / 0.09);
+                /* a Gaussian's shadow begins at its centre's distance, less the bias */
+                if (fabs(z - 0.5) < 0.15) continue;
+                const double error = fabs((double)fraction[i] - want);
+                worst = error > worst ? error : worst;
+                mean += error / POINTS;
+            }
+            CHECK(worst < 0.105 && mean < 0.02); /* maps take note once a tenth is gone */
+            CHECK(!ssdgs_scene_shadow(scene, 0, points, 0, NULL));
+            ssdgs_model_destroy(plate);
+        }
+}
+
+/* Answers from another scene's maps. */
+static void of_scene(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    ssdgs_real passed[256];
+    CHECK(count > 0 && count <= 256);
+    CHECK(!ssdgs_scene_shadow((ssdgs_scene *)user, light, points, count, passed));
+    for (int i = 0; i < count; i++) fraction[i] *= passed[i];
+}
+
+/* The half of what comes, of the second light alone; counts what it is asked. */
+static int asked;
+static double about[3]; /* where the points must lie */
+static void half_of(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    for (int i = 0; i < count; i++) {
+        for (int c = 0; c < 3; c++) CHECK(fabs((double)points[3 * i + c] - about[c]) < 1);
+        CHECK(fraction[i] == 1);
+        if (light == *(int *)user) fraction[i] *= (ssdgs_real)0.5;
+    }
+    asked += count;
+}
+
+/* An occluder equals a plate that does what it does; one that takes half leaves half. */
+static void test_occluder(void) {
+    const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
+    const ssdgs_light lights[2] = {point_light(0.3, 0, 4), point_light(2, -2, 1)};
+    ssdgs_context *was = context;
+    ssdgs_scene *was_scene = scene, *other_scene = NULL;
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 1;
+    ssdgs_settings s = small_settings();
+    s.light_map.size = 512;
+    s.shadow.layers = 0;
+    ssdgs_context *other = NULL;
+    CHECK(!ssdgs_context_create(&desc, &other) && !ssdgs_scene_create(other, &other_scene));
+    context = other;
+    ssdgs_model *foreign = plate_of(&s, 0.25, 0.9);
+    CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene));
+    ssdgs_model *plate = plate_of(&s, 0.25, 0.9), *ball = cloud(&s, 0, 300, 0.3);
+    ssdgs_object there = ssdgs_object_default(foreign), object[2];
+    object[0] = placed(ball, 0.4, 1, 0, 0.1, 0, -0.2);
+    object[1] = ssdgs_object_default(plate);
+    there.to_world[11] = object[1].to_world[11] = (ssdgs_real)1.2;
+    CHECK(!ssdgs_scene_light(other_scene, &there, 1, lights, 2, NULL));
+    ssdgs_occluder occluder = {of_scene, other_scene, 1};
+    for (int transport = 0; transport < 2; transport++) {
+        const ssdgs_render_options options = ssdgs_render_options_exact();
+        together(object, 2, &camera, lights, 2, &options, shot);
+        together(object, 1, &camera, lights, 2, &options, shot + 1);
+        ssdgs_scene_occlude(scene, &occluder);
+        together(object, 1, &camera, lights, 2, &options, shot + 2);
+        CHECK(!shot[2].stats.lights_cached);
+        const int first = 3 * PIXELS / 3; /* below the plate */
+        double darker = 0, norm = 0;
+        for (int i = first; i < 3 * PIXELS; i++) {
+            darker += (double)(shot[1].value[i] - shot[0].value[i]);
+            norm += (double)shot[1].value[i];
+        }
+        CHECK(darker > 0.05 * norm);
+        CHECK_L2(shot[2].value + first, shot[0].value + first, 3 * PIXELS - first, 0.05,
+                 "an occluder for a plate");
+        CHECK_L2(shot[2].value + 9 * PIXELS + first, shot[0].value + 9 * PIXELS + first, 3 * PIXELS - first,
+                 0.12, "what scatters");
+        ssdgs_scene_occlude(scene, NULL);
+        if (transport) break;
+        s.transport = 1;
+        ssdgs_model_destroy(ball);
+        ball = object[0].model = cloud(&s, 0, 300, 0.3);
+    }
+    int second = 1;
+    ssdgs_occluder half = {half_of, &second, 1};
+    together(object, 1, &camera, lights + 1, 1, NULL, shot);
+    const ssdgs_light twice[2] = {lights[1], lights[1]};
+    ssdgs_scene_occlude(scene, &half);
+    asked = 0;
+    object[0].to_world[3] = 50, about[0] = 50;
+    together(object, 1, &camera, twice, 2, NULL, shot + 1);
+    CHECK(asked == 600); /* no pixel */
+    object[0].to_world[3] = (ssdgs_real)0.1, about[0] = 0;
+    together(object, 1, &camera, twice, 2, NULL, shot + 1);
+    CHECK(asked > 1500);
+    double other_light = 0, sum = 0; /* by what comes to where it scatters: nothing else changes that */
+    for (int i = 9 * PIXELS; i < 12 * PIXELS; i++) {
+        other_light += fabs((double)(shot[1].value[i] - 2 * shot[0].value[i]));
+        sum += (double)shot[1].value[i];
+    }
+    CHECK(other_light > 1e-3 * sum);
+    for (int i = 0; i < 3 * PIXELS; i++) shot[0].value[3 * PIXELS + i] *= (ssdgs_real)1.5;
+    CHECK_L2(shot[1].value + 3 * PIXELS, shot[0].value + 3 * PIXELS, 3 * PIXELS, 1e-5,
+             "half of one of two lights");
+    for (int change = 0; change < 3; change++) { /* what is kept stays until the answers change */
+        const int pixels_alone = asked = 0;
+        if (change == 2) half.revision++;
+        ssdgs_scene_occlude(scene, change ? &half : NULL);
+        together(object, 1, &camera, twice, 2, NULL, shot + 2);
+        CHECK(shot[2].stats.lights_cached == 0 && (change > 0) == (asked > pixels_alone));
+        together(object, 1, &camera, twice, 2, NULL, shot + 2);
+        CHECK(shot[2].stats.lights_cached == 2);
+    }
+    CHECK(same(shot + 1, shot + 2));
+    ssdgs_model_destroy(ball), ssdgs_model_destroy(plate), ssdgs_model_destroy(foreign);
+    ssdgs_scene_destroy(scene), ssdgs_scene_destroy(other_scene);
+    ssdgs_context_destroy(context), ssdgs_context_destroy(other);
+    context = was, scene = was_scene;
+}
+
+/* The maps of a frame made ahead: the frame finds them, and what the camera saw stays. */
+static void test_ahead(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_light lights[2] = {point_light(2, -2, 2), point_light(-2, -1, 1)};
+    ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_real point[3] = {0, 0, -2}, fraction = -1;
+    together(&object, 1, &camera, lights, 2, NULL, shot);
+    ssdgs_scene *ahead = NULL;
+    const ssdgs_image image = planes_of(shot + 1);
+    CHECK(!ssdgs_scene_create(context, &ahead));
+    CHECK(ssdgs_scene_shadow(ahead, 0, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    for (int frame = 0; frame < 3; frame++) {
+        if (frame == 2) lights[1].position[0] += (ssdgs_real)0.5;
+        CHECK(!ssdgs_scene_light(ahead, &object, 1, lights, 2, NULL));
+        CHECK(!ssdgs_scene_shadow(ahead, 1, point, 1, &fraction) && fraction >= 0 && fraction <= 1);
+        CHECK(!ssdgs_scene_render(ahead, &object, 1, &camera, lights, 2, NULL, &image, &shot[1].stats));
+        CHECK(shot[1].stats.lights_cached == 2 && shot[1].stats.camera_cached == (frame > 0));
+        CHECK((frame < 2) == same(shot, shot + 1));
+    }
+    /* one that draws without maps makes them when they are asked for */
+    s = ssdgs_settings_published();
+    s.scattering.width = 16;
+    ssdgs_model *plain = cloud(&s, 0, 300, 0.5);
+    const ssdgs_object shaded = ssdgs_object_default(plain);
+    ssdgs_scene *late = NULL;
+    CHECK(!ssdgs_scene_create(context, &late));
+    for (int i = 0; i < 2; i++)
+        CHECK(!ssdgs_scene_render(late, &shaded, 1, &camera, lights, 2, NULL, &image, &shot[1].stats));
+    CHECK(shot[1].stats.lights_cached == 2);
+    CHECK(ssdgs_scene_shadow(late, 1, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    CHECK(!ssdgs_scene_light(late, &shaded, 1, lights, 2, NULL));
+    for (int c = 0; c < 3; c++) point[c] = -lights[1].position[c];
+    CHECK(!ssdgs_scene_shadow(late, 1, point, 1, &fraction) && fraction < (ssdgs_real)0.5);
+    ssdgs_scene_destroy(late);
+    ssdgs_model_destroy(plain);
+    const int wrong[3] = {-1, 2, 0};
+    for (int i = 0; i < 3; i++)
+        CHECK(ssdgs_scene_shadow(ahead, wrong[i], i < 2 ? point : NULL, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_shadow(NULL, 0, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_light(NULL, &object, 1, lights, 2, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_scene_light(ahead, &object, 1, NULL, 2, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_scene_occlude(NULL, NULL);
+    ssdgs_scene_destroy(ahead);
+    ssdgs_model_destroy(model);
+}
+
+/* A spot inside its cone is a point light, outside it is none, between them glTF's part of it. */
+static void test_spot(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light point = point_light(2, -2, 2);
+    for (int kind = 0; kind < 3; kind++) { /* scattering by transport, without, and per Gaussian */
+        ssdgs_settings s = kind == 2 ? ssdgs_settings_published() : small_settings();
+        s.transport = kind == 0;
+        s.scattering.width = s.shadow.width = 16;
+        ssdgs_model *model = cloud(&s, 0, 300, 0.3);
+        ssdgs_object object = placed(model, 0.4, 1.5, 0, 0.1, 0, -0.1);
+        ssdgs_light spot = point;
+        const ssdgs_render_options options = ssdgs_render_options_exact();
+        spot.kind = SSDGS_LIGHT_SPOT;
+        for (int c = 0; c < 3; c++) spot.direction[c] = (ssdgs_real)((c == 1 ? 1 : -1) * sqrt(1.0 / 3));
+        together(&object, 1, &camera, &point, 1, &options, shot);
+        spot.cone[0] = 1, spot.cone[1] = 2;
+        together(&object, 1, &camera, &spot, 1, &options, shot + 1);
+        CHECK(same(shot, shot + 1)); /* wide: all is inside */
+        for (int c = 0; c < 3; c++) spot.direction[c] *= -1;
+        spot.cone[0] = (ssdgs_real)0.1, spot.cone[1] = 1;
+        together(&object, 1, &camera, &spot, 1, &options, shot + 1);
+        double left = 0;
+        for (int i = 0; i < 12 * PIXELS; i++) left += fabs((double)shot[1].value[i]);
+        CHECK(left <= 0);
+        /* a small object at a known angle: the part of it, on all that it sends */
+        for (int c = 0; c < 3; c++) spot.direction[c] *= -1;
+        spot.cone[0] = (ssdgs_real)0.05, spot.cone[1] = (ssdgs_real)0.4;
+        object = placed(model, 0.4, 0.01, 0, 0.5, 0.3, 0.2);
+        const ssdgs_camera close = camera_from(0.4, -2.2, 0.8);
+        const double d[3] = {0.5 - 2, 0.3 + 2, 0.2 - 2},
+                     far_away = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        const double along = (-d[0] + d[1] - d[2]) * sqrt(1.0 / 3) / far_away;
+        const double t = (along - cos(0.4)) / (cos(0.05) - cos(0.4)), part = t * t;
+        CHECK(t > 0.1 && t < 0.9);
+        together(&object, 1, &close, &point, 1, &options, shot);
+        together(&object, 1, &close, &spot, 1, &options, shot + 1);
+        for (int i = 0; i < 12 * PIXELS; i++) shot[0].value[i] *= (ssdgs_real)part;
+        CHECK_L2(shot[1].value, shot[0].value, 3 * PIXELS, 0.02, "a spot's rim");
+        CHECK_L2(shot[1].value + 9 * PIXELS, shot[0].value + 9 * PIXELS, 3 * PIXELS, 0.02,
+                 "what scatters in a spot's rim");
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_light wrong = point;
+    const ssdgs_image image = planes_of(shot);
+    wrong.kind = SSDGS_LIGHT_SPOT, wrong.cone[1] = 1;
+    CHECK(ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "light 0: its direction") != NULL);
+    wrong.direction[0] = 1, wrong.cone[0] = 1;
+    CHECK(ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "light 0: the angles of its cone are 1 and 1") != NULL);
+    wrong.cone[0] = 0;
+    CHECK(!ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL));
+}
+
+/* ---- cameras of engines ---- */
+
+/* Engines' matrices, made from a camera by their books, give the camera back: right-handed and looking along
+   -z, left-handed and along z, rows or columns, any range of depths, y up or down. */
+static void test_matrices(void) {
+    ssdgs_camera want = camera_from(0.4, -2.2, 0.8), got;
+    want.width = 80, want.height = 50;
+    want.cx = 35, want.cy = 27, want.fy = 70;
+    for (int kind = 0; kind < 64; kind++) {
+        const int column_major = kind & 1, y_down = kind >> 1 & 1, left = kind >> 2 & 1,
+                  reverse = kind >> 3 & 1, gl = kind >> 4 & 1, infinite = kind >> 5 & 1;
+        const double axis[3] = {1, y_down ? 1 : -1,
+                                left ? 1 : -1}; /* of right, down, forward in view space */
+        const double n = 0.1, far_plane = 50, s = axis[2], f = infinite ? 1e30 : far_plane;
+        double near_z = reverse ? 1 : gl ? -1 : 0, far_z = reverse ? (gl ? -1 : 0) : 1;
+        /* z = a s d + b, over d */
+        const double b = (near_z - far_z) / (1 / n - 1 / f), a = s * (near_z - b / n);
+        double view[16], projection[16];
+        memset(view, 0, sizeof view), memset(projection, 0, sizeof projection);
+        for (int i = 0; i < 12; i++) view[i] = axis[i / 4] * (double)want.view[i];
+        view[15] = 1;
+        const double up = y_down ? 1 : -1; /* of a pixel's y in clip space */
+        projection[0] = 2 * (double)want.fx / want.width;
+        projection[2] = s * (2 * (double)want.cx / want.width - 1);
+        projection[5] = up * axis[1] * 2 * (double)want.fy / want.height;
+        projection[6] = up * s * (2 * (double)want.cy / want.height - 1);
+        projection[10] = a, projection[11] = b, projection[14] = s;
+        ssdgs_real v[16], p[16];
+        for (int i = 0; i < 16; i++) {
+            const int from = column_major ? i % 4 * 4 + i / 4 : i;
+            v[i] = (ssdgs_real)view[from], p[i] = (ssdgs_real)(3 * projection[from]); /* of any scale */
+        }
+        const int flags = (column_major ? SSDGS_COLUMN_MAJOR : 0) | (y_down ? SSDGS_CLIP_Y_DOWN : 0);
+        if (!CHECK(!ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got)))
+            printf("    %s\n", ssdgs_error_message(context));
+        CHECK(got.width == 80 && got.height == 50 && got.near_plane == 0);
+        CHECK_NEAR(got.view, want.view, 12, 1e-6, 0, "view");
+        CHECK_NEAR(&got.fx, &want.fx, 4, 1e-4, 0, "fx, fy, cx, cy");
+        /* the same camera from a world whose x is turned round: left-handed */
+        for (int i = 0; i < 3; i++) v[column_major ? i : 4 * i] *= -1;
+        CHECK(!ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got));
+        const ssdgs_image image = planes_of(shot);
+        CHECK(!ssdgs_scene_render(scene, NULL, 0, &got, NULL, 0, NULL, &image, NULL));
+        /* what is none */
+        for (int broken = 0; broken < 6; broken++) {
+            static const int place[6] = {12, 3, 15, 1, 14, 0};
+            const int at = column_major ? place[broken] % 4 * 4 + place[broken] / 4 : place[broken];
+            ssdgs_real *in = (broken == 0 ? v : p) + at, kept = *in;
+            *in = broken == 1 || broken == 2 || broken == 3 || !broken ? 1 : 0;
+            CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+            *in = kept;
+        }
+        v[0] *= 2;
+        CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+        v[0] = (ssdgs_real)NAN;
+        CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_NONFINITE);
+    }
+    const ssdgs_real none[16] = {0};
+    CHECK(ssdgs_camera_from_matrices(context, NULL, none, 0, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_camera_from_matrices(NULL, none, none, 0, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+}
+
+/* A whole left-handed world: models placed by a reflection, a camera that mirrors. */
+static void test_left_handed(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_camera mirrored = camera;
+    ssdgs_light light = point_light(2, -2, 2), there = light;
+    ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    options.alpha_threshold = (ssdgs_real)1e-6, options.stop = 0;
+    options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+    together(&object, 1, &camera, &light, 1, &options, shot);
+    object.to_world[0] = -1;
+    there.position[0] *= -1;
+    for (int i = 0; i < 3; i++) mirrored.view[4 * i] *= -1;
+    together(&object, 1, &mirrored, &there, 1, &options, shot + 1);
+    for (int i = 0; i < PIXELS; i++) shot[1].value[12 * PIXELS + 3 * i] *= -1; /* normals, in that world */
+    for (int plane = 0; plane < PLANES; plane++)
+        CHECK_L2(shot[1].value + plane * PIXELS, shot[0].value + plane * PIXELS, PIXELS,
+                 real64 ? 1e-12 : 1e-5, "a left-handed world");
+    const ssdgs_image image = planes_of(shot);
+    CHECK(ssdgs_render(model, &mirrored, &light, 1, &image) == SSDGS_ERR_ARGUMENT);
+    ssdgs_model_destroy(model);
+}
+
 /* ---- what is kept, and what is not ---- */
 
 static void test_kept(void) {
@@ -838,6 +1194,12 @@ int main(void) {
     test_shadows();
     test_baked();
     test_scene_depth();
+    test_query();
+    test_occluder();
+    test_ahead();
+    test_spot();
+    test_matrices();
+    test_left_handed();
     test_kept();
     test_threads_and_memory();
     test_refused();

@@ -222,6 +222,7 @@ static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
         p->planes[i] =
             p->wanted >> i & 1 ? (ssdgs_real *)calloc(plane_values(p, i), sizeof(ssdgs_real)) : NULL;
     ssdgs_image image;
+    memset(&image, 0, sizeof image);
     image.stride = p->stride;
     image.color = p->planes[0];
     image.alpha = p->planes[1];
@@ -707,7 +708,7 @@ static void fuzz_dataset(const unsigned char *data, size_t size) {
         }
         HOLDS((photos = olat_photos(&set)) != NULL);
         for (int i = 0; i < set.count; i++) {
-            HOLDS(!ssdgs__camera_check(context, &photos[i].camera) &&
+            HOLDS(!ssdgs__camera_check(context, &photos[i].camera, 0) &&
                   !ssdgs__lights_check(context, &photos[i].light, 1));
             HOLDS(!images || photos[i].pixels);
         }
