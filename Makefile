@@ -21,7 +21,7 @@ PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
 HEADERS = ssdgs.h examples/olat.h tests/test.h tests/kernels.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/bench
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
@@ -30,7 +30,7 @@ BUILDS = builds examples
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/bench
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
@@ -74,7 +74,7 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight
+$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc

@@ -70,16 +70,16 @@ WHAT IT COMPUTES
 CONVENTIONS
   camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens
           distortion.
-  world   right-handed, any unit, the same for cameras, lights and Gaussians. Floats hold seven digits: of a
-          scene 1,000 times its size away from 0 give all positions less a nearby point, and that as
-          settings.origin.
+  world   right-handed (scenes: either), any unit, the same for cameras, lights and Gaussians. Floats hold
+          seven digits: of a scene 1,000 times its size away from 0 give all positions less a nearby point,
+          and that as settings.origin.
   light   a point's E is intensity / distance^2, a directional light's is its intensity. Intensities have
           the unit of the photographs': training sets light_scale such that E is 1 at the centre of the
           bounds on average.
-  colour  renders are linear light, never encoded or clamped; ssdgs_to_pixels() and ssdgs_to_bytes() encode
-          them. Photographs, options.background and ssdgs_evaluate() deal in stored values, which
-          settings.transfer relates to linear ones. A photograph's alpha blends stored values, as
-          ssdgs_compose() does.
+  colour  renders are linear light, never encoded or clamped, and multiplied by alpha ("premultiplied");
+          ssdgs_to_pixels(), ssdgs_blend_pixels() and ssdgs_to_bytes() encode them. Photographs,
+          options.background and ssdgs_evaluate() deal in stored values, which settings.transfer relates to
+          linear ones. A photograph's alpha blends stored values, as ssdgs_compose() does.
   images  row-major, top row first, up to 32768 px a side.
 
 MEMORY
@@ -90,9 +90,9 @@ MEMORY
 
 THREADS
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
-  allocator, log and progress run on the caller's thread. A call made while another is at work on the context,
-  from a hook or another thread, returns ERR_ARGUMENT; progress may call all but the trainer's destruction.
-  After fork() the child may use its copies, without threads.
+  allocator, log and progress run on the caller's thread, an occluder on any. A call made while another is at
+  work on the context, from a hook or another thread, returns ERR_ARGUMENT; progress may call all but the
+  trainer's destruction. After fork() the child may use its copies, without threads.
 
 DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
@@ -120,10 +120,17 @@ OUTLINES
   few are transparent, borders decide: of the colour of options.background they are empty, and Gaussians of
   that colour fade; else all that is shown is opaque. A note says which.
 
-SCENES
+SCENES, as engines have them: examples/engine.c is one
   ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
   together, shadowing each other. What the networks predict and what true dipole transport brings stays within
-  an object and its own space. A light's map covers all objects, with at most 2048 pixels a side.
+  an object and its own space. Pixels light objects of other lobes one by one, so that none blends with what
+  is behind it before it is lit. A light's map covers all objects, with at most 2048 pixels a side. A frame:
+      ssdgs_camera_from_matrices()   the engine's view and projection
+      ssdgs_scene_light()            the lights' maps
+      draw the meshes, with shadows of splats by ssdgs_scene_shadow()
+      ssdgs_scene_render()           with the meshes' depth as image.scene_depth, their shadows on splats by
+                                     ssdgs_scene_occlude()
+      ssdgs_blend_pixels()           over the engine's framebuffer
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
@@ -154,7 +161,7 @@ CONTENTS, search for the tag
   >>model >>frame                    parameters and networks; a frame's memory, views and cache
   >>project >>shadow >>transport     splats and tiles; visibility from the lights; dipole transport
   >>shade >>composite >>render       colour of the Gaussians seen; blending, highlights; stages in order
-  >>loss >>ply                       loss and metrics; model files
+  >>scene >>loss >>ply               placed models; loss and metrics; model files
   >>trainer >>density >>reduce       one photograph and Adam; clone, split, prune; merge: levels of detail
   >>steps >>checkpoint               the trainer's public functions; a run's whole state
   >>kernels >>vmath >>*_kernel       vector macros, functions, and the kernels in the same order */
@@ -344,6 +351,9 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
 /* Puts Gaussians in the order that training leaves, neighbours together, which is faster. Indices change.
    Call it once a model made in code is filled; not while it is trained. ERR_ARGUMENT, ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
+/* The box, in the model's space, that holds its Gaussians to three standard deviations, but for a few strays.
+   0 0 0 where it has none. ERR_MEMORY. */
+SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]);
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
@@ -6234,7 +6244,10 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
     return ssdgs_render_ex(model, camera, lights, light_count, NULL, image, NULL);
 }
 
-/* ---- scenes ---- */
+/* ==== >>scene  placed models in one frame, shadows asked for and given ==== */
+
+/* Frames of ssdgs_object, what they keep, and what an engine asks of a model. All but the public functions is
+   in >>frame (objects), >>shadow and >>composite. */
 
 struct ssdgs_scene {
     ssdgs_context *context;
@@ -6382,6 +6395,60 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
     const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_shadow");
     return result ? result
                   : ssdgs__leave(scene->context, ssdgs__scene_shadow(scene, light, points, count, fraction));
+}
+
+static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
+    ssdgs_context *context = model->context;
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_placed placed;
+    ssdgs_frame frame;
+    ssdgs__bounds bounds;
+    if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
+    if (!context->scratch)
+        context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *context->scratch);
+    if (!context->scratch) return SSDGS_ERR_MEMORY;
+    ssdgs__place(&object, &placed);
+    memset(&frame, 0, sizeof frame);
+    frame.context = context;
+    frame.scratch = context->scratch;
+    frame.options = ssdgs_render_options_exact();
+    frame.objects = &placed;
+    frame.object_count = 1;
+    frame.count = model->count;
+    const ssdgs_result result =
+        ssdgs__scene_bounds(&frame, &bounds); /* without strays, but by longest axes */
+    if (result) return result;
+    ssdgs_real least[3] = {0, 0, 0}, most[3] = {0, 0, 0};
+    for (int i = 0, none = 1; i < model->count; i++) {
+        const ssdgs_real *p = model->gaussians + i;
+        double box[6], log_scale;
+        ssdgs_real raw[4], q[4], r[9];
+        if (!ssdgs__box_of(&placed, i, -21, box, box + 3, &log_scale)) continue;
+        for (size_t c = 0; c < 4; c++) raw[c] = p[(SSDGS_ROTATION + c) * model->capacity];
+        ssdgs__rotation_scalar(raw, q, r);
+        for (size_t j = 0; j < 3; j++) {
+            ssdgs_real variance = 0, at = p[(SSDGS_POSITION + j) * model->capacity];
+            for (size_t c = 0; c < 3; c++) {
+                const ssdgs_real s = ssdgs__exp_scalar(p[(SSDGS_LOG_SCALE + c) * model->capacity]);
+                variance += r[3 * j + c] * r[3 * j + c] * s * s;
+            }
+            const ssdgs_real reach = 3 * SSDGS__SQRT(variance);
+            least[j] = none || at - reach < least[j] ? at - reach : least[j];
+            most[j] = none || at + reach > most[j] ? at + reach : most[j];
+        }
+        none = 0;
+    }
+    for (int j = 0; j < 3; j++) {
+        low[j] = least[j] > (ssdgs_real)bounds.low[j] ? least[j] : (ssdgs_real)bounds.low[j];
+        high[j] = most[j] < (ssdgs_real)bounds.high[j] ? most[j] : (ssdgs_real)bounds.high[j];
+    }
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
+    if (!model) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_bounds");
+    return result ? result : ssdgs__leave(model->context, ssdgs__model_bounds(model, low, high));
 }
 
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */

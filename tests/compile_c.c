@@ -65,6 +65,7 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_to_pixels),
                                          ADDRESS(ssdgs_blend_pixels),
                                          ADDRESS(ssdgs_model_adopt),
+                                         ADDRESS(ssdgs_model_bounds),
                                          ADDRESS(ssdgs_checkpoint_iteration)};
 
 int main(void) {

@@ -164,6 +164,19 @@ check "its refined lights are there" awk '/"pl_pos"/ { n++; gsub(/[^-0-9.e+ ]/, 
     END { exit bad || !n }' "$out/moved.ply.refined.json"
 check "its Gaussians are doubles" grep -aq "property double x" "$out/moved.ply"
 
+# the level: models that are given or made, frames that differ, nothing written where something is wrong
+engine() { "$build/engine" --frames 2 --size 96 54 --out "$out/level_" "$@"; }
+check "engine" says 0 "^$" sh -c "\"$build/engine\" --frames 2 --size 96 54 --out \"$out/made_\"; echo"
+check "engine with a model" says 0 "^$" sh -c "\"$build/engine\" --frames 1 --size 96 54 --out \"$out/given_\" \"$model\"; echo"
+check "its pictures" test -s "$out/made_001.png" -a -s "$out/made_sheet.png" -a ! -e "$out/made_002.png"
+check "they differ" differs "$out/made_000.png" "$out/made_001.png"
+check "models too" differs "$out/made_000.png" "$out/given_000.png"
+check "a model that is not there" says 1 "nothing.ply" engine "$out/nothing.ply"
+check "no frames" says 2 "^usage: engine" engine --frames 0
+check "no such option" says 2 "^usage: engine" engine --wrong
+check "a folder that is not there" says 1 "never" "$build/engine" --frames 1 --size 96 54 --out "$out/never/x"
+check "nothing was written" test ! -e "$out/level_000.png"
+
 rm -rf "$out"
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]

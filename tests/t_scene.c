@@ -894,6 +894,41 @@ static void test_spot(void) {
     CHECK(!ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL));
 }
 
+/* All Gaussians to three standard deviations, strays left out; nothing where there is nothing. */
+static void test_bounds(void) {
+    ssdgs_settings s = small_settings();
+    ssdgs_real low[3], high[3], want_low[3] = {9, 9, 9}, want_high[3] = {-9, -9, -9};
+    ssdgs_model *model = cloud(&s, 0, 300, 0.3), *empty = NULL;
+    for (int i = 0; i < 300; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        const ssdgs_real w = g.rotation[0], x = g.rotation[1], y = g.rotation[2], z = g.rotation[3],
+                         n = 2 / (w * w + x * x + y * y + z * z);
+        const ssdgs_real axis[9] = {
+            1 - n * (y * y + z * z), n * (x * y - w * z),     n * (x * z + w * y),
+            n * (x * y + w * z),     1 - n * (x * x + z * z), n * (y * z - w * x),
+            n * (x * z - w * y),     n * (y * z + w * x),     1 - n * (x * x + y * y)};
+        for (int c = 0; c < 3; c++) {
+            double variance = 0;
+            for (int k = 0; k < 3; k++)
+                variance += (double)(axis[3 * c + k] * axis[3 * c + k] * g.scale[k] * g.scale[k]);
+            const ssdgs_real reach = (ssdgs_real)(3 * sqrt(variance));
+            want_low[c] = g.position[c] - reach < want_low[c] ? g.position[c] - reach : want_low[c];
+            want_high[c] = g.position[c] + reach > want_high[c] ? g.position[c] + reach : want_high[c];
+        }
+    }
+    CHECK(!ssdgs_model_bounds(model, low, high));
+    CHECK_NEAR(low, want_low, 3, 1e-6, 1e-5, "bounds, low");
+    CHECK_NEAR(high, want_high, 3, 1e-6, 1e-5, "bounds, high");
+    ssdgs_model_arrays(model).gaussians[7] = 100; /* a stray */
+    CHECK(!ssdgs_model_bounds(model, low, high) && high[0] < 5);
+    CHECK(!ssdgs_model_create(context, &s, 0, &empty));
+    CHECK(!ssdgs_model_bounds(empty, low, high) && !(low[0] < 0) && !(high[2] > 0));
+    CHECK(ssdgs_model_bounds(NULL, low, high) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_model_bounds(model, low, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_model_destroy(model), ssdgs_model_destroy(empty);
+}
+
 /* ---- cameras of engines ---- */
 
 /* Engines' matrices, made from a camera by their books, give the camera back: right-handed and looking along
@@ -1198,6 +1233,7 @@ int main(void) {
     test_occluder();
     test_ahead();
     test_spot();
+    test_bounds();
     test_matrices();
     test_left_handed();
     test_kept();

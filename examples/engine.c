@@ -1,0 +1,369 @@
+/* cc -O2 examples/engine.c -o engine -lm -lpthread: how a game engine draws with ssdgs.h. Meshes, a floor and
+   a box, and three objects of two models stand in a level, under a spot that moves and a sun. Everything
+   hides and shadows everything. usage: engine [--frames N] [--size W H] [--out PREFIX] [MODEL.ply
+   [MODEL.ply]]; writes PREFIX000.png and so on, and PREFIXsheet.png with nine of them. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "olat.h"
+
+enum { OBJECTS = 3, LIGHTS = 2, TILES = 24, SHEET = 3, BALL = 2000 };
+
+/* ---- the engine: its framebuffer, its triangles, its matrices (OpenGL's) ---- */
+
+typedef struct level {
+    int width, height;
+    float view[16], projection[16]; /* columns one after the other */
+    unsigned char *pixels;          /* (h,w,4) sRGB */
+    float *depth, *normal, *albedo, *world, *lit, *passed;
+    ssdgs_camera camera;
+    ssdgs_light lights[LIGHTS];
+    ssdgs_object objects[OBJECTS];
+    float light_scale; /* of the models: what their photographs' intensities are multiplied by */
+    float box_low[3], box_high[3];
+    /* the library's */
+    ssdgs_context *context;
+    ssdgs_model *models[2];
+    ssdgs_scene *scene;
+    float *color, *alpha;
+} level;
+
+static void perspective(float fov_y, float aspect, float near_plane, float out[16]) { /* infinitely far */
+    const float f = 1 / tanf(fov_y / 2);
+    memset(out, 0, 16 * sizeof *out);
+    out[0] = f / aspect, out[5] = f, out[10] = out[11] = -1, out[14] = -2 * near_plane;
+}
+
+static void normalize(float v[3]) {
+    const float length = sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (int i = 0; i < 3; i++) v[i] /= length;
+}
+
+static void look_at(const float eye[3], const float target[3], float out[16]) { /* z is up, -z ahead */
+    float f[3], r[3], u[3];
+    for (int i = 0; i < 3; i++) f[i] = target[i] - eye[i];
+    normalize(f);
+    r[0] = f[1], r[1] = -f[0], r[2] = 0;
+    normalize(r);
+    for (int i = 0; i < 3; i++) u[i] = r[(i + 1) % 3] * f[(i + 2) % 3] - r[(i + 2) % 3] * f[(i + 1) % 3];
+    for (int i = 0; i < 3; i++) {
+        out[4 * i] = r[i], out[4 * i + 1] = u[i], out[4 * i + 2] = -f[i], out[4 * i + 3] = 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        const float *axis = i == 0 ? r : i == 1 ? u : f;
+        out[12 + i] = (i == 2 ? 1.0f : -1.0f) * (axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2]);
+    }
+    out[15] = 1;
+}
+
+/* A triangle into the z-buffer, which holds the depth along the view: its pixels' place, normal, colour. */
+static void triangle(level *l, float corner[3][3], const float normal[3], const float albedo[3]) {
+    float x[3], y[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        float v[3];
+        for (int c = 0; c < 3; c++)
+            v[c] = l->view[c] * corner[i][0] + l->view[4 + c] * corner[i][1] + l->view[8 + c] * corner[i][2] +
+                   l->view[12 + c];
+        w[i] = -v[2];
+        if (w[i] < 0.05f) return;
+        x[i] = (l->projection[0] * v[0] / w[i] + 1) * 0.5f * (float)l->width;
+        y[i] = (1 - l->projection[5] * v[1] / w[i]) * 0.5f * (float)l->height;
+    }
+    const float area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+    if (fabsf(area) < 1e-9f) return;
+    float low_x = fminf(x[0], fminf(x[1], x[2])), high_x = fmaxf(x[0], fmaxf(x[1], x[2]));
+    float low_y = fminf(y[0], fminf(y[1], y[2])), high_y = fmaxf(y[0], fmaxf(y[1], y[2]));
+    low_x = fmaxf(low_x, 0), low_y = fmaxf(low_y, 0);
+    high_x = fminf(high_x, (float)l->width - 1), high_y = fminf(high_y, (float)l->height - 1);
+    for (int py = (int)low_y; (float)py <= high_y; py++)
+        for (int px = (int)low_x; (float)px <= high_x; px++) {
+            const float at_x = (float)px + 0.5f, at_y = (float)py + 0.5f;
+            float b[3];
+            for (int i = 0; i < 3; i++) {
+                const int j = (i + 1) % 3, k = (i + 2) % 3;
+                b[i] = ((x[j] - at_x) * (y[k] - at_y) - (x[k] - at_x) * (y[j] - at_y)) / area;
+            }
+            if (b[0] < 0 || b[1] < 0 || b[2] < 0) continue;
+            const float depth = 1 / (b[0] / w[0] + b[1] / w[1] + b[2] / w[2]);
+            const int pixel = py * l->width + px;
+            if (depth >= l->depth[pixel]) continue;
+            l->depth[pixel] = depth;
+            for (int c = 0; c < 3; c++) {
+                l->world[3 * pixel + c] = depth * (b[0] * corner[0][c] / w[0] + b[1] * corner[1][c] / w[1] +
+                                                   b[2] * corner[2][c] / w[2]);
+                l->normal[3 * pixel + c] = normal[c];
+                l->albedo[3 * pixel + c] = albedo[c];
+            }
+        }
+}
+
+static void quad(level *l, float corner[4][3], const float normal[3], const float albedo[3]) {
+    float second[3][3];
+    memcpy(second[0], corner[0], sizeof second[0]);
+    memcpy(second[1], corner[2], sizeof second[1]);
+    memcpy(second[2], corner[3], sizeof second[2]);
+    triangle(l, corner, normal, albedo);
+    triangle(l, second, normal, albedo);
+}
+
+static void draw_meshes(level *l) {
+    const float up[3] = {0, 0, 1}, dark[3] = {0.22f, 0.22f, 0.24f}, light[3] = {0.5f, 0.48f, 0.45f},
+                red[3] = {0.6f, 0.14f, 0.08f};
+    for (int i = 0; i < l->width * l->height; i++) {
+        l->depth[i] = INFINITY;
+        memset(l->albedo + 3 * i, 0, 3 * sizeof *l->albedo);
+    }
+    for (int i = 0; i < TILES * TILES; i++) { /* the floor, a chessboard */
+        const float s = 0.5f, x = s * (float)(i % TILES - TILES / 2), y = s * (float)(i / TILES - TILES / 2);
+        float tile[4][3] = {{x, y, 0}, {x + s, y, 0}, {x + s, y + s, 0}, {x, y + s, 0}};
+        quad(l, tile, up, (i % TILES + i / TILES) % 2 ? light : dark);
+    }
+    for (int face = 0; face < 6; face++) { /* the box */
+        const int axis = face / 2, a = (axis + 1) % 3, b = (axis + 2) % 3;
+        float corner[4][3], normal[3] = {0, 0, 0};
+        normal[axis] = face % 2 ? 1.0f : -1.0f;
+        for (int i = 0; i < 4; i++) {
+            corner[i][axis] = face % 2 ? l->box_high[axis] : l->box_low[axis];
+            corner[i][a] = i == 1 || i == 2 ? l->box_high[a] : l->box_low[a];
+            corner[i][b] = i > 1 ? l->box_high[b] : l->box_low[b];
+        }
+        quad(l, corner, normal, red);
+    }
+}
+
+/* Whether the box stands between a point and a light: what a shadow map would say. */
+static int box_hides(const level *l, int light, const float point[3]) {
+    float begin = 1e-3f, end = 1;
+    for (int c = 0; c < 3; c++) {
+        const float from = point[c], to = l->lights[light].position[c];
+        const float along = l->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL ? 100 * to : to - from;
+        float near_side = (l->box_low[c] - from) / along, far_side = (l->box_high[c] - from) / along;
+        if (fabsf(along) < 1e-9f) {
+            if (from < l->box_low[c] || from > l->box_high[c]) return 0;
+            continue;
+        }
+        begin = fmaxf(begin, fminf(near_side, far_side));
+        end = fminf(end, fmaxf(near_side, far_side));
+    }
+    return begin < end;
+}
+
+/* Meshes take light from splats: the library asks, by several threads at once. */
+static void mesh_shadow(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    for (int i = 0; i < count; i++)
+        if (box_hides((const level *)user, light, points + 3 * i)) fraction[i] = 0;
+}
+
+/* What of a light comes to a place on a mesh, before shadows: irradiance. */
+static float irradiance(const level *l, int light, const float point[3], const float normal[3]) {
+    const ssdgs_light *from = l->lights + light;
+    float to[3], strength = l->light_scale, cosine = 0, along = 0;
+    for (int c = 0; c < 3; c++)
+        to[c] = from->kind == SSDGS_LIGHT_DIRECTIONAL ? from->position[c] : from->position[c] - point[c];
+    if (from->kind == SSDGS_LIGHT_SPOT) strength /= to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+    normalize(to);
+    for (int c = 0; c < 3; c++) cosine += to[c] * normal[c], along -= to[c] * from->direction[c];
+    if (from->kind == SSDGS_LIGHT_SPOT) {
+        const float inner = cosf(from->cone[0]), outer = cosf(from->cone[1]);
+        const float t = fminf(1, fmaxf(0, (along - outer) / (inner - outer)));
+        strength *= t * t;
+    }
+    return strength * fmaxf(0, cosine);
+}
+
+/* Lights the meshes' pixels. Splats take light from them: the scene is asked for all pixels at once. */
+static ssdgs_result shade_meshes(level *l) {
+    const int pixels = l->width * l->height;
+    const float ambient = 0.04f;
+    for (int i = 0; i < 3 * pixels; i++) l->lit[i] = l->albedo[i] * ambient;
+    for (int light = 0; light < LIGHTS; light++) {
+        const ssdgs_result result = ssdgs_scene_shadow(l->scene, light, l->world, pixels, l->passed);
+        if (result) return result;
+        for (int i = 0; i < pixels; i++) {
+            const float *at = l->world + 3 * i;
+            if (!(l->depth[i] < INFINITY) || box_hides(l, light, at)) continue;
+            const float e = irradiance(l, light, at, l->normal + 3 * i) * l->passed[i] / 3.14159265f;
+            for (int c = 0; c < 3; c++)
+                l->lit[3 * i + c] += l->albedo[3 * i + c] * e * l->lights[light].intensity[c];
+        }
+    }
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = l->lit;
+    ssdgs_to_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
+                    4 * (ptrdiff_t)l->width);
+    return SSDGS_OK;
+}
+
+/* ---- the level ---- */
+
+/* A ball of flat discs, for those who bring no model: matt and red, or mirroring and white. */
+static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **out) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
+    settings.shadow.layers = 0; /* nothing here is trained */
+    settings.light_map.bias = 0.16f;
+    ssdgs_result result = ssdgs_model_create(context, &settings, BALL, out);
+    for (int i = 0; i < BALL && !result; i++) {
+        const float z = 1 - (2 * (float)i + 1) / BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
+        const float normal[3] = {r * cosf(turn), r * sinf(turn), z};
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        for (int c = 0; c < 3; c++) {
+            g.position[c] = 0.5f * (g.normal[c] = normal[c]);
+            g.scale[c] = c < 2 ? 0.03f : 0.002f;
+            g.diffuse[c] = shiny ? 0.05f : c ? 0.2f : 0.8f;
+            g.specular[c] = shiny ? 3.0f : 0.3f;
+        }
+        /* the third axis to the normal: half a turn about what lies between them */
+        g.rotation[0] = 0, g.rotation[1] = normal[0], g.rotation[2] = normal[1],
+        g.rotation[3] = normal[2] + 1;
+        g.opacity = 0.99f;
+        g.sharpness[0] = g.sharpness[1] = shiny ? 20.0f : 4.0f;
+        g.f0 = shiny ? 0.6f : 0.04f;
+        result = ssdgs_model_set(*out, i, &g);
+    }
+    return result ? result : ssdgs_model_sort(*out);
+}
+
+/* An object of this height that stands on the floor at x, y, turned about the vertical. */
+static ssdgs_result place(ssdgs_model *model, float height, float x, float y, float turn,
+                          ssdgs_object *object) {
+    ssdgs_real low[3], high[3];
+    *object = ssdgs_object_default(model);
+    const ssdgs_result result = ssdgs_model_bounds(model, low, high);
+    const float s = height / (high[2] - low[2]), c = s * cosf(turn), d = s * sinf(turn);
+    const float rows[12] = {c, -d, 0, x, d, c, 0, y, 0, 0, s, -s * low[2]};
+    const float middle[2] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2};
+    memcpy(object->to_world, rows, sizeof rows);
+    for (int i = 0; i < 2; i++)
+        object->to_world[4 * i + 3] -= rows[4 * i] * middle[0] + rows[4 * i + 1] * middle[1];
+    return result;
+}
+
+static ssdgs_result move(level *l, float t) { /* t: 0 .. 1 */
+    const float turn = 6.2831853f * t, sun[3] = {0.48f, -0.36f, 0.8f}, aim[3] = {0, 0.2f, 0.4f};
+    const float eye[3] = {3.2f * sinf(0.5f * sinf(turn)), -3.2f * cosf(0.5f * sinf(turn)), 1.7f};
+    ssdgs_light *spot = l->lights, *far_away = l->lights + 1;
+    look_at(eye, aim, l->view);
+    perspective(0.75f, (float)l->width / (float)l->height, 0.05f, l->projection);
+    memset(l->lights, 0, sizeof l->lights);
+    spot->kind = SSDGS_LIGHT_SPOT;
+    spot->position[0] = 2.2f * cosf(turn), spot->position[1] = -1.2f + 0.8f * sinf(turn),
+    spot->position[2] = 2.6f;
+    for (int c = 0; c < 3; c++) spot->direction[c] = aim[c] - spot->position[c];
+    normalize(spot->direction);
+    spot->cone[0] = 0.3f, spot->cone[1] = 0.5f;
+    far_away->kind = SSDGS_LIGHT_DIRECTIONAL;
+    for (int c = 0; c < 3; c++) {
+        spot->intensity[c] = (c == 2 ? 24.0f : 30.0f) / l->light_scale;
+        far_away->intensity[c] = (c ? 0.5f + 0.1f * (float)c : 0.5f) / l->light_scale;
+        far_away->position[c] = sun[c];
+    }
+    ssdgs_result result = place(l->models[0], 1.0f, -0.75f, 0.1f, turn, l->objects);
+    if (!result) result = place(l->models[1], 0.8f, 0.85f, 0.3f, 0.6f, l->objects + 1);
+    if (!result) result = place(l->models[0], 0.5f, 0.15f, -0.8f, 2 - turn, l->objects + 2);
+    l->objects[2].tint[0] = 0.5f; /* the same model, bluer */
+    return result;
+}
+
+/* What an engine does for a frame. */
+static ssdgs_result draw_frame(level *l, float t) {
+    ssdgs_image image;
+    ssdgs_result result = move(l, t);
+    memset(&image, 0, sizeof image);
+    image.color = l->color;
+    image.alpha = l->alpha;
+    image.scene_depth = l->depth;
+    if (!result)
+        result = ssdgs_camera_from_matrices(l->context, l->view, l->projection, SSDGS_COLUMN_MAJOR, l->width,
+                                            l->height, &l->camera);
+    if (!result) result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, l->lights, LIGHTS, NULL);
+    if (!result) draw_meshes(l);
+    if (!result) result = shade_meshes(l);
+    if (!result)
+        result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, NULL,
+                                    &image, NULL);
+    if (!result)
+        ssdgs_blend_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
+                           4 * (ptrdiff_t)l->width);
+    return result;
+}
+
+static ssdgs_result open_level(level *l, const char *const models[2]) {
+    const ssdgs_occluder meshes = {mesh_shadow, l, 1}; /* the box does not move; a moving one changes the 1 */
+    const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
+    memcpy(l->box_low, low, sizeof low);
+    memcpy(l->box_high, high, sizeof high);
+    ssdgs_result result = ssdgs_context_create(NULL, &l->context);
+    for (int i = 0; i < 2 && !result; i++)
+        result = models[i] ? ssdgs_model_load(l->context, models[i], l->models + i, NULL)
+                           : make_ball(l->context, i, l->models + i);
+    if (!result) result = ssdgs_scene_create(l->context, &l->scene);
+    if (result) return result;
+    ssdgs_scene_occlude(l->scene, &meshes);
+    l->light_scale = ssdgs_model_settings(l->models[0])->light_scale;
+    return SSDGS_OK;
+}
+
+static int write_png(const char *prefix, const char *name, int width, int height,
+                     const unsigned char *pixels) {
+    char path[1200], error[512];
+    snprintf(path, sizeof path, "%s%s", prefix, name);
+    if (!olat_write_png(path, width, height, 4, pixels, error)) return 0;
+    fprintf(stderr, "%s\n", error);
+    return 1;
+}
+
+int main(int argc, char **argv) {
+    const char *out = "build/engine_", *models[2] = {NULL, NULL};
+    int frames = 120, given = 0, failed = 0;
+    level l;
+    memset(&l, 0, sizeof l);
+    l.width = 480, l.height = 270;
+    for (int i = 1; i < argc && !failed; i++) {
+        if (!strcmp(argv[i], "--frames") && i + 1 < argc) frames = atoi(argv[++i]);
+        else if (!strcmp(argv[i], "--out") && i + 1 < argc) out = argv[++i];
+        else if (!strcmp(argv[i], "--size") && i + 2 < argc)
+            l.width = atoi(argv[++i]), l.height = atoi(argv[++i]);
+        else if (argv[i][0] != '-' && given < 2) models[given++] = argv[i];
+        else failed = 1;
+    }
+    if (failed || frames < 1 || frames > 999 || l.width < 16 || l.height < 16 || l.width > 4096 ||
+        l.height > 4096) {
+        fprintf(stderr,
+                "usage: engine [--frames N, 1 .. 999] [--size W H, 16 .. 4096] [--out PREFIX] [MODEL.ply "
+                "[MODEL.ply]]\n");
+        return 2;
+    }
+    const size_t pixels = (size_t)l.width * (size_t)l.height;
+    float *planes = (float *)calloc(pixels * 18, sizeof *planes);
+    unsigned char *sheet = (unsigned char *)calloc(pixels * SHEET * SHEET, 4);
+    l.pixels = (unsigned char *)malloc(pixels * 4);
+    l.depth = planes, l.alpha = planes + pixels, l.passed = planes + 2 * pixels,
+    l.normal = planes + 3 * pixels;
+    l.albedo = planes + 6 * pixels, l.world = planes + 9 * pixels, l.lit = planes + 12 * pixels;
+    l.color = planes + 15 * pixels;
+    failed = !planes || !sheet || !l.pixels;
+    if (failed) fprintf(stderr, "out of memory\n");
+    ssdgs_result result = failed ? SSDGS_OK : open_level(&l, models);
+    for (int frame = 0; frame < frames && !result && !failed; frame++) {
+        char name[32];
+        result = draw_frame(&l, (float)frame / (float)frames);
+        if (result) break;
+        snprintf(name, sizeof name, "%03d.png", frame);
+        failed = write_png(out, name, l.width, l.height, l.pixels);
+        for (int i = 0; i < SHEET * SHEET; i++) { /* every ninth part of the way */
+            if (frame != i * frames / (SHEET * SHEET)) continue;
+            for (int y = 0; y < l.height; y++)
+                memcpy(sheet + 4 * ((size_t)(i / SHEET * l.height + y) * (size_t)(SHEET * l.width) +
+                                    (size_t)(i % SHEET * l.width)),
+                       l.pixels + 4 * (size_t)y * (size_t)l.width, 4 * (size_t)l.width);
+        }
+    }
+    if (result) fprintf(stderr, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(l.context));
+    if (!result && !failed) failed = write_png(out, "sheet.png", SHEET * l.width, SHEET * l.height, sheet);
+    ssdgs_scene_destroy(l.scene);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(l.models[i]);
+    ssdgs_context_destroy(l.context);
+    free(planes), free(sheet), free(l.pixels);
+    return result || failed;
+}
