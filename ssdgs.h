@@ -124,7 +124,7 @@ SCENES, as engines have them: examples/engine.c is one
   ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
   together, shadowing each other. What the networks predict and what true dipole transport brings stays within
   an object and its own space. Pixels light objects of other lobes one by one, so that none blends with what
-  is behind it before it is lit. A light's map covers all objects, with at most 2048 pixels a side. A frame:
+  is behind it before it is lit. A light's map covers all objects, with at most 1024 pixels a side. A frame:
       ssdgs_camera_from_matrices()   the engine's view and projection
       ssdgs_scene_light()            the lights' maps
       draw the meshes, with shadows of splats by ssdgs_scene_shadow()
@@ -3246,7 +3246,8 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     if (!views) return faces;
     int map = settings->light_map.size;
     if (!map) {
-        const double size = 2 * radius / exp(b->log_scale), most = frame->object_count > 1 ? 2048 : 512;
+        const double size = 2 * radius / exp(b->log_scale),
+                     most = frame->object_count > 1 && faces == 1 ? 1024 : 512;
         map = (int)(size < 64 ? 64 : size > most ? most : size);
     }
     const double size = map * detail < 8192 ? map * detail : 8192;
