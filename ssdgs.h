@@ -250,15 +250,18 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_logger logger;              /* none */
     ssdgs_parallel parallel;          /* threads of the context's own */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
-    int threads;                      /* how many of its own, the caller counted; 0 = one per CPU */
-    ssdgs_isa isa;                    /* the best this CPU has; ERR_ISA where one is missing */
+    int threads;   /* how many of its own, the caller counted; 0 = one per CPU. With `parallel`: how many that
+                      has; 0 = 4. It is given thrice as many tasks at once */
+    ssdgs_isa isa; /* the best this CPU has; ERR_ISA where one is missing */
 } ssdgs_context_desc;
 
 /* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
-/* Joins the threads. The memory stays until the context's models, scenes and trainers are gone too. NULL is
- * fine. */
+/* Joins the threads. The memory stays until what was made on the context is gone too. NULL is fine. */
 SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
+/* Gives back the memory that frames and training have left for the next; those that follow take it anew. What
+   models and scenes keep stays theirs. */
+SSDGS_API void ssdgs_context_trim(ssdgs_context *context);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
 SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
@@ -327,6 +330,9 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
                                           ssdgs_model **out);
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model); /* NULL is fine */
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
+/* Hands a model to another context, after loading it on another thread for instance, while no call is at work
+   on either. Both must have the same allocator. ERR_ARGUMENT: they have not, or a trainer has the model. */
+SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to);
 
 /* One Gaussian in physical units. */
 typedef struct ssdgs_gaussian {
@@ -421,19 +427,18 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
    clamped (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background =
    color. */
 typedef struct ssdgs_image {
-    int stride;               /* pixels from row to row; 0 = camera width */
-    ssdgs_real *color;        /* (h,w,3) */
-    ssdgs_real *alpha;        /* (h,w) */
-    ssdgs_real *depth;        /* (h,w) sum of weight x camera depth: divide by alpha */
-    ssdgs_real *normal;       /* (h,w,3) sum of weight x normal, world */
-    ssdgs_real *diffuse;      /* (h,w,3) */
-    ssdgs_real *specular;     /* (h,w,3) */
-    ssdgs_real *scattering;   /* (h,w,3) */
-    ssdgs_real *shadow;       /* (h,w) sum of weight x S, averaged over the lights */
-    ssdgs_real *median_depth; /* (h,w) camera depth at which half of what is behind is hidden; 0: nowhere */
-    const ssdgs_real
-        *scene_depth; /* (h,w), read: camera depth of what else is in the picture; Gaussians whose
-                         centres are not nearer are not blended there. NULL: nothing else */
+    int stride;                    /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;             /* (h,w,3) */
+    ssdgs_real *alpha;             /* (h,w) */
+    ssdgs_real *depth;             /* (h,w) sum of weight x camera depth: divide by alpha */
+    ssdgs_real *normal;            /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;           /* (h,w,3) */
+    ssdgs_real *specular;          /* (h,w,3) */
+    ssdgs_real *scattering;        /* (h,w,3) */
+    ssdgs_real *shadow;            /* (h,w) sum of weight x S, averaged over the lights */
+    ssdgs_real *median_depth;      /* (h,w) camera depth where transmittance falls below 1/2; 0: nowhere */
+    const ssdgs_real *scene_depth; /* (h,w) read: camera depth of meshes and the like, which hide Gaussians
+                                      whose centres are behind them; may be NULL or infinite */
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
@@ -841,22 +846,21 @@ typedef struct ssdgs_placed {
     uint64_t revision; /* of the model */
     ssdgs_settings settings;
     ssdgs_model_view gaussians;
-    int first;       /* a multiple of 64; the gaps that this leaves are not drawn */
-    int terms;       /* to render, after settings and options */
-    int light_count; /* the frame's, 0 where colours are baked */
-    int turned;      /* 0: rotation is the identity */
-    ssdgs_real
-        rotation[9]; /* row-major, to the world; it may mirror. A point goes to scale rotation p + offset */
-    ssdgs_real scale, offset[3], tint[3];
+    int first;                                /* a multiple of 64; the gaps that this leaves are not drawn */
+    int terms;                                /* to render, after settings and options */
+    int light_count;                          /* the frame's, 0 where colours are baked */
+    int turned;                               /* 0: rotation is the identity */
+    ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
+    ssdgs_real tint[3];
     int material; /* pixels blend and light the layers of each material by themselves */
 } ssdgs_placed;
 
 typedef struct ssdgs_frame {
     ssdgs_context *context;
-    ssdgs_model *model; /* this and the next two are the first object's; in training there is no other */
+    ssdgs_model *model; /* this and the next two: the first object's that is not baked, or the first's */
     ssdgs_settings settings;
     ssdgs_model_view gaussians;
-    ssdgs_placed *objects;
+    ssdgs_placed *objects; /* in training one */
     int object_count;
     int count; /* Gaussians of all objects and the gaps between them; n below */
     int material_count;
@@ -1551,7 +1555,7 @@ struct ssdgs_context {
     const ssdgs__kernels *k;
     struct ssdgs__pool *pool;
     struct ssdgs__scratch *scratch; /* reused by every frame on this context */
-    int isa, threads;
+    int isa, threads, groups;       /* groups: of tasks for a job system; 0: there is none */
     int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
                           frees it */
     volatile int busy; /* 1 while a call is at work */
@@ -1966,8 +1970,28 @@ static void ssdgs__pool_forked(ssdgs_context *context) {
 #endif
 }
 
+/* Of `count` tasks every groups-th: in images the dear ones are neighbours. */
+typedef struct ssdgs__group_job {
+    ssdgs__task task;
+    void *data;
+    int count, groups;
+} ssdgs__group_job;
+
+static void ssdgs__group_task(void *data, int index) {
+    const ssdgs__group_job *job = (const ssdgs__group_job *)data;
+    for (int i = index; i < job->count; i += job->groups) job->task(job->data, i);
+}
+
+/* For a job system, where a task costs more than on threads of our own, in groups. */
 static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
-    if (count > 0) context->parallel.run(context->parallel.user, count, task, data);
+    ssdgs__group_job job;
+    job.task = task;
+    job.data = data;
+    job.count = count;
+    job.groups = context->groups && context->groups < count ? context->groups : count;
+    if (count < 1) return;
+    if (job.groups == count) context->parallel.run(context->parallel.user, count, task, data);
+    else context->parallel.run(context->parallel.user, job.groups, ssdgs__group_task, &job);
 }
 
 /* ==== >>cpu  which tables this machine can run ==== */
@@ -2086,6 +2110,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     context->references = 1;
     context->parallel = zero.parallel;
     context->threads = 1;
+    context->groups = context->parallel.run ? 3 * (zero.threads ? zero.threads : 4) : 0;
     if (!context->parallel.run) {
         ssdgs__context_serial(context);
 #ifndef SSDGS_NO_THREADS
@@ -2784,7 +2809,7 @@ typedef struct ssdgs__bounds { /* what the light's map must cover, and how finel
     int count;
 } ssdgs__bounds;
 
-/* Of a model, kept from frame to frame: what the last one found is there for the next. */
+/* Of a model or a scene, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
         shadow_known, transport, transport_known, objects, material_of;
@@ -2827,6 +2852,41 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
         if (reserved_) return reserved_; \
         (pointer) = (type *)(buffer).memory; \
     } while (0)
+
+SSDGS_API void ssdgs_context_trim(ssdgs_context *context) {
+    if (!context || ssdgs__enter(context, "ssdgs_context_trim")) return;
+    ssdgs__scratch_destroy(context, context->scratch);
+    context->scratch = NULL;
+    (void)ssdgs__leave(context, SSDGS_OK);
+}
+
+static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
+    ssdgs_context *from = model->context;
+    if (model->references > 1)
+        return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: a trainer has the model");
+    if (memcmp(&from->allocator, &to->allocator, sizeof from->allocator) != 0)
+        return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: the contexts' allocators differ");
+    ssdgs__frame_memory_destroy(from, model->frame);
+    model->frame = NULL;
+    model->context = to;
+    model->revision = ++to->revisions;
+    to->references++;
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
+    if (!model || !to) return SSDGS_ERR_ARGUMENT;
+    ssdgs_context *from = model->context;
+    ssdgs_result result = ssdgs__enter(from, "ssdgs_model_move");
+    if (result || from == to) return result ? result : ssdgs__leave(from, SSDGS_OK);
+    result = ssdgs__enter(to, "ssdgs_model_move");
+    if (result) return ssdgs__leave(from, result);
+    result = ssdgs__model_move(model, to);
+    (void)ssdgs__leave(to, SSDGS_OK);
+    if (result) return ssdgs__leave(from, result);
+    ssdgs__leave_and_drop(from);
+    return SSDGS_OK;
+}
 
 /* Room for `count` views; what the present ones own is kept. */
 static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_memory *m, int count) {
@@ -2962,7 +3022,7 @@ static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ss
         fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: projection shears, shifts or is flat");
     const double down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
-    const double sign[3] = {p[0] > 0 ? 1 : -1, p[5] * down > 0 ? 1 : -1, w > 0 ? 1 : -1};
+    const double sign[3] = {p[0] > 0 ? 1.0 : -1.0, p[5] * down > 0 ? 1.0 : -1.0, w > 0 ? 1.0 : -1.0};
     ssdgs_camera camera;
     memset(&camera, 0, sizeof camera);
     camera.width = width;
@@ -3090,9 +3150,10 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
         }
         gaussians += (o->model->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
     }
-    if (gaussians > SSDGS__MAX_GAUSSIANS || count > UINT16_MAX)
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects and more than %d Gaussians",
-                           count, count > UINT16_MAX ? 0 : SSDGS__MAX_GAUSSIANS);
+    if (count > UINT16_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects", count);
+    if (gaussians > SSDGS__MAX_GAUSSIANS)
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of more than %d Gaussians",
+                           SSDGS__MAX_GAUSSIANS);
     return SSDGS_OK;
 }
 

@@ -204,7 +204,7 @@ static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **o
     settings.light_map.bias = 0.16f;
     ssdgs_result result = ssdgs_model_create(context, &settings, BALL, out);
     for (int i = 0; i < BALL && !result; i++) {
-        const float z = 1 - (2 * (float)i + 1) / BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
+        const float z = 1 - (2 * (float)i + 1) / (float)BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
         const float normal[3] = {r * cosf(turn), r * sinf(turn), z};
         ssdgs_gaussian g = ssdgs_gaussian_default();
         for (int c = 0; c < 3; c++) {

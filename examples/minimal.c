@@ -26,7 +26,7 @@ static ssdgs_result fill(ssdgs_model *model) {
     const float orange[3] = {0.9f, 0.22f, 0.06f}, grey[3] = {0.42f, 0.42f, 0.42f}, up[3] = {0, 0, 1};
     ssdgs_result result = SSDGS_OK;
     for (int i = 0; i < BALL && !result; i++) { /* along a spiral from pole to pole */
-        const float z = 1 - (2 * (float)i + 1) / BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
+        const float z = 1 - (2 * (float)i + 1) / (float)BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
         const float normal[3] = {r * cosf(turn), r * sinf(turn), z};
         const float position[3] = {0.6f * normal[0], 0.6f * normal[1], 0.6f * normal[2] + 0.1f};
         const ssdgs_gaussian g = disc(position, normal, 0.045f, orange, 0.55f);

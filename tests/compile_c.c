@@ -15,6 +15,7 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_isa_string),
                                          ADDRESS(ssdgs_context_isa),
                                          ADDRESS(ssdgs_context_threads),
+                                         ADDRESS(ssdgs_context_trim),
                                          ADDRESS(ssdgs_settings_default),
                                          ADDRESS(ssdgs_settings_published),
                                          ADDRESS(ssdgs_model_create),
@@ -66,6 +67,7 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_blend_pixels),
                                          ADDRESS(ssdgs_model_adopt),
                                          ADDRESS(ssdgs_model_bounds),
+                                         ADDRESS(ssdgs_model_move),
                                          ADDRESS(ssdgs_checkpoint_iteration)};
 
 int main(void) {
