@@ -940,8 +940,8 @@ static void test_matrices(void) {
     for (int kind = 0; kind < 64; kind++) {
         const int column_major = kind & 1, y_down = kind >> 1 & 1, left = kind >> 2 & 1,
                   reverse = kind >> 3 & 1, gl = kind >> 4 & 1, infinite = kind >> 5 & 1;
-        const double axis[3] = {1, y_down ? 1 : -1,
-                                left ? 1 : -1}; /* of right, down, forward in view space */
+        const double axis[3] = {1, y_down ? 1.0 : -1.0,
+                                left ? 1.0 : -1.0}; /* of right, down, forward in view space */
         const double n = 0.1, far_plane = 50, s = axis[2], f = infinite ? 1e30 : far_plane;
         double near_z = reverse ? 1 : gl ? -1 : 0, far_z = reverse ? (gl ? -1 : 0) : 1;
         /* z = a s d + b, over d */
