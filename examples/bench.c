@@ -945,6 +945,64 @@ static void measure_scaling(bench *b) {
     print_table(t);
 }
 
+/* Placed objects of one model of 5,000 Gaussians on a square grid, under point lights that hang over it: a
+   frame in which the lights, the camera and an object move, and one in which nothing does. */
+static void measure_scenes(bench *b) {
+    static const int kinds[][2] = {{1, 1}, {3, 2}, {10, 1}, {10, 4}, {100, 1}}; /* objects, lights */
+    enum { KINDS = sizeof kinds / sizeof *kinds, MOST = 100, COUNT = 5000, LIGHTS = 4 };
+    const ssdgs_real *intensity = b->photos[0].light.intensity;
+    table *t = new_table(b, "scenes", "objects lights gaussians ms_moving ms_at_rest mib_held");
+    for (int k = 0; k < KINDS - 2 * b->quick; k++) {
+        const int objects = kinds[k][0], lights = kinds[k][1], side = (int)ceil(sqrt(objects));
+        static ssdgs_object object[MOST];
+        ssdgs_light light[LIGHTS];
+        ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+        ssdgs_real low[3], high[3];
+        ssdgs_scene *scene = NULL;
+        double best[2] = {1e30, 1e30};
+        session s;
+        meter m;
+        open_metered(b, &s, &m, 0);
+        reduce_session(&s, COUNT / (double)s.model->count);
+        check(s.context, ssdgs_model_bounds(s.model, low, high));
+        check(s.context, ssdgs_scene_create(s.context, &scene));
+        const ssdgs_real step =
+            (ssdgs_real)1.1 * (high[0] - low[0] > high[1] - low[1] ? high[0] - low[0] : high[1] - low[1]);
+        const ssdgs_real width = step * (ssdgs_real)side, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+        for (int i = 0; i < objects; i++) {
+            object[i] = ssdgs_object_default(s.model);
+            object[i].to_world[3] = step * ((ssdgs_real)(i % side) - (ssdgs_real)(side - 1) / 2);
+            object[i].to_world[7] = step * ((ssdgs_real)(i / side) - (ssdgs_real)(side - 1) / 2);
+        }
+        memset(light, 0, sizeof light);
+        for (int frame = 0; frame < (b->quick ? 8 : 24); frame++) {
+            const int moving = frame % 2 == 0; /* the frame after it is the same */
+            const ssdgs_real t01 = (ssdgs_real)(frame / 2) / 12, eye[3] = {t01 * width / 4, -width, width};
+            const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.9, SIDE, SIDE);
+            object[0].to_world[11] = t01 * step / 4;
+            for (int l = 0; l < lights; l++) {
+                light[l].position[0] = width * ((ssdgs_real)(l % 2) - (ssdgs_real)0.5 + t01 / 4);
+                light[l].position[1] = width * ((ssdgs_real)(l / 2 % 2) - (ssdgs_real)0.5);
+                light[l].position[2] = width;
+                for (int c = 0; c < 3; c++) light[l].intensity[c] = intensity[c] * width * width;
+            }
+            const double start = now();
+            check(s.context,
+                  ssdgs_scene_render(scene, object, objects, &camera, light, lights, NULL, &image, NULL));
+            const double ms = 1e3 * (now() - start);
+            if (frame > 1 && ms < best[!moving]) best[!moving] = ms;
+        }
+        char name[48];
+        snprintf(name, sizeof name, "%d object%s, %d light%s", objects, objects > 1 ? "s" : "", lights,
+                 lights > 1 ? "s" : "");
+        add_row(t, name, (double)objects, (double)lights, (double)objects * s.model->count, best[0], best[1],
+                (double)m.peak / 1048576);
+        ssdgs_scene_destroy(scene);
+        close_session(&s);
+    }
+    print_table(t);
+}
+
 /* Density control, every hundredth iteration, is left out: the number of Gaussians stays the model's. */
 static void measure_training(bench *b) {
     table *t = new_table(b, "training", "iterations ms_1_thread ms_all_threads hours_all_threads");
@@ -1005,6 +1063,7 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
     measure_sweep(b);
     measure_skipping(b);
     measure_scaling(b);
+    measure_scenes(b);
     measure_training(b);
 }
 
