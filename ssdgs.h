@@ -2963,6 +2963,8 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     return camera;
 }
 
+SSDGS__SMALL_BEGIN
+
 static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c, int mirrored) {
     if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
@@ -3047,6 +3049,8 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
                                                                       height, out));
 }
 
+SSDGS__SMALL_END
+
 /* ---- objects: models placed in a frame ---- */
 
 /* From the world to the object's space. */
@@ -3104,6 +3108,8 @@ static int ssdgs__piece_next(const ssdgs_frame *frame, int *at, int end, ssdgs__
     return 1;
 }
 
+SSDGS__SMALL_BEGIN
+
 static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_object *objects, int count) {
     int64_t gaussians = 0;
     const ssdgs_model *first = NULL;
@@ -3156,6 +3162,8 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                            SSDGS__MAX_GAUSSIANS);
     return SSDGS_OK;
 }
+
+SSDGS__SMALL_END
 
 /* Where a Gaussian reaches in the world, and its mean log scale; 0 where alpha_threshold, by its logit, lets
    it draw nothing. */
@@ -3510,6 +3518,8 @@ static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
     return raw > 20 ? (ssdgs_real)20 : raw < -10 ? (ssdgs_real)-10 : raw;
 }
 
+SSDGS__SMALL_BEGIN
+
 /* As an object sees it in its own space, where a length is 1 / scale of the world's. */
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light) {
     const ssdgs_settings *s = &o->settings;
@@ -3557,6 +3567,8 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     return k;
 }
 
+SSDGS__SMALL_END
+
 /* The lights as an object sees them. */
 static const ssdgs__lighting *ssdgs__lightings(const ssdgs_frame *frame, const ssdgs_placed *o) {
     return (const ssdgs__lighting *)frame->scratch->lightings.memory +
@@ -3568,6 +3580,8 @@ static const ssdgs__lighting *ssdgs__pixel_lightings(const ssdgs_frame *frame, i
     return (const ssdgs__lighting *)frame->scratch->lightings.memory +
            (ptrdiff_t)(frame->object_count + material) * frame->light_count;
 }
+
+SSDGS__SMALL_BEGIN
 
 /* Whether pixels are lit in the same way: by the same lobes, with the same kind of shadow. */
 static int ssdgs__lit_alike(const ssdgs__lighting *a, const ssdgs__lighting *b) {
@@ -3865,6 +3879,8 @@ static SSDGS__TRAINING ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ss
                                     NULL,    components, training, 0,      0,           NULL};
     return ssdgs__frame_begin(frame, model->context, &model->frame, &request);
 }
+
+SSDGS__SMALL_END
 
 /* ==== >>project  records, order, instances, tile lists ==== */
 
@@ -6311,6 +6327,8 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 /* Frames of ssdgs_object, what they keep, and what an engine asks of a model. All but the public functions is
    in >>frame (objects), >>shadow and >>composite. */
 
+SSDGS__SMALL_BEGIN
+
 struct ssdgs_scene {
     ssdgs_context *context;
     struct ssdgs__frame_memory *frame; /* of its frames */
@@ -6512,6 +6530,8 @@ SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3],
     const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_bounds");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_bounds(model, low, high));
 }
+
+SSDGS__SMALL_END
 
 /* ==== >>loss  0.8 L1 + 0.2 (1 - SSIM) with its gradient, transfer curve, metrics ==== */
 
