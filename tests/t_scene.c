@@ -1279,6 +1279,7 @@ static void test_refused(void) {
     CHECK(ssdgs_scene_render(NULL, object, 2, &camera, NULL, 0, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_scene_render(scene, object, 2, NULL, NULL, 0, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_scene_render(scene, object, 2, &camera, NULL, 0, NULL, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_scene_destroy(scene);
     CHECK(ssdgs_scene_create(NULL, &scene) == SSDGS_ERR_ARGUMENT && !scene);
     CHECK(ssdgs_scene_create(context, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(!ssdgs_scene_create(context, &scene));
