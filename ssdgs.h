@@ -3110,6 +3110,13 @@ static int ssdgs__piece_next(const ssdgs_frame *frame, int *at, int end, ssdgs__
 
 SSDGS__SMALL_BEGIN
 
+/* The square of the scale of a transform (3,4). */
+static double ssdgs__scale2(const ssdgs_real m[12]) {
+    double sum = 0;
+    for (int i = 0; i < 9; i++) sum += (double)m[i / 3 * 4 + i % 3] * (double)m[i / 3 * 4 + i % 3];
+    return sum / 3;
+}
+
 static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_object *objects, int count) {
     int64_t gaussians = 0;
     const ssdgs_model *first = NULL;
@@ -3118,7 +3125,7 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                            count < 0 ? "%d objects" : "%d objects, but the array is NULL", count);
     for (int i = 0; i < count; i++) {
         const ssdgs_object *o = objects + i;
-        double length2 = 0;
+        const double length2 = ssdgs__scale2(o->to_world);
         if (!o->model || o->model->context != context)
             return ssdgs__fail(
                 context, SSDGS_ERR_ARGUMENT,
@@ -3127,10 +3134,6 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
             if (!ssdgs__finite(o->to_world[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "object %d: to_world[%d] is not finite", i,
                                    j);
-        for (int j = 0; j < 9; j++) {
-            const double x = (double)o->to_world[j / 3 * 4 + j % 3];
-            length2 += x * x / 3;
-        }
         if (!(length2 >= 1e-24 && length2 <= 1e24))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "object %d: to_world's scale is %g", i,
                                sqrt(length2));
@@ -3439,6 +3442,11 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     return SSDGS_OK;
 }
 
+/* Whether an object's pixels are lit, not its Gaussians. */
+static int ssdgs__is_deferred(const ssdgs_placed *o) {
+    return o->settings.asg == SSDGS_ASG_DEFERRED && o->light_count;
+}
+
 /* Whether an object scatters what comes to it by true dipole transport. */
 static int ssdgs__has_transport(const ssdgs_placed *o) {
     return (o->terms & SSDGS_SCATTERING_TERM) && o->settings.transport && o->light_count;
@@ -3520,8 +3528,10 @@ static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
 
 SSDGS__SMALL_BEGIN
 
-/* As an object sees it in its own space, where a length is 1 / scale of the world's. */
-static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light) {
+/* As an object sees it in its own space, where a length is 1 / scale of the world's. lobes: another light's,
+   which has the same, or NULL. */
+static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
+                                          const ssdgs__lighting *lobes) {
     const ssdgs_settings *s = &o->settings;
     const ssdgs_light *from = frame->lights + light;
     const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
@@ -3544,13 +3554,14 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     k.refined_shadow = s->shadow.layers > 0;
     k.per_channel_optics = s->per_channel_optics;
     k.shadow_on_scattering = s->shadow_on_scattering;
-    k.deferred = s->asg == SSDGS_ASG_DEFERRED && o->light_count;
+    k.deferred = ssdgs__is_deferred(o);
     memcpy(k.view, frame->camera.view, sizeof k.view);
     k.inverse_fx = 1 / frame->camera.fx;
     k.inverse_fy = 1 / frame->camera.fy;
     k.cx = frame->camera.cx;
     k.cy = frame->camera.cy;
-    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+    if (lobes) memcpy(k.basis, lobes->basis, sizeof k.basis);
+    for (int j = 0; j < SSDGS_ASG_COUNT && !lobes; j++) {
         const ssdgs_real *sharpness = o->gaussians.asg_sharpness + 2 * j;
         ssdgs_real q[4], r[9], *b = k.basis + 12 * j;
         ssdgs__rotation_scalar(o->gaussians.asg_basis + 4 * j, q, r);
@@ -3605,15 +3616,16 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
         memset(world.offset, 0, sizeof world.offset);
         world.rotation[0] = world.rotation[4] = world.rotation[8] = world.scale = 1;
         world.settings.length_unit *= o->scale;
-        for (int light = 0; light < lights; light++) *table++ = ssdgs__lighting_of(frame, o, light);
+        const ssdgs__lighting *own = table;
+        for (int light = 0; light < lights; light++)
+            *table++ = ssdgs__lighting_of(frame, o, light, light ? own : NULL);
         if (!lights) continue;
-        const ssdgs__lighting lit = ssdgs__lighting_of(frame, &world, 0);
         for (o->material = 0; o->material < frame->material_count; o->material++)
-            if (ssdgs__lit_alike(pixels + o->material * (ptrdiff_t)lights, &lit)) break;
+            if (ssdgs__lit_alike(pixels + o->material * (ptrdiff_t)lights, own)) break;
         if (o->material < frame->material_count) continue;
         for (int light = 0; light < lights; light++)
             pixels[frame->material_count * (ptrdiff_t)lights + light] =
-                ssdgs__lighting_of(frame, &world, light);
+                ssdgs__lighting_of(frame, &world, light, own);
         frame->material_count++;
     }
     return SSDGS_OK;
@@ -3622,13 +3634,12 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
 /* A model where it stands. */
 static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     const ssdgs_real *m = object->to_world;
-    double length2 = 0;
+    const double length2 = ssdgs__scale2(m);
     memset(o, 0, sizeof *o);
     o->model = object->model;
     o->revision = o->model->revision;
     o->settings = o->model->settings;
     o->gaussians = ssdgs__model_view(o->model);
-    for (int i = 0; i < 9; i++) length2 += (double)m[i / 3 * 4 + i % 3] * (double)m[i / 3 * 4 + i % 3] / 3;
     o->scale = (ssdgs_real)(fabs(length2 - 1) < 1e-12 ? 1 : sqrt(length2));
     for (int i = 0; i < 9; i++) {
         o->rotation[i] = m[i / 3 * 4 + i % 3] / o->scale;
@@ -3825,9 +3836,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
     int deferred = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
-        const ssdgs_placed *o = frame->objects + i;
-        deferred |= o->settings.asg == SSDGS_ASG_DEFERRED && o->light_count;
-        transport |= o->settings.transport && (o->terms & SSDGS_SCATTERING_TERM);
+        deferred |= ssdgs__is_deferred(frame->objects + i);
+        transport |= ssdgs__has_transport(frame->objects + i);
     }
     if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
@@ -3926,9 +3936,8 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.by_distance = v->by_distance;
     p.compensate = v->compensate;
     p.blur = v->blur;
-    p.variance = v->variance;
-    if (v->light < 0) p.variance = s->pixel_variance;
-    else ssdgs__light_blur(s, &p.blur, &p.variance, &p.compensate);
+    p.variance = s->pixel_variance;
+    if (v->light >= 0) ssdgs__light_blur(s, &p.blur, &p.variance, &p.compensate);
     return p;
 }
 
@@ -6619,15 +6628,14 @@ static float ssdgs__from_half(uint16_t half) {
 
 /* Linear colour and alpha of a framebuffer's pixel, and back. */
 typedef struct ssdgs__framebuffer {
-    int format, red, size;       /* where in a pixel of bytes red is; bytes of a pixel */
+    int place[3], size;          /* of red, green, blue in a pixel of bytes; bytes of a pixel */
     const unsigned char *encode; /* NULL: bytes are linear */
     unsigned char bytes[SSDGS__PARTS];
     ssdgs_real decode[256];
 } ssdgs__framebuffer;
 
 static void ssdgs__framebuffer_make(ssdgs__framebuffer *f, int transfer, ssdgs_format format) {
-    f->format = (int)format;
-    f->red = format == SSDGS_BGRA8 ? 2 : 0;
+    for (int c = 0; c < 3; c++) f->place[c] = format == SSDGS_BGRA8 ? 2 - c : c;
     f->size = format == SSDGS_RGBA32F ? 16 : format == SSDGS_RGBA16F ? 8 : 4;
     f->encode = transfer == SSDGS_TRANSFER_SRGB ? f->bytes : NULL;
     if (f->size > 4) return;
@@ -6640,7 +6648,7 @@ static void ssdgs__pixel_get(const ssdgs__framebuffer *f, const unsigned char *f
     uint16_t half[4];
     float wide[4];
     if (f->size == 4) {
-        for (int c = 0; c < 3; c++) rgba[c] = f->decode[from[c == 1 ? 1 : c ? 2 - f->red : f->red]];
+        for (int c = 0; c < 3; c++) rgba[c] = f->decode[from[f->place[c]]];
         rgba[3] = (ssdgs_real)from[3] / 255;
         return;
     }
@@ -6653,8 +6661,7 @@ static void ssdgs__pixel_put(const ssdgs__framebuffer *f, const ssdgs_real rgba[
     uint16_t half[4];
     float wide[4];
     if (f->size == 4) {
-        for (int c = 0; c < 3; c++)
-            to[c == 1 ? 1 : c ? 2 - f->red : f->red] = ssdgs__byte(f->encode, rgba[c]);
+        for (int c = 0; c < 3; c++) to[f->place[c]] = ssdgs__byte(f->encode, rgba[c]);
         to[3] = ssdgs__byte(NULL, rgba[3]);
         return;
     }

@@ -635,7 +635,7 @@ static ssdgs__lighting lighting(const lobes *l, const double *p) {
         for (int i = 0; i < 2; i++) sharpness[2 * j + i] = (ssdgs_real)l->sharpness[j][i];
     }
     object.gaussians.asg_basis = basis, object.gaussians.asg_sharpness = sharpness;
-    return ssdgs__lighting_of(&frame, &object, 0);
+    return ssdgs__lighting_of(&frame, &object, 0, NULL);
 }
 
 static int channel_of(int parameter) {

@@ -281,7 +281,7 @@ static void test_asg(void) {
     }
     ssdgs_frame frame;
     begin(&frame, run.model, &camera, &lamp, 1, NULL);
-    run.k = ssdgs__lighting_of(&frame, frame.objects, 0);
+    run.k = ssdgs__lighting_of(&frame, frame.objects, 0, NULL);
     run.gauss = reals(run.stride * SSDGS_CHANNELS);
     run.dgauss = reals(run.stride * SSDGS_CHANNELS);
     run.rows = reals(run.stride * SSDGS__ROWS);
