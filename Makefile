@@ -20,8 +20,8 @@ OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
 PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
-HEADERS = ssdgs.h examples/olat.h tests/test.h tests/kernels.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/bench
+HEADERS = ssdgs.h examples/olat.h tests/test.h tests/scene.h tests/kernels.h
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
@@ -30,7 +30,7 @@ BUILDS = builds examples
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/bench
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
@@ -74,8 +74,11 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine
+$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
+
+test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry
+	sh tests/gltf.sh $(BUILD)
 
 test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc
 	sh tests/mpi.sh $(BUILD)
@@ -140,7 +143,7 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM:$(CC)%=mpicc%) $(LINKED)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
-$(BUILD)/hashes_64 $(BUILD)/t_scene_64: $(BUILD)/ssdgs_64.o
+$(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
 $(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(BUILD)/kernels_64.o

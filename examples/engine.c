@@ -170,11 +170,14 @@ static float irradiance(const level *l, int light, const float point[3], const f
     return strength * fmaxf(0, cosine);
 }
 
+/* Ambient irradiance, times 1 and z: blue from above, darker from below. */
+static const float sky[3][3] = {{0.10f, 0.12f, 0.15f}, {0, 0, 0}, {0.05f, 0.06f, 0.09f}};
+
 /* Lights the meshes' pixels. Splats take light from them: the scene is asked for all pixels at once. */
 static ssdgs_result shade_meshes(level *l) {
     const int pixels = l->width * l->height;
-    const float ambient = 0.04f;
-    for (int i = 0; i < 3 * pixels; i++) l->lit[i] = l->albedo[i] * ambient;
+    for (int i = 0; i < 3 * pixels; i++)
+        l->lit[i] = l->albedo[i] * (sky[0][i % 3] + sky[2][i % 3] * l->normal[3 * (i / 3) + 2]) / 3.14159265f;
     for (int light = 0; light < LIGHTS; light++) {
         const ssdgs_result result = ssdgs_scene_shadow(l->scene, light, l->world, pixels, l->passed);
         if (result) return result;
@@ -268,7 +271,9 @@ static ssdgs_result move(level *l, float t) { /* t: 0 .. 1 */
 /* What an engine does for a frame. */
 static ssdgs_result draw_frame(level *l, float t) {
     ssdgs_image image;
+    ssdgs_render_options options = ssdgs_render_options_default();
     ssdgs_result result = move(l, t);
+    for (int i = 0; i < 9; i++) options.ambient[i / 3][i % 3] = sky[i / 3][i % 3] / l->light_scale;
     memset(&image, 0, sizeof image);
     image.color = l->color;
     image.alpha = l->alpha;
@@ -276,11 +281,11 @@ static ssdgs_result draw_frame(level *l, float t) {
     if (!result)
         result = ssdgs_camera_from_matrices(l->context, l->view, l->projection, SSDGS_COLUMN_MAJOR, l->width,
                                             l->height, &l->camera);
-    if (!result) result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, l->lights, LIGHTS, NULL);
+    if (!result) result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, l->lights, LIGHTS, &options);
     if (!result) draw_meshes(l);
     if (!result) result = shade_meshes(l);
     if (!result)
-        result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, NULL,
+        result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options,
                                     &image, NULL);
     if (!result)
         ssdgs_blend_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,

@@ -624,9 +624,10 @@ static ssdgs__lighting lighting(const lobes *l, const double *p) {
     object.settings.eta = (ssdgs_real)l->eta;
     object.settings.asg = SSDGS_ASG_GEOMETRIC;
     object.terms = SSDGS_SPECULAR_TERM;
-    object.scale = 1;
+    object.scale = object.roughness = 1;
     for (int i = 0; i < 9; i += 4) object.rotation[i] = 1;
     frame.lights = &light;
+    frame.light_count = 1;
     for (int i = 0; i < 3; i++)
         light.position[i] = (ssdgs_real)p[LIGHT + i], frame.eye[i] = (ssdgs_real)p[EYE + i];
     ssdgs_real basis[4 * SSDGS_ASG_COUNT], sharpness[2 * SSDGS_ASG_COUNT];

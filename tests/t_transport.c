@@ -120,6 +120,7 @@ static void test_pairs(int sorted, double detail, double most_error) {
     double worst[SSDGS__LENGTHS] = {0}, most[SSDGS__LENGTHS] = {0}, all = 0;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
+    lights[0].intensity[0] = lights[1].intensity[0] = 1;
     on_sphere(model, COUNT);
     if (sorted) CHECK(!ssdgs_model_sort(model));
     ssdgs_frame frame;
@@ -166,6 +167,7 @@ static void test_plane(void) {
     ssdgs_light light;
     memset(&light, 0, sizeof light);
     light.position[2] = 2;
+    light.intensity[0] = 1;
     for (int i = 0; i < COUNT; i++) { /* 0.005 apart */
         const int row = i / ROW, column = i % ROW;
         model->gaussians[i] = (ssdgs_real)(0.005 * (column - ROW / 2));
@@ -199,6 +201,7 @@ static void test_inputs(void) {
     double worst = 0, most = 0, dark = 1e30;
     memset(lights, 0, sizeof lights);
     lights[0].position[2] = lights[1].position[0] = 2;
+    lights[0].intensity[0] = lights[1].intensity[0] = 1;
     on_sphere(model, COUNT);
     for (int i = 0; i < COUNT; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 6;
     CHECK(!ssdgs_model_sort(model));
@@ -259,6 +262,7 @@ static void test_flux(void) {
         memset(&light, 0, sizeof light);
         light.kind = part == 2 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
         light.position[2] = (ssdgs_real)(part == 2 ? 1 : height);
+        light.intensity[0] = 1;
         ssdgs_frame frame;
         begin(&frame, model, &light, 1);
         for (int i = 0; i < COUNT; i++) sum += (double)frame.flux[i];

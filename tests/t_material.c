@@ -1,0 +1,487 @@
+/* Materials changed and made in code, also as real64: an object's roughness, strength of highlights,
+   translucency and mask; media and mirrors beside what path tracing says of balls. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "scene.h"
+
+static const double pi = 3.14159265358979323846;
+static double exactly(double floats) { return real64 ? 1e-9 : floats; }
+
+static ssdgs_settings settings_of(int asg) {
+    ssdgs_settings s = small_settings();
+    s.asg = asg;
+    return s;
+}
+
+/* ---- objects that differ from their model ---- */
+
+static void show(const ssdgs_object *object, const ssdgs_light *lights, int count, const ssdgs_real sky,
+                 picture *p) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    for (int c = 0; c < 3; c++) options.ambient[0][c] = sky;
+    together(object, 1, &camera, lights, count, &options, p);
+}
+
+/* As a model whose Gaussians were written so: tint, strength of highlights, and of deferred ones their
+   sharpness. Those that the mask leaves out stay; half a mask is half of the way. */
+static void test_edits(int asg) {
+    enum { COUNT = 200 };
+    const ssdgs_settings settings = settings_of(asg);
+    const ssdgs_light lights[2] = {point_light(2, -2, 2), parallel_light(0.6, 0, 0.8)};
+    unsigned char mask[COUNT];
+    for (int i = 0; i < COUNT; i++) mask[i] = (unsigned char)(i % 3 == 0 ? 255 : i % 3 == 1 ? 0 : 102);
+    for (int masked = 0; masked < 2; masked++)
+        for (int sky = 0; sky < 2; sky++) {
+            ssdgs_model *model = cloud(&settings, 0, COUNT, 0.6), *written = cloud(&settings, 0, COUNT, 0.6);
+            ssdgs_object object = ssdgs_object_default(model), same_object = ssdgs_object_default(written);
+            object.tint[0] = (ssdgs_real)0.4;
+            object.tint[2] = (ssdgs_real)1.5;
+            object.specular = 3;
+            if (masked) object.mask = mask;
+            for (int i = 0; i < COUNT; i++) {
+                ssdgs_gaussian g;
+                const ssdgs_real share = masked ? (ssdgs_real)mask[i] / 255 : 1;
+                CHECK(!ssdgs_model_get(written, i, &g));
+                for (int c = 0; c < 3; c++) {
+                    const ssdgs_real tint = 1 + share * (object.tint[c] - 1);
+                    g.diffuse[c] *= tint;
+                    g.specular[c] *= tint * (1 + share * 2);
+                    g.scattering[c] *= tint;
+                }
+                CHECK(!ssdgs_model_set(written, i, &g));
+            }
+            show(&object, lights, 2, (ssdgs_real)sky, shot);
+            show(&same_object, lights, 2, (ssdgs_real)sky, shot + 1);
+            CHECK_NEAR(shot[0].value, shot[1].value, VALUES, exactly(2e-5), exactly(2e-4),
+                       "tint and strength");
+            object.tint[0] = object.tint[2] = object.specular = 1;
+            show(&object, lights, 2, (ssdgs_real)sky, shot + 1);
+            object.mask = NULL;
+            show(&object, lights, 2, (ssdgs_real)sky, shot + 2);
+            CHECK(same(shot + 1, shot + 2) && !same(shot, shot + 2)); /* nothing to take */
+            ssdgs_model_destroy(model);
+            ssdgs_model_destroy(written);
+        }
+}
+
+/* The mean brightness of a large facet's highlight under lights all over the sky is as before, whatever the
+   roughness; its middle is brighter where it is smoother. */
+static void test_roughness(int asg) {
+    static ssdgs_light lights[600];
+    enum { MANY = 600 };
+    ssdgs_settings settings = settings_of(asg);
+    settings.terms = SSDGS_SPECULAR_TERM;
+    ssdgs_model *model = NULL;
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    const ssdgs_real facing[3] = {(ssdgs_real)0.4, (ssdgs_real)-2.2, (ssdgs_real)0.8};
+    CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+    for (int c = 0; c < 3; c++) {
+        g.scale[c] = (ssdgs_real)0.3;
+        g.normal[c] = facing[c];
+    }
+    g.opacity = (ssdgs_real)0.9;
+    g.sharpness[0] = 4;
+    g.sharpness[1] = 6;
+    CHECK(!ssdgs_model_set(model, 0, &g));
+    for (int i = 0; i < MANY; i++) {
+        const double z = 1 - 2 * (i + 0.5) / MANY, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
+        lights[i] = parallel_light(across * cos(turn), across * sin(turn), z);
+        lights[i].unshadowed = 1;
+        /* geometric lobes do not end at the horizon: the sky does */
+        double above = 0;
+        for (int c = 0; c < 3; c++) above += (double)(lights[i].position[c] * facing[c]);
+        if (above < 0) memset(lights[i].intensity, 0, sizeof lights[i].intensity);
+    }
+    ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_light ahead = parallel_light(0.4 / 2.3748, -2.2 / 2.3748, 0.8 / 2.3748);
+    const int middle = 6 * PIXELS + 3 * (SIDE / 2 * SIDE + SIDE / 2);
+    double even = 0, last = 1e9;
+    for (int i = 0; i < 5; i++) {
+        static const double roughness[5] = {1, 0.5, 0.8, 1.25, 2};
+        object.roughness = (ssdgs_real)roughness[i];
+        show(&object, lights, MANY, 0, shot);
+        const double all = (double)shot[0].value[middle];
+        if (!i) even = all;
+        if (!real64) printf("figure roughness_%d_%g %.3f of the light\n", asg, roughness[i], all / even);
+        CHECK(fabs(all / even - 1) < 0.12);
+        show(&object, &ahead, 1, 0, shot + 1);
+        if (i > 0) CHECK((double)shot[1].value[middle] < last);
+        if (i > 0) last = (double)shot[1].value[middle];
+        show(&object, NULL, 0, 1, shot + 2); /* ambient light sees the same of each */
+        if (!i) shot[3] = shot[2];
+        CHECK_NEAR(shot[2].value, shot[3].value, 3 * PIXELS, exactly(1e-6), exactly(1e-4),
+                   "ambient of any roughness");
+    }
+    if (asg == SSDGS_ASG_DEFERRED) { /* as a Gaussian of that sharpness */
+        object.roughness = 2;
+        show(&object, &ahead, 1, 0, shot);
+        g.sharpness[0] = 1;
+        g.sharpness[1] = (ssdgs_real)1.5;
+        CHECK(!ssdgs_model_set(model, 0, &g));
+        object.roughness = 1;
+        show(&object, &ahead, 1, 0, shot + 1);
+        const double ratio = (double)(shot[0].value[middle] / shot[1].value[middle]);
+        for (int i = 0; i < PIXELS; i++)
+            for (int c = 0; c < 3; c++) shot[1].value[6 * PIXELS + 3 * i + c] *= (ssdgs_real)ratio;
+        CHECK(ratio > 0.1 && ratio < 0.5);
+        CHECK_NEAR(shot[0].value + 6 * PIXELS, shot[1].value + 6 * PIXELS, 3 * PIXELS, exactly(1e-6),
+                   exactly(1e-4), "its form");
+    }
+    ssdgs_model_destroy(model);
+}
+
+/* ---- media ---- */
+
+static const double red[3] = {40, 32, 24}, dark[3] = {0.05, 0.2, 0.8}; /* sigma_s, sigma_a: wax */
+enum { BALL = 20000 };
+
+static ssdgs_model *ball(const ssdgs_settings *settings, double radius) {
+    ssdgs_model *model = NULL;
+    if (!CHECK(!ssdgs_model_create(context, settings, BALL, &model))) exit(1);
+    for (int i = 0; i < BALL; i++) {
+        const double z = 1 - 2 * (i + 0.5) / BALL, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
+        const double n[3] = {across * cos(turn), across * sin(turn), z};
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        for (int c = 0; c < 3; c++) {
+            g.position[c] = (ssdgs_real)((radius - 0.004) * n[c]);
+            g.normal[c] = (ssdgs_real)n[c];
+            g.scale[c] = (ssdgs_real)(radius * (c < 2 ? 0.018 : 0.002));
+            g.scattering[c] = 1;
+        }
+        memset(g.diffuse, 0, sizeof g.diffuse);
+        memset(g.specular, 0, sizeof g.specular);
+        g.rotation[0] = 0, g.rotation[1] = g.normal[0], g.rotation[2] = g.normal[1],
+        g.rotation[3] = g.normal[2] + 1;
+        g.opacity = (ssdgs_real)0.99;
+        CHECK(!ssdgs_model_set(model, i, &g));
+    }
+    CHECK(!ssdgs_model_sort(model));
+    return model;
+}
+
+static ssdgs_settings wax(void) {
+    ssdgs_settings s = ssdgs_settings_default();
+    s.terms = SSDGS_SCATTERING_TERM;
+    s.scattering.layers = s.shadow.layers = 0;
+    s.eta = 1;
+    for (int c = 0; c < 3; c++) {
+        s.medium.scattering[c] = (ssdgs_real)red[c];
+        s.medium.absorption[c] = (ssdgs_real)dark[c];
+    }
+    return s;
+}
+
+static uint64_t drawn;
+static double next(void) { return test_uniform(77, drawn++); }
+
+/* How far it is from x along d to the surface of a ball around 0. */
+static double way_out(const double x[3], const double d[3], double radius) {
+    double along = 0, x2 = 0;
+    for (int c = 0; c < 3; c++) {
+        along += x[c] * d[c];
+        x2 += x[c] * x[c];
+    }
+    return -along + sqrt(fmax(0, along * along + radius * radius - x2));
+}
+
+/* Radiance that leaves a ball of a medium, isotropic and of the index around it, against a ray, by so many
+   paths: at each place where light scatters, the sun's. */
+static double traced(const double x0[3], const double d0[3], const double sun[3], double radius,
+                     double scattering, double absorption, int paths) {
+    double sum = 0;
+    for (int path = 0; path < paths; path++) {
+        double x[3], d[3], weight = 1;
+        for (int c = 0; c < 3; c++) x[c] = x0[c], d[c] = d0[c];
+        for (int bounce = 0; bounce < 2000; bounce++) {
+            const double step = -log(1 - next()) / (scattering + absorption);
+            if (step >= way_out(x, d, radius)) break;
+            for (int c = 0; c < 3; c++) x[c] += step * d[c];
+            weight *= scattering / (scattering + absorption);
+            sum += weight * exp(-(scattering + absorption) * way_out(x, sun, radius)) / (4 * pi);
+            if (weight < 0.1) {
+                if (next() < 0.5) break;
+                weight *= 2;
+            }
+            const double z = 1 - 2 * next(), across = sqrt(1 - z * z), turn = 2 * pi * next();
+            d[0] = across * cos(turn), d[1] = across * sin(turn), d[2] = z;
+        }
+    }
+    return sum / paths;
+}
+
+/* The ray through the middle of a pixel: where it meets the ball, and whether it does. */
+static int meets(const ssdgs_camera *camera, int pixel, double radius, double x[3], double d[3]) {
+    double eye[3], along = 0, eye2 = 0, length = 0;
+    const double u = (pixel % SIDE + 0.5 - (double)camera->cx) / (double)camera->fx;
+    const double v = (pixel / SIDE + 0.5 - (double)camera->cy) / (double)camera->fy;
+    for (int c = 0; c < 3; c++) {
+        d[c] = (double)(camera->view[c]) * u + (double)camera->view[4 + c] * v + (double)camera->view[8 + c];
+        length += d[c] * d[c];
+        eye[c] = -(double)(camera->view[c] * camera->view[3] + camera->view[4 + c] * camera->view[7] +
+                           camera->view[8 + c] * camera->view[11]);
+    }
+    for (int c = 0; c < 3; c++) {
+        d[c] /= sqrt(length);
+        along += eye[c] * d[c];
+        eye2 += eye[c] * eye[c];
+    }
+    const double root = along * along - eye2 + radius * radius;
+    for (int c = 0; c < 3; c++) x[c] = eye[c] + (-along - sqrt(fmax(root, 0))) * d[c];
+    return root > 0.02 * radius * radius; /* not the very rim */
+}
+
+/* A picture's pixels, where given, beside others in sRGB, the brightest white. */
+static double decibels(const ssdgs_real *color, const double *want, const unsigned char *given) {
+    double white = 1e-9, error2 = 0, count = 0;
+    for (int i = 0; i < 3 * PIXELS; i++)
+        if (given[i / 3]) white = fmax(white, want[i]);
+    for (int i = 0; i < 3 * PIXELS; i++) {
+        if (!given[i / 3]) continue;
+        const double d = (double)ssdgs_srgb_encode((ssdgs_real)fmin(1, fmax((double)color[i] / white, 0))) -
+                         (double)ssdgs_srgb_encode((ssdgs_real)(want[i] / white));
+        error2 += d * d;
+        count++;
+    }
+    return -10 * log10(error2 / count);
+}
+
+/* A ball of wax, lit from beside the camera, from the side and from behind. */
+static void test_wax(void) {
+    static double want[3 * PIXELS];
+    static unsigned char given[PIXELS];
+    const ssdgs_settings settings = wax();
+    ssdgs_model *model = ball(&settings, 0.5);
+    const ssdgs_camera camera = camera_from(0, -2, 0);
+    for (int side = 0; side < 3; side++) {
+        static const double suns[3][3] = {{0.48, -0.8, 0.36}, {0.96, 0, 0.28}, {0.6, 0.8, 0}};
+        ssdgs_light sun = parallel_light(suns[side][0], suns[side][1], suns[side][2]);
+        for (int c = 0; c < 3; c++) sun.intensity[c] = 1;
+        alone(model, &camera, &sun, 1, NULL, shot);
+        memset(given, 0, sizeof given);
+        for (int pixel = 0; pixel < PIXELS; pixel += 3) {
+            double x[3], d[3];
+            if (!meets(&camera, pixel, 0.5, x, d)) continue;
+            given[pixel] = 1;
+            for (int c = 0; c < 3; c++)
+                want[3 * pixel + c] = traced(x, d, suns[side], 0.5, red[c], dark[c], 150);
+        }
+        const double dB = decibels(shot[0].value, want, given);
+        double ratio[3];
+        for (int c = 0; c < 3; c++) {
+            double sums[2] = {0, 0};
+            for (int pixel = 0; pixel < PIXELS; pixel++)
+                if (given[pixel])
+                    sums[0] += (double)shot[0].value[3 * pixel + c], sums[1] += want[3 * pixel + c];
+            ratio[c] = sums[0] / sums[1];
+        }
+        printf("figure wax_%d %.1f dB from path tracing; in all %.2f, %.2f, %.2f of the light\n", side, dB,
+               ratio[0], ratio[1], ratio[2]);
+        CHECK(dB > 26 - 4 * side);
+    }
+    ssdgs_model_destroy(model);
+}
+
+/* Twice as translucent is a medium of half the density; light that no one shadows scatters as beneath a
+   plane; so does ambient light. What is kept of another translucency does not serve. */
+static void test_translucency(void) {
+    ssdgs_settings settings = wax(), thin = wax();
+    thin.eta = settings.eta = (ssdgs_real)1.3;
+    for (int c = 0; c < 3; c++) {
+        thin.medium.scattering[c] /= 2;
+        thin.medium.absorption[c] /= 2;
+    }
+    ssdgs_model *model = ball(&settings, 0.5), *thinner = ball(&thin, 0.5);
+    ssdgs_object object = ssdgs_object_default(model), thin_object = ssdgs_object_default(thinner);
+    const ssdgs_light sun = parallel_light(0.96, 0, 0.28);
+    show(&thin_object, &sun, 1, 0, shot);
+    show(&object, &sun, 1, 0, shot + 1);
+    object.translucency = 2;
+    for (int again = 0; again < 2; again++) {
+        show(&object, &sun, 1, 0, shot + 2);
+        CHECK_NEAR(shot[2].value, shot[0].value, 3 * PIXELS, exactly(2e-5), exactly(2e-4),
+                   "twice as translucent");
+    }
+    object.translucency = 1;
+    show(&object, &sun, 1, 0, shot + 2);
+    CHECK(same(shot + 1, shot + 2) && !same(shot, shot + 1));
+    /* from the file too */
+    const char *const path = real64 ? "build/t_material_64.ply" : "build/t_material.ply";
+    CHECK(!ssdgs_model_save(model, path));
+    ssdgs_model *loaded = NULL;
+    CHECK(!ssdgs_model_load(context, path, &loaded, NULL));
+    CHECK(!memcmp(&ssdgs_model_settings(loaded)->medium, &settings.medium, sizeof settings.medium) || real64);
+    ssdgs_model_destroy(loaded);
+    remove(path);
+    /* beneath a plane: A / pi x cos, with A of eq. 5's medium and what both surfaces let through */
+    ssdgs_light plain = sun;
+    plain.unshadowed = 1;
+    for (int sky = 0; sky < 2; sky++) {
+        const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+        double x[3], d[3], error = 0;
+        show(&object, sky ? NULL : &plain, !sky, (ssdgs_real)sky, shot);
+        for (int pixel = 0; pixel < PIXELS; pixel++) {
+            if (!meets(&camera, pixel, 0.5, x, d) || shot[0].value[15 * PIXELS + pixel] < (ssdgs_real)0.99)
+                continue;
+            const double cosine = (x[0] * 0.96 + x[2] * 0.28) / 0.5;
+            if (!sky && cosine < 0.3) continue;
+            for (int c = 0; c < 3; c++) {
+                const double albedo = red[c] / (red[c] + dark[c]), root = sqrt(3 * (1 - albedo)), eta = 1.3;
+                const double fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+                const double a = albedo / 2 * (1 + exp(-4 * (1 + fdr) / (1 - fdr) * root / 3)) * exp(-root);
+                const double passed =
+                    1 + 0.4399 - 0.7099 * eta + 0.3319 * eta * eta - 0.0636 * eta * eta * eta;
+                const double irradiance = sky ? 1 : cosine * (double)plain.intensity[c];
+                const double got =
+                    (double)shot[0].value[3 * pixel + c] / (a * passed * passed * irradiance) * pi;
+                error = fmax(error, fabs(got - 1));
+            }
+        }
+        if (!real64) printf("figure beneath_a_plane_%d off by %.2f\n", sky, error);
+        CHECK(error < 0.12);
+    }
+    ssdgs_model_destroy(model);
+    ssdgs_model_destroy(thinner);
+}
+
+/* ---- mirrors ---- */
+
+/* Beckmann's microfacets with Smith's shadowing and Schlick's Fresnel: radiance of irradiance 1 at right
+ * angles. */
+static double microfacets(const double n[3], const double wi[3], const double wo[3], double alpha,
+                          double f0) {
+    double h[3], length = 0, nh = 0, woh = 0, to_light = 0, to_eye = 0;
+    for (int c = 0; c < 3; c++) {
+        h[c] = wi[c] + wo[c];
+        length += h[c] * h[c];
+        to_light += n[c] * wi[c];
+        to_eye += n[c] * wo[c];
+    }
+    if (to_light <= 0 || to_eye <= 0) return 0;
+    for (int c = 0; c < 3; c++) {
+        nh += n[c] * h[c] / sqrt(length);
+        woh += wo[c] * h[c] / sqrt(length);
+    }
+    double g = 1;
+    for (int i = 0; i < 2; i++) {
+        const double cosine = i ? to_eye : to_light,
+                     a = cosine / (alpha * sqrt(fmax(1 - cosine * cosine, 1e-12)));
+        if (a < 1.6) g *= (3.535 * a + 2.181 * a * a) / (1 + 2.276 * a + 2.577 * a * a);
+    }
+    const double tan2 = (1 - nh * nh) / (nh * nh),
+                 density = exp(-tan2 / (alpha * alpha)) / (pi * alpha * alpha * pow(nh, 4));
+    return density * g * (f0 + (1 - f0) * pow(1 - woh, 5)) / (4 * to_eye);
+}
+
+static void test_metal(void) {
+    static double want[3 * PIXELS];
+    static unsigned char given[PIXELS];
+    static const double gold[3] = {1, 0.78, 0.34}, sun[3] = {0.48, -0.8, 0.36};
+    ssdgs_settings settings = ssdgs_settings_default();
+    settings.terms = SSDGS_SPECULAR_TERM;
+    ssdgs_model *model = ball(&settings, 0.5);
+    const ssdgs_camera camera = camera_from(0, -2, 0);
+    const ssdgs_render_options exact = ssdgs_render_options_exact();
+    ssdgs_light light = parallel_light(sun[0], sun[1], sun[2]);
+    for (int c = 0; c < 3; c++) light.intensity[c] = 1;
+    for (int k = 0; k < 3; k++) {
+        static const double alpha[3] = {0.15, 0.3, 0.6};
+        const ssdgs_real roughness[2] = {(ssdgs_real)alpha[k], (ssdgs_real)alpha[k]};
+        for (int i = 0; i < BALL; i++) {
+            ssdgs_gaussian g;
+            CHECK(!ssdgs_model_get(model, i, &g));
+            CHECK(!ssdgs_gaussian_mirror(model, roughness, &g));
+            for (int c = 0; c < 3; c++) g.specular[c] *= (ssdgs_real)gold[c];
+            g.f0 = (ssdgs_real)0.9;
+            CHECK(!ssdgs_model_set(model, i, &g));
+        }
+        alone(model, &camera, &light, 1, &exact, shot);
+        memset(given, 0, sizeof given);
+        for (int pixel = 0; pixel < PIXELS; pixel++) {
+            double x[3], d[3];
+            if (!meets(&camera, pixel, 0.5, x, d)) continue;
+            const double n[3] = {x[0] / 0.5, x[1] / 0.5, x[2] / 0.5}, wo[3] = {-d[0], -d[1], -d[2]};
+            given[pixel] = 1;
+            for (int c = 0; c < 3; c++)
+                want[3 * pixel + c] = gold[c] * microfacets(n, sun, wo, alpha[k], 0.9);
+        }
+        const double dB = decibels(shot[0].value, want, given);
+        double sums[2] = {0, 0};
+        for (int pixel = 0; pixel < PIXELS; pixel++)
+            if (given[pixel]) sums[0] += (double)shot[0].value[3 * pixel], sums[1] += want[3 * pixel];
+        printf("figure metal_%g %.1f dB from microfacets, %.2f of the light\n", alpha[k], dB,
+               sums[0] / sums[1]);
+        CHECK(dB > (k < 2 ? 28 : 16) && sums[0] / sums[1] > 0.6 && sums[0] / sums[1] < 1.2);
+    }
+    ssdgs_model_destroy(model);
+}
+
+static void test_refused(void) {
+    ssdgs_settings settings = settings_of(SSDGS_ASG_DEFERRED);
+    ssdgs_model *model = cloud(&settings, 0, 5, 0.5), *none = NULL;
+    ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_image image = planes_of(shot);
+    for (int i = 0; i < 8; i++) {
+        static const double wrong[8] = {0, 0.09, 11, -1, 1e7, 0, 11, (double)NAN};
+        object = ssdgs_object_default(model);
+        *(i < 3 ? &object.roughness : i < 5 ? &object.specular : &object.translucency) = (ssdgs_real)wrong[i];
+        CHECK(ssdgs_scene_render(scene, &object, 1, &camera, NULL, 0, NULL, &image, NULL) ==
+              SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(context), "object 0: roughness") != NULL);
+    }
+    settings.scattering.layers = 0;
+    CHECK(ssdgs_model_create(context, &settings, 1, &none) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "medium.scattering") != NULL);
+    settings = wax();
+    settings.transport = 0;
+    CHECK(ssdgs_model_create(context, &settings, 1, &none) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "transport = 1") != NULL);
+    settings = wax();
+    settings.scattering.layers = 1;
+    CHECK(ssdgs_model_create(context, &settings, 1, &none) == SSDGS_ERR_ARGUMENT);
+    const ssdgs_real fine[2] = {(ssdgs_real)0.3, (ssdgs_real)0.3}, rough[2] = {(ssdgs_real)0.3, 2};
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    CHECK(ssdgs_gaussian_mirror(model, rough, &g) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "roughness[1] = 2") != NULL);
+    CHECK(ssdgs_gaussian_mirror(model, NULL, &g) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_gaussian_mirror(model, fine, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs_model_destroy(model);
+    settings = settings_of(SSDGS_ASG_GEOMETRIC);
+    CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+    CHECK(ssdgs_gaussian_mirror(model, fine, &g) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "geometric") != NULL);
+    ssdgs_model_destroy(model);
+    settings = wax();
+    CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+    unsigned char pixels[4 * 16 * 16];
+    memset(pixels, 200, sizeof pixels);
+    ssdgs_photo photo;
+    memset(&photo, 0, sizeof photo);
+    photo.camera = camera;
+    photo.camera.width = photo.camera.height = 16;
+    photo.light = point_light(2, -2, 2);
+    photo.pixels = pixels;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_result result = ssdgs_trainer_create(model, &photo, 1, NULL, &trainer);
+    if (!result) result = ssdgs_trainer_step(trainer, NULL);
+    CHECK(result == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), "not trained") != NULL);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+}
+
+int main(void) {
+    if (!CHECK(!ssdgs_context_create(NULL, &context)) || !CHECK(!ssdgs_scene_create(context, &scene)))
+        TEST_END();
+    for (int asg = SSDGS_ASG_GEOMETRIC; asg <= SSDGS_ASG_DEFERRED; asg += 2) {
+        TEST_ROW("112", "objects that differ from their model", test_edits(asg));
+        test_roughness(asg);
+    }
+    TEST_ROW("113", "media in code", test_translucency());
+    if (!real64) test_wax();
+    test_metal();
+    test_refused();
+    ssdgs_scene_destroy(scene);
+    ssdgs_context_destroy(context);
+    TEST_END();
+}
