@@ -177,6 +177,27 @@ check "no such option" says 2 "^usage: engine" engine --wrong
 check "a folder that is not there" says 1 "never" "$build/engine" --frames 1 --size 96 54 --out "$out/never/x"
 check "nothing was written" test ! -e "$out/level_000.png"
 
+# splats for viewers: as near to the model without its highlights as colours of a byte allow, and nothing of the user's replaced
+export_of() { "$build/export" "$@"; }
+near_to() { sed -n "s|.*$1: .* model, \\([0-9.]*\\) dB without.*|\\1|p" "$out/log"; }
+check "export" says 0 "exported.splat: " export_of "$model" "$out/exported"
+for file in glb ply splat; do
+    check "exported.$file: $(near_to "exported.$file") dB" awk -v a="$(near_to "exported.$file")" 'BEGIN { exit !(a > 27) }'
+    check "is there" test -s "$out/exported.$file"
+done
+check "the picture" test -s "$out/exported.png"
+check "in another light" says 0 "moved.splat: " export_of "$model" "$out/moved" --linear --light 1 -2 2
+check "which shows" differs "$out/moved.png" "$out/exported.png"
+check "linear" grep -aq lin_rec709_display "$out/moved.glb"
+check "splats of it" says 0 "plain splats" "$build/relight" "$out/exported.ply" "$set" --out "$out/splats"
+cp "$model" "$out/own.ply"
+check "over the model" says 1 "would replace an input" export_of "$out/own.ply" "$out/own"
+check "a model that is not there" says 1 "nothing.ply" export_of "$out/nothing.ply" "$out/none"
+check "no relightable model" says 1 "is no relightable model" export_of "$out/exported.ply" "$out/none"
+check "a folder that is not there" says 1 "never" export_of "$model" "$out/never/x"
+check "no names" says 2 "^usage: export" export_of
+check "nothing was written" test ! -e "$out/none.glb"
+
 rm -rf "$out"
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]
