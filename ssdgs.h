@@ -489,6 +489,7 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_preview(void);
 
 typedef struct ssdgs_render_stats {
     int gaussians;       /* in the model */
+    int objects;         /* in sight: what the others are asked for is their shadows */
     int visible;         /* inside the camera's frustum */
     int shaded;          /* contributing to a pixel */
     int skipped;         /* contributing, but not shaded, within max_error: drawn in a neighbour's colour */
@@ -500,6 +501,7 @@ typedef struct ssdgs_render_stats {
     int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done */
     size_t instances;    /* (tile, splat) pairs of the camera */
+    size_t light_instances; /* and of the lights' maps that were not the last frame's */
 } ssdgs_render_stats;
 
 /* Renders model as camera sees it under lights[0 .. light_count). After the first frame of a size nothing is
@@ -839,7 +841,7 @@ typedef struct ssdgs_record {
     ssdgs_real extent_x, extent_y; /* px: half the box that it touches */
 } ssdgs_record;
 
-/* A pixel of a light's map: where on its way the transmittance falls. Not set in tiles without a Gaussian. */
+/* A pixel of a light's map: where on its way the transmittance falls. */
 typedef struct ssdgs_light_pixel {
     ssdgs_real
         distance[3]; /* at which it falls below 0.9, 0.5, 0.1, less the nearest Gaussian's; 1e30: nowhere */
@@ -848,7 +850,8 @@ typedef struct ssdgs_light_pixel {
     ssdgs_real behind;    /* what is left behind all */
 } ssdgs_light_pixel;
 
-/* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. */
+/* One projection of the model: view 0 is the camera, the others are faces of the lights' maps. Of these all
+   but light_map, map_tile and nearest is gone once others of the frame have taken the memory. */
 typedef struct ssdgs_splat_view {
     int light;            /* -1: the camera */
     int width, height;    /* px */
@@ -880,8 +883,10 @@ typedef struct ssdgs_splat_view {
     unsigned char *tile_needed; /* (instances) it must be shaded; NULL: where it is seen */
     /* SSDGS_STAGE_WALK and SSDGS_STAGE_COMPOSITE_BACKWARD */
     ssdgs_real *tile_sums; /* (instances, 4 of a light's walk or 8 + 4 (1 + layer_count) of the backward) */
-    ssdgs_light_pixel
-        *light_map; /* a light's: (tiles, 16 micro-tiles, 16 pixels), rows first. NULL: not wanted */
+    ssdgs_light_pixel *light_map; /* a light's: (tiles with Gaussians, 16 micro-tiles, 16 pixels), rows first.
+                                     NULL: not wanted */
+    uint32_t *map_tile;           /* (tiles) a tile's number in light_map; UINT32_MAX: it has no Gaussian */
+    ssdgs_real nearest;           /* depth of the nearest Gaussian, 0 without any: set by SSDGS_STAGE_SORT */
 } ssdgs_splat_view;
 
 /* A model in a frame. Its Gaussian i is Gaussian first + i of the frame. */
@@ -895,6 +900,8 @@ typedef struct ssdgs_placed {
     int light_count;                          /* the frame's, 0 where colours are baked */
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
+    int moved;                                /* since the last frame */
+    double middle[3], radius; /* world: a ball that holds all that it draws; of several objects alone */
     ssdgs_real tint[3], roughness, specular, translucency;
     ssdgs_real medium[15];      /* RGB weights of true transport's lengths, where a medium scatters */
     const unsigned char *mask;  /* as in ssdgs_object */
@@ -925,7 +932,10 @@ typedef struct ssdgs_frame {
     int frozen[2];         /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
+    int batch[2]; /* from which view, to before which one the CPU's stages up to WALK work: all, where hooks
+                     are set */
     /* SSDGS_STAGE_WALK */
+    size_t light_instances; /* of all lights' views that were walked */
     unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
     ssdgs_real *visibility; /* (lights, n) eq. 7; of a light without views neither this nor the next two */
     ssdgs_real *depth_cue;  /* (lights, n) world units */
@@ -1158,10 +1168,13 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__GLANCES 2000 /* about 0.1 ms */
 #define SSDGS__BAND 16      /* image rows of a task */
 #define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
-#define SSDGS__SOFT 0.02    /* true dipole transport, length units: distances are sqrt(r^2 + soft^2) */
-#define SSDGS__LENGTHS 5    /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
-#define SSDGS__SERIES 10    /* coefficients of a series to second order in x, y, z */
-#define SSDGS__SOURCES 512  /* of light, gathered for a kernel */
+#ifndef SSDGS__BATCH_BYTES
+#define SSDGS__BATCH_BYTES ((size_t)1 << 28) /* of views that are projected and walked together */
+#endif
+#define SSDGS__SOFT 0.02   /* true dipole transport, length units: distances are sqrt(r^2 + soft^2) */
+#define SSDGS__LENGTHS 5   /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
+#define SSDGS__SERIES 10   /* coefficients of a series to second order in x, y, z */
+#define SSDGS__SOURCES 512 /* of light, gathered for a kernel */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
 #define SSDGS__SHARE \
@@ -2220,6 +2233,11 @@ SSDGS_API int ssdgs_context_threads(const ssdgs_context *context) { return conte
 /* Reads settings. Holds raw parameters, ASG and networks, and their public functions. Files and the
    trainer make models of them. */
 
+typedef struct ssdgs__bounds { /* what a light's map must cover, and how finely */
+    double low[3], high[3], log_scale;
+    int count;
+} ssdgs__bounds;
+
 struct ssdgs_model {
     ssdgs_context *context;
     ssdgs_settings settings;
@@ -2233,6 +2251,9 @@ struct ssdgs_model {
     size_t global_count;
     ssdgs_real *globals;               /* the groups of ssdgs__global_groups, in order */
     struct ssdgs__frame_memory *frame; /* of its frames: what the last one found is there for the next */
+    double low[3], high[3];            /* the box that holds all that its Gaussians draw */
+    ssdgs__bounds bounds;              /* of them to three standard deviations, but for a few strays */
+    uint64_t box_revision;             /* of which revision both are */
     ssdgs_real *exposure;       /* (capacity) what of an even sky its own Gaussians leave each of them */
     uint64_t exposure_revision; /* for which of its revisions */
     size_t exposure_room;
@@ -2400,8 +2421,14 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     for (int i = 0; i < 3 && ssdgs__has_medium(s); i++) {
         if (!s->transport)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
-        SSDGS__RANGE(medium.scattering[i], (ssdgs_real)1e-12, (ssdgs_real)1e12);
-        SSDGS__RANGE(medium.absorption[i], 0, (ssdgs_real)1e12);
+        const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
+        if (!(scattering >= (ssdgs_real)1e-12 && scattering <= (ssdgs_real)1e12) ||
+            !(absorption >= 0 && absorption <= (ssdgs_real)1e12))
+            return ssdgs__fail(
+                context, SSDGS_ERR_ARGUMENT,
+                "settings: medium.scattering[%d] = %g, medium.absorption[%d] = %g: within 1e-12 .. "
+                "1e12 and 0 .. 1e12",
+                i, (double)scattering, i, (double)absorption);
     }
 #undef SSDGS__RANGE
     return SSDGS_OK;
@@ -2880,9 +2907,9 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
    holds. Called by render and by the trainer. */
 
 typedef struct ssdgs__view_memory {
+    ssdgs__buffer light_map, map_tile; /* the view's; the rest is that of a view of any batch */
     ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
-        sums, light_map;
-    ssdgs__buffer histogram;
+        sums, histogram;
     uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
 } ssdgs__view_memory;
 
@@ -2892,7 +2919,7 @@ typedef struct ssdgs__cache {
     ssdgs_camera camera;
     ssdgs_render_options options;
     ssdgs_occluder occluder;
-    ssdgs_real bias;                      /* of pixels */
+    ssdgs_real bias[2], near_plane;       /* as the frame's */
     int terms, light_count, maps, hidden; /* hidden: by scene_depth */
     int camera_ready, lights_ready, bounds_ready;
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
@@ -2904,15 +2931,10 @@ typedef struct ssdgs__cached_light {
     int views, kept, shadows_ready, transport_ready;
 } ssdgs__cached_light;
 
-typedef struct ssdgs__bounds { /* what the light's map must cover, and how finely */
-    double low[3], high[3], log_scale;
-    int count;
-} ssdgs__bounds;
-
 /* Of a model or a scene, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
-        shadow_known, transport, transport_known, objects, material_of;
+        shadow_known, transport, transport_known, objects, material_of, reach;
     int view_room;
     ssdgs__cache cache;
     ssdgs__bounds scene;
@@ -3397,6 +3419,28 @@ static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds 
     return SSDGS_OK;
 }
 
+static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o);
+
+/* Of all of a model's, where it was trained. */
+static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bounds) {
+    ssdgs_context *context = model->context;
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_placed placed;
+    ssdgs_frame frame;
+    if (!context->scratch)
+        context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *context->scratch);
+    if (!context->scratch) return SSDGS_ERR_MEMORY;
+    ssdgs__place(&object, &placed);
+    memset(&frame, 0, sizeof frame);
+    frame.context = context;
+    frame.scratch = context->scratch;
+    frame.options = ssdgs_render_options_exact();
+    frame.objects = &placed;
+    frame.object_count = 1;
+    frame.count = model->count;
+    return ssdgs__scene_bounds(&frame, bounds);
+}
+
 static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *variance, int *compensate) {
     *blur = s->light_map.blur;
     *compensate = *blur == SSDGS_BLUR_FLOOR;
@@ -3409,11 +3453,49 @@ static int ssdgs__casts(const ssdgs_light *light) {
            (light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0);
 }
 
-/* The views that cover the whole scene from a light: one frustum from outside, an orthographic one from very
-   far, six faces of a cube from close by or inside. Returns how many; with views NULL only that. */
+/* Whether a light, or with -1 the camera, sees an object: rows (objects) of the camera and the lights. Of one
+   object alone nobody asks. */
+static unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
+    if (frame->object_count < 2) return NULL;
+    return (unsigned char *)frame->memory->reach.memory + (ptrdiff_t)(light + 1) * frame->object_count;
+}
+
+/* What a light's map must cover: all objects, or those in its reach. */
+static ssdgs__bounds ssdgs__light_bounds(const ssdgs_frame *frame, int index) {
+    const ssdgs_light *light = frame->lights + index;
+    const unsigned char *reach = ssdgs__reach(frame, index);
+    ssdgs__bounds b = frame->memory->scene;
+    if (!reach || light->kind == SSDGS_LIGHT_DIRECTIONAL ||
+        !(light->range > 0 || light->kind == SSDGS_LIGHT_SPOT))
+        return b;
+    memset(&b, 0, sizeof b);
+    for (int i = 0; i < frame->object_count; i++) {
+        const ssdgs_placed *o = frame->objects + i;
+        const ssdgs__bounds *own = &o->model->bounds;
+        if (!reach[i] || !own->count) continue;
+        for (int c = 0; c < 3; c++) {
+            double at = (double)o->offset[c], half = 0;
+            for (int j = 0; j < 3; j++) {
+                const double r = (double)o->scale * (double)o->rotation[3 * c + j];
+                at += r * (own->high[j] + own->low[j]) / 2;
+                half += fabs(r) * (own->high[j] - own->low[j]) / 2;
+            }
+            b.low[c] = b.count && b.low[c] < at - half ? b.low[c] : at - half;
+            b.high[c] = b.count && b.high[c] > at + half ? b.high[c] : at + half;
+        }
+        b.log_scale += (own->log_scale + log((double)o->scale)) * own->count;
+        b.count += own->count;
+    }
+    if (b.count) b.log_scale /= b.count;
+    return b;
+}
+
+/* The views that cover, from a light, what is in its reach: one frustum from outside, or along a spot's cone
+   where that is narrower; an orthographic one from very far, six faces of a cube from close by or inside.
+   Returns how many; with views NULL only that. */
 static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_view *views) {
     const ssdgs_settings *settings = &frame->settings;
-    const ssdgs__bounds *b = &frame->memory->scene;
+    const ssdgs__bounds bounds = ssdgs__light_bounds(frame, index), *b = &bounds;
     const ssdgs_light *light = frame->lights + index;
     const double detail = (double)frame->options.light_detail;
     if (!ssdgs__casts(light)) return 0;
@@ -3429,11 +3511,17 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     const double radius = sqrt(radius2);
     double distance = sqrt(distance2);
     if (light->kind == SSDGS_LIGHT_DIRECTIONAL) distance = 1e30;
-    const int faces = distance > 1.3 * radius ? 1 : 6;
+    const double cone = light->kind == SSDGS_LIGHT_SPOT && light->cone[1] < (ssdgs_real)1.2
+                            ? 1.01 * tan((double)light->cone[1])
+                            : 1e30;
+    const int outside = distance > 1.3 * radius;
+    const int along = cone < (outside ? radius / sqrt(distance * distance - radius2) : 1e29);
+    const int faces = outside || along ? 1 : 6;
     if (!views) return faces;
+    if (along) distance = distance > radius ? distance : radius; /* of what it lights, about */
     int map = settings->light_map.size;
     if (!map) {
-        const double size = 2 * radius / exp(b->log_scale),
+        const double size = 2 * (along ? cone * distance : radius) / exp(b->log_scale),
                      most = frame->object_count > 1 && faces == 1 ? 1024 : 512;
         map = (int)(size < 64 ? 64 : size > most ? most : size);
     }
@@ -3456,16 +3544,17 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
             v->near_plane = (ssdgs_real)(1e-4 * radius);
             v->by_distance = 1;
         } else {
-            v->orthographic = distance > 1000 * radius;
+            v->orthographic = !along && distance > 1000 * radius;
             v->distance = v->orthographic && light->kind == SSDGS_LIGHT_POINT ? (ssdgs_real)distance : 1;
             for (int i = 0; i < 3; i++) {
-                direction[i] = to_scene[i];
+                direction[i] = along ? (double)light->direction[i] : to_scene[i];
                 eye[i] =
                     v->orthographic ? centre[i] - 2 * radius * to_scene[i] / sqrt(distance2) : position[i];
             }
-            f = v->orthographic ? 0.5 * map / radius
-                                : 0.5 * map * sqrt(distance * distance - radius2) / radius;
-            v->near_plane = v->orthographic ? 0 : (ssdgs_real)(1e-3 * distance);
+            f = along             ? (0.5 * map - 1) / cone
+                : v->orthographic ? 0.5 * map / radius
+                                  : 0.5 * map * sqrt(distance * distance - radius2) / radius;
+            v->near_plane = v->orthographic ? 0 : (ssdgs_real)((outside ? 1e-3 : 1e-4) * distance);
             v->by_distance = !v->orthographic;
         }
         v->fx = v->fy = (ssdgs_real)f;
@@ -3587,8 +3676,9 @@ static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
 }
 
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
-   time, and what hooks leave is theirs. same: the objects are those of the last frame, where they were. */
-static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
+   time, and what hooks leave is theirs. same: the objects are those of the last frame. stirred: for the
+   camera and each light, whether one that moved is or was in its reach. */
+static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned char *stirred) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
     ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
@@ -3599,16 +3689,20 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
     cache->bounds_ready = cache->bounds_ready && known;
+    for (int i = 0; i < frame->object_count; i++)
+        cache->bounds_ready = cache->bounds_ready && !frame->objects[i].moved;
     known = known && !memcmp(&now->stop, &old->stop, sizeof now->stop);
-    cache->camera_ready = cache->camera_ready && known && !frame->scene_depth && !cache->hidden &&
-                          a->width == b->width && a->height == b->height &&
-                          now->antialias == old->antialias &&
-                          !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
-                          !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
+    cache->camera_ready =
+        cache->camera_ready && known && !stirred[0] && !frame->scene_depth && !cache->hidden &&
+        !memcmp(&cache->near_plane, &frame->near_plane, sizeof cache->near_plane) && a->width == b->width &&
+        a->height == b->height && now->antialias == old->antialias &&
+        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
+        !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
     ssdgs_occluder occluder;
     memset(&occluder, 0, sizeof occluder);
     if (frame->occluder) occluder = *frame->occluder;
     known = known && cache->lights_ready && frame->light_count == cache->light_count &&
+            !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
             occluder.shadow == cache->occluder.shadow && occluder.user == cache->occluder.user &&
             occluder.revision == cache->occluder.revision && frame->maps <= cache->maps &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
@@ -3617,10 +3711,14 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
               (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for light maps */
     for (int i = 0; i < frame->light_count; i++) {
         const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
-        lights[i].kept = known && light->kind == last->kind && ssdgs__casts(light) == ssdgs__casts(last);
-        for (int j = 0; j < 3; j++)
-            lights[i].kept =
-                lights[i].kept && !memcmp(light->position + j, last->position + j, sizeof(ssdgs_real));
+        lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
+                         ssdgs__casts(light) == ssdgs__casts(last);
+        lights[i].kept = lights[i].kept && !memcmp(light->position, last->position, sizeof light->position) &&
+                         !memcmp(&light->range, &last->range, sizeof light->range);
+        if (light->kind == SSDGS_LIGHT_SPOT)
+            lights[i].kept = lights[i].kept &&
+                             !memcmp(light->direction, last->direction, sizeof light->direction) &&
+                             !memcmp(light->cone, last->cone, sizeof light->cone);
         lights[i].shadows_ready = lights[i].kept && lights[i].shadows_ready;
         lights[i].transport_ready =
             lights[i].kept && lights[i].transport_ready &&
@@ -3631,7 +3729,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same) {
     cache->hidden = frame->scene_depth != NULL;
     cache->occluder = occluder;
     cache->maps = frame->maps;
-    cache->bias = frame->bias[1];
+    memcpy(cache->bias, frame->bias, sizeof cache->bias);
+    cache->near_plane = frame->near_plane;
     cache->options = *now;
     cache->terms = frame->terms;
     cache->light_count = frame->light_count;
@@ -3696,9 +3795,9 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
         for (int k = 0; k < SSDGS__LENGTHS; k++) sum += found[k];
         const double scale = sum > missing ? missing / sum : 1;
         found[0] += sum > missing ? 0 : missing - sum;
-        for (int k = 0; k < SSDGS__LENGTHS; k++) /* transport's soft distances lose a part of a plane */
+        for (int k = 0; k < SSDGS__LENGTHS; k++)
             weights[c * SSDGS__LENGTHS + k] =
-                (ssdgs_real)(scale * found[k] * passed * passed * exp(SSDGS__SOFT / (0.04 * (1 << k))));
+                (ssdgs_real)(scale * found[k] * passed * passed / ssdgs__beneath_plane(k));
     }
 }
 
@@ -3833,8 +3932,8 @@ static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     o->mask = object->mask;
 }
 
-/* Puts the objects into the frame, one after the other. same: they are those of the last frame, where they
-   were. tuned: one of them is not as translucent as it was. */
+/* Puts the objects into the frame, one after the other. same: they are those of the last frame, if elsewhere.
+   tuned: one of them is not as translucent as it was. */
 static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *objects, int count,
                                      int light_count, int *same, int *tuned) {
     ssdgs_context *context = frame->context;
@@ -3856,9 +3955,10 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
             const ssdgs_result result = ssdgs__globals_check(o.model);
             if (result) return result;
         }
-        *same = *same && kept && !memcmp(last->rotation, o.rotation, sizeof o.rotation) &&
-                !memcmp(&last->scale, &o.scale, sizeof o.scale) &&
-                !memcmp(last->offset, o.offset, sizeof o.offset);
+        *same = *same && kept;
+        o.moved = !kept || memcmp(last->rotation, o.rotation, sizeof o.rotation) ||
+                  memcmp(&last->scale, &o.scale, sizeof o.scale) ||
+                  memcmp(last->offset, o.offset, sizeof o.offset);
         const int retuned = kept && memcmp(&last->translucency, &o.translucency, sizeof o.translucency);
         if (kept && !retuned) memcpy(o.medium, last->medium, sizeof o.medium);
         else if (ssdgs__has_medium(&o.settings)) ssdgs__medium_weights(&o.settings, o.translucency, o.medium);
@@ -3924,6 +4024,114 @@ static int ssdgs__components_asked(const ssdgs_image *image) {
            image->depth;
 }
 
+/* Finds the boxes of an object's model: one holds all that its Gaussians draw, to 3.4 standard deviations. */
+static ssdgs_result ssdgs__model_box(ssdgs_model *model) {
+    if (model->box_revision == model->revision) return SSDGS_OK;
+    const ssdgs_result result = ssdgs__bounds_of_model(model, &model->bounds);
+    if (result) return result;
+    model->box_revision = model->revision;
+    int any = 0;
+    for (int i = 0; i < model->count; i++) {
+        const ssdgs_real *p = model->gaussians + i;
+        ssdgs_real largest = -SSDGS__MOST_RAW;
+        for (size_t c = 0; c < 3; c++) {
+            const ssdgs_real s = p[(SSDGS_LOG_SCALE + c) * model->capacity];
+            largest = s > largest ? s : largest;
+        }
+        const double reach =
+            3.4 * (double)ssdgs__exp_scalar(largest < SSDGS__MOST_RAW ? largest : SSDGS__MOST_RAW);
+        for (size_t c = 0; c < 3; c++) {
+            const double at = (double)p[(SSDGS_POSITION + c) * model->capacity];
+            if (!any || at - reach < model->low[c]) model->low[c] = at - reach;
+            if (!any || at + reach > model->high[c]) model->high[c] = at + reach;
+        }
+        any = 1;
+    }
+    for (int c = 0; c < 3 && !any; c++) model->low[c] = model->high[c] = 0;
+    return SSDGS_OK;
+}
+
+/* Whether something of a ball may be in the picture. Twice the radius: a splat is affine, which beside the
+   picture makes it larger than it is. */
+static int ssdgs__in_sight(const ssdgs_frame *frame, const ssdgs_placed *o) {
+    const ssdgs_camera *camera = &frame->camera;
+    const double near_plane = (double)(camera->near_plane > 0 ? camera->near_plane : frame->near_plane);
+    double at[3];
+    for (int i = 0; i < 3; i++) {
+        const ssdgs_real *row = camera->view + 4 * i;
+        at[i] = (double)row[0] * o->middle[0] + (double)row[1] * o->middle[1] +
+                (double)row[2] * o->middle[2] + (double)row[3];
+    }
+    if (at[2] + o->radius < near_plane) return 0;
+    for (int axis = 0; axis < 2; axis++) {
+        const double focal = (double)(axis ? camera->fy : camera->fx),
+                     centre = (double)(axis ? camera->cy : camera->cx);
+        const double low = (-8 - centre) / focal,
+                     high = ((axis ? camera->height : camera->width) + 8 - centre) / focal;
+        if ((at[axis] - high * at[2]) / sqrt(1 + high * high) > 2 * o->radius) return 0;
+        if ((low * at[2] - at[axis]) / sqrt(1 + low * low) > 2 * o->radius) return 0;
+    }
+    return 1;
+}
+
+/* Whether a light shines on something of a ball: within its range and its cone. */
+static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
+    double along = 0, distance2 = 0;
+    if (light->kind == SSDGS_LIGHT_DIRECTIONAL) return 1;
+    for (int c = 0; c < 3; c++) {
+        const double d = o->middle[c] - (double)light->position[c];
+        along += d * (double)light->direction[c];
+        distance2 += d * d;
+    }
+    const double distance = sqrt(distance2);
+    if (light->range > 0 && distance - o->radius > (double)light->range) return 0;
+    if (light->kind != SSDGS_LIGHT_SPOT || distance <= o->radius) return 1;
+    const double ratio = along / distance;
+    return acos(ratio > 1    ? 1
+                : ratio < -1 ? -1
+                             : ratio) -
+               asin(o->radius / distance) <=
+           (double)light->cone[1] + 1e-3;
+}
+
+/* Where the objects of several are, and which of them the camera and the lights reach. stirred: (1 + lights)
+   for the camera and each light, whether one that has moved is or was among them. */
+static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int same, unsigned char **stirred) {
+    ssdgs_context *context = frame->context;
+    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
+    unsigned char *reach;
+    const size_t size = ((size_t)count + 1) * (size_t)rows;
+    const int known = same && frame->memory->reach.bytes >= size;
+    SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, size);
+    *stirred = reach + (ptrdiff_t)count * rows;
+    memset(*stirred, 0, (size_t)rows);
+    for (int i = 0; i < count; i++) {
+        ssdgs_placed *o = frame->objects + i;
+        const ssdgs_model *model = o->model;
+        double half2 = 0;
+        const ssdgs_result result = several ? ssdgs__model_box(o->model) : SSDGS_OK;
+        if (result) return result;
+        for (int c = 0; c < 3; c++) {
+            const double half = (model->high[c] - model->low[c]) / 2;
+            half2 += half * half;
+            o->middle[c] = (double)o->offset[c];
+            for (int j = 0; j < 3; j++)
+                o->middle[c] +=
+                    (double)o->scale * (double)o->rotation[3 * c + j] * (model->high[j] + model->low[j]) / 2;
+        }
+        o->radius = (double)o->scale * sqrt(half2) * (1 + 1e-5);
+        const int anywhere = !several || !(o->radius < 1e30); /* with Gaussians that are not finite */
+        for (int row = 0; row < rows; row++) {
+            const int in =
+                anywhere || (row ? ssdgs__in_light(frame->lights + row - 1, o) : ssdgs__in_sight(frame, o));
+            unsigned char *at = reach + (ptrdiff_t)row * count + i;
+            (*stirred)[row] |= (unsigned char)(o->moved && (in || !known || *at));
+            *at = (unsigned char)in;
+        }
+    }
+    return SSDGS_OK;
+}
+
 static int ssdgs__has_ambient(const ssdgs_render_options *options) {
     int any = 0;
     for (int i = 0; i < 27; i++)
@@ -3980,6 +4188,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
     int same, tuned;
+    unsigned char *stirred;
     result = ssdgs__place_all(frame, request->objects, request->object_count, light_count, &same, &tuned);
     for (int i = 0; !result && ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
         result = ssdgs__expose(frame->objects + i);
@@ -3989,7 +4198,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     const int needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__cached_light *cached;
     SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
-    ssdgs__compare_cache(frame, same);
+    result = ssdgs__find_reach(frame, same, &stirred);
+    if (result) return result;
+    ssdgs__compare_cache(frame, same, stirred);
     for (int i = 0; i < frame->light_count; i++) cached[i].transport_ready &= !tuned;
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
@@ -4029,6 +4240,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         memcpy(frame->views[0].view, camera->view, sizeof camera->view);
     }
     frame->views[0].cached = m->cache.camera_ready;
+    frame->batch[1] = frame->view_count;
     for (int i = 0, j = 1; i < frame->light_count; i++) {
         if (!needs_light) continue;
         if (!cached[i].kept) ssdgs__light_views(frame, i, frame->views + j);
@@ -4146,15 +4358,26 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     return p;
 }
 
+/* The memory that the stages up to WALK work in: batches of lights' views have the same. */
+static ssdgs__view_memory *ssdgs__view_memory_of(const ssdgs_frame *frame, int view) {
+    const int first = frame->batch[0] > 1 ? frame->batch[0] : 1;
+    return (ssdgs__view_memory *)frame->memory->view_memory.memory + (view ? 1 + view - first : 0);
+}
+
 static void ssdgs__project_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int chunks = ssdgs__chunks(frame->count), chunk = index % chunks;
-    ssdgs_splat_view *v = frame->views + index / chunks;
+    ssdgs_splat_view *v = frame->views + frame->batch[0] + index / chunks;
     ssdgs__piece piece;
     if (v->cached) return;
     for (int at = chunk * SSDGS__CHUNK;
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs_placed *o = piece.object;
+        const unsigned char *reach = ssdgs__reach(frame, v->light);
+        if (reach && !reach[o - frame->objects]) {
+            piece.gap += piece.end - piece.begin;
+            piece.end = piece.begin;
+        }
         const ssdgs__projection p = ssdgs__projection_of(frame, o, v);
         frame->context->k->project(&p, o->gaussians.gaussians, o->gaussians.stride, (size_t)piece.begin,
                                    (size_t)piece.end, v->record + o->first, v->depth + o->first);
@@ -4165,15 +4388,17 @@ static void ssdgs__project_task(void *data, int index) {
 static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
-    for (int i = 0; i < frame->view_count; i++) {
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs_splat_view *v = frame->views + i;
-        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i);
+        if (v->cached) continue;
         SSDGS__RESERVE(m->record, v->record, ssdgs_record, n);
         SSDGS__RESERVE(m->depth, v->depth, ssdgs_real, n);
         v->tiles_x = (v->width + 15) / 16;
         v->tiles_y = (v->height + 15) / 16;
     }
-    ssdgs__parallel(context, frame->view_count * ssdgs__chunks(frame->count), ssdgs__project_task, frame);
+    ssdgs__parallel(context, (frame->batch[1] - frame->batch[0]) * ssdgs__chunks(frame->count),
+                    ssdgs__project_task, frame);
     return SSDGS_OK;
 }
 
@@ -4181,14 +4406,13 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
    indices. */
 static void ssdgs__sort_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    ssdgs_splat_view *v = frame->views + index;
+    ssdgs_splat_view *v = frame->views + frame->batch[0] + index;
     const int n = frame->count;
-    uint64_t *from =
-                 (uint64_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + index)->keys.memory,
+    if (v->cached) return;
+    uint64_t *from = (uint64_t *)ssdgs__view_memory_of(frame, frame->batch[0] + index)->keys.memory,
              *to = from + n;
     uint32_t *histogram = (uint32_t *)(to + n);
     int visible = 0;
-    if (v->cached) return;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
     for (int i = 0; i < n; i++) {
         const float depth = (float)v->depth[i];
@@ -4214,19 +4438,21 @@ static void ssdgs__sort_task(void *data, int index) {
     }
     for (int i = 0; i < visible; i++) v->order[i] = (uint32_t)from[i];
     v->visible = visible;
+    v->nearest = visible ? v->depth[v->order[0]] : 0;
 }
 
 static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->count;
-    for (int i = 0; i < frame->view_count; i++) {
-        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
+        ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i);
         uint64_t *keys;
+        if (frame->views[i].cached) continue;
         SSDGS__RESERVE(m->keys, keys, uint64_t, 2 * n + 3 * 1024);
         SSDGS__RESERVE(m->order, frame->views[i].order, uint32_t, n + 1);
         (void)keys;
     }
-    ssdgs__parallel(context, frame->view_count, ssdgs__sort_task, frame);
+    ssdgs__parallel(context, frame->batch[1] - frame->batch[0], ssdgs__sort_task, frame);
     return SSDGS_OK;
 }
 
@@ -4253,9 +4479,9 @@ static void ssdgs__bin_range(int count, int chunk, int *begin, int *end) {
 /* The boxes of a chunk of Gaussians, empty where not drawn, and how many instances there can be at most. */
 static void ssdgs__bin_room_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs_splat_view *v = frame->views + view;
-    ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     uint64_t room = 0;
     if (v->cached) return;
     int begin, end;
@@ -4276,8 +4502,8 @@ static void ssdgs__bin_room_task(void *data, int index) {
 /* The instances of a chunk of Gaussians, from its first number on: tiles for places. */
 static void ssdgs__bin_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     if (frame->views[view].cached) return;
     int begin, end;
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
@@ -4287,7 +4513,7 @@ static void ssdgs__bin_task(void *data, int index) {
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
     const ssdgs_splat_view *v = frame->views + view;
-    return (uint32_t *)((ssdgs__view_memory *)frame->memory->view_memory.memory + view)->histogram.memory +
+    return (uint32_t *)ssdgs__view_memory_of(frame, view)->histogram.memory +
            (size_t)chunk * (size_t)(v->tiles_x * v->tiles_y);
 }
 
@@ -4295,8 +4521,8 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
    in memory. */
 static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     const ssdgs_splat_view *v = frame->views + view;
     ssdgs_instances *of_rank = (ssdgs_instances *)m->of_rank.memory;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
@@ -4318,14 +4544,14 @@ static void ssdgs__bin_count_task(void *data, int index) {
 /* Turns the counts into places: per tile, chunk after chunk, so lists stay in depth order. */
 static void ssdgs__bin_offsets_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    ssdgs_splat_view *v = frame->views + index;
+    ssdgs_splat_view *v = frame->views + frame->batch[0] + index;
     const int tiles = v->tiles_x * v->tiles_y;
     uint32_t sum = 0;
     if (v->cached) return;
     for (int tile = 0; tile < tiles; tile++) {
         v->tile_start[tile] = sum;
         for (int chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
-            uint32_t *h = ssdgs__histogram(frame, index, chunk) + tile;
+            uint32_t *h = ssdgs__histogram(frame, frame->batch[0] + index, chunk) + tile;
             const uint32_t count = *h;
             *h = sum;
             sum += count;
@@ -4337,8 +4563,8 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
 
 static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const int view = index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs__view_memory *m = (const ssdgs__view_memory *)frame->memory->view_memory.memory + view;
+    const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
+    const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     const ssdgs_instances *of_rank = (const ssdgs_instances *)m->of_rank.memory;
     const ssdgs_splat_view *v = frame->views + view;
     uint32_t *place = ssdgs__histogram(frame, view, chunk);
@@ -4360,17 +4586,17 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
 static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->count;
-    const int tasks = frame->view_count * SSDGS__BIN_CHUNKS;
-    for (int i = 0; i < frame->view_count; i++) {
+    const int views = frame->batch[1] - frame->batch[0], tasks = views * SSDGS__BIN_CHUNKS;
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         uint16_t *box;
-        SSDGS__RESERVE(((ssdgs__view_memory *)frame->memory->view_memory.memory + i)->box, box, uint16_t,
-                       4 * n + 4);
+        if (frame->views[i].cached) continue;
+        SSDGS__RESERVE(ssdgs__view_memory_of(frame, i)->box, box, uint16_t, 4 * n + 4);
         (void)box;
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
-    for (int i = 0; i < frame->view_count; i++) {
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs_splat_view *v = frame->views + i;
-        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i);
         const size_t tiles = (size_t)(v->tiles_x * v->tiles_y);
         uint64_t room = 0;
         if (v->cached) continue;
@@ -4395,14 +4621,9 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_task, frame);
     ssdgs__parallel(context, tasks, ssdgs__bin_count_task, frame);
-    ssdgs__parallel(context, frame->view_count, ssdgs__bin_offsets_task, frame);
+    ssdgs__parallel(context, views, ssdgs__bin_offsets_task, frame);
     ssdgs__parallel(context, tasks, ssdgs__bin_scatter_task, frame);
     return SSDGS_OK;
-}
-
-/* Depth or distance of the nearest Gaussian of a view. */
-static SSDGS__INLINE ssdgs_real ssdgs__nearest(const ssdgs_splat_view *view) {
-    return view->visible ? view->depth[view->order[0]] : 0;
 }
 
 /* ==== >>shadow  eqs. 6, 7 and the depth cue; which Gaussians the camera sees ==== */
@@ -4427,14 +4648,14 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.stop = frame->options.stop;
     t.max_error = frame->options.max_error;
     t.bias = frame->bias[0];
-    t.depth_origin = ssdgs__nearest(v);
+    t.depth_origin = v->nearest;
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
     t.cue = frame->cue;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
-    t.light_map = v->light_map ? v->light_map + (size_t)index * 256 : NULL;
+    t.light_map = v->light_map && t.count ? v->light_map + (size_t)v->map_tile[index] * 256 : NULL;
     const int shared =
         v->light >= 0 &&
         (v[-1].light == v->light || (v + 1 < frame->views + frame->view_count && v[1].light == v->light));
@@ -4459,7 +4680,7 @@ static void ssdgs__tile_scene_depth(const ssdgs_frame *frame, ssdgs__tile *tile,
 
 static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
-    const ssdgs_splat_view *v = frame->views;
+    const ssdgs_splat_view *v = frame->views + frame->batch[0];
     for (; v->cached || index >= v->tiles_x * v->tiles_y; v++)
         index -= v->cached ? 0 : v->tiles_x * v->tiles_y;
     ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 0);
@@ -4562,9 +4783,10 @@ static void ssdgs__gather_camera_task(void *data, int index) {
 static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     int tiles = 0;
-    for (int i = 0; i < frame->view_count; i++) {
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs_splat_view *v = frame->views + i;
-        ssdgs__view_memory *m = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
+        ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i),
+                           *own = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
         if (v->cached) continue;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
@@ -4573,27 +4795,35 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             if (frame->options.max_error > 0)
                 SSDGS__RESERVE(m->needed, v->tile_needed, unsigned char, v->instances + 1);
         } else {
+            frame->light_instances += v->instances;
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->light_map = NULL;
-            if (frame->maps || (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM)))
-                SSDGS__RESERVE(m->light_map, v->light_map, ssdgs_light_pixel,
-                               (size_t)(v->tiles_x * v->tiles_y) * 256);
+            if (!frame->maps && !(frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))) continue;
+            const int all = v->tiles_x * v->tiles_y;
+            uint32_t used = 0;
+            SSDGS__RESERVE(own->map_tile, v->map_tile, uint32_t, all + 1);
+            for (int tile = 0; tile < all; tile++)
+                v->map_tile[tile] = v->tile_start[tile] < v->tile_start[tile + 1] ? used++ : UINT32_MAX;
+            SSDGS__RESERVE(own->light_map, v->light_map, ssdgs_light_pixel, (size_t)used * 256 + 1);
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
-    if (!frame->views->cached) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
+    if (!frame->batch[0] && !frame->views->cached)
+        ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
     ssdgs__gather_job job;
     job.frame = frame;
-    job.end_view = 1;
-    for (job.light = 0; job.light < frame->light_count; job.light++) {
-        job.first_view = job.end_view;
-        while (job.end_view < frame->view_count && frame->views[job.end_view].light == job.light)
+    for (job.first_view = frame->batch[0] ? frame->batch[0] : 1; job.first_view < frame->batch[1];
+         job.first_view = job.end_view) {
+        job.light = frame->views[job.first_view].light;
+        job.end_view = job.first_view + 1;
+        while (job.end_view < frame->batch[1] && frame->views[job.end_view].light == job.light)
             job.end_view++;
-        if (job.first_view == job.end_view || frame->views[job.first_view].cached) continue;
+        if (frame->views[job.first_view].cached) continue;
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
         if (frame->occluder) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
     }
-    frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
+    if (frame->batch[1] == frame->view_count)
+        frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
     return SSDGS_OK;
 }
 
@@ -5649,13 +5879,18 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
                    *shadow = NULL, *scattering = NULL;
         const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
         const ssdgs_light *source = frame->lights + light;
+        const unsigned char *in_reach = ssdgs__reach(frame, light);
+        const int off = in_reach && !in_reach[o - frame->objects];
         const int limited = source->kind == SSDGS_LIGHT_SPOT || source->range > 0;
         ssdgs_real reach[SSDGS__BLOCK];
-        const int reached = o->light_count && (!limited || ssdgs__reach_row(frame, o, light, gauss, reach));
-        const int lit = reached || (o->light_count && (frame->diffuse || frame->layer_pixels)); /* for S */
+        const int reached =
+            o->light_count && !off && (!limited || ssdgs__reach_row(frame, o, light, gauss, reach));
+        const int lit =
+            reached || (o->light_count && !off && (frame->diffuse || frame->layer_pixels)); /* for S */
         for (int i = 0; frame->layer_count && !(lit && lighting->deferred) && i < SSDGS__PER_LIGHT; i++)
             for (int s = 0; s < live; s++)
                 memset(ssdgs__layer(frame, layer + i) + 4 * at[s], 0, 3 * sizeof(ssdgs_real));
+        for (int s = 0; off && s < SSDGS__BLOCK; s++) outs[9 * SSDGS__BLOCK + s] += 1;
         if (!lit) continue;
         k->reflect(lighting, gauss, part + l->rows);
         for (int s = 0; s < SSDGS__BLOCK; s++) {
@@ -6104,11 +6339,11 @@ typedef struct ssdgs__composite_job {
    what there was before that. */
 static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
                                               ssdgs_real thick) {
-    const int tile = (y >> 4) * map->tiles_x + (x >> 4);
+    const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
+    if (tile == UINT32_MAX) return 1;
     const ssdgs_light_pixel *at =
         map->light_map + (size_t)tile * 256 + ((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3));
     int level = 0;
-    if (map->tile_start[tile] == map->tile_start[tile + 1]) return 1;
     for (int i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > at->distance[i];
     if (!level) return 1;
     if (level == SSDGS__MAP_STEPS) return at->behind;
@@ -6136,7 +6371,7 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
     ssdgs_real distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-6 * distance + ssdgs__nearest(map);
+    distance -= bias + (ssdgs_real)1e-6 * distance + map->nearest;
     const int x = u < wide ? (int)u : map->width - 2;
     const int y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
@@ -6530,7 +6765,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     }
 }
 
-static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
+static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
     for (int stage = first; stage <= last; stage++) {
         const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
@@ -6538,6 +6773,28 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
         if (result) return result;
     }
     return SSDGS_OK;
+}
+
+/* The stages up to WALK run once for every batch of views: what these leave for the others is small. A batch
+   is as many lights as do with SSDGS__BATCH_BYTES, or one. Without hooks alone: those take all views at once.
+ */
+static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
+    const int walks = last < SSDGS_STAGE_WALK ? last : SSDGS_STAGE_WALK;
+    const size_t room = SSDGS__BATCH_BYTES / (80 * ((size_t)frame->count + 1));
+    int hooked = 0, end = 0;
+    for (int stage = 0; stage <= SSDGS_STAGE_WALK; stage++)
+        hooked |= frame->context->gpu.stage[stage] != NULL;
+    for (int begin = 0; first <= walks && begin < frame->view_count; begin = end) {
+        for (end = begin + 1; end < frame->view_count; end++) {
+            const int within = end > 1 && frame->views[end].light == frame->views[end - 1].light;
+            if (!within && !hooked && (size_t)(end - begin) >= room) break;
+        }
+        frame->batch[0] = begin;
+        frame->batch[1] = end;
+        const ssdgs_result result = ssdgs__run_each(frame, first, walks);
+        if (result) return result;
+    }
+    return ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
 }
 
 typedef struct ssdgs__rows_job {
@@ -6630,6 +6887,9 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     }
     stats->network_work = all > 0 ? done / all : 0;
     stats->instances = frame->views[0].instances;
+    stats->light_instances = frame->light_instances;
+    for (int i = 0; i < frame->object_count; i++)
+        stats->objects += ssdgs__reach(frame, -1) ? ssdgs__reach(frame, -1)[i] : 1;
     for (int i = 0; i < frame->shaded_count; i++)
         stats->blackened += frame->color[4 * (size_t)frame->shaded[i] + 3] > 0;
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
@@ -6858,7 +7118,7 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     job.end = job.view + lights[light].views;
     job.points = points;
     job.fraction = fraction;
-    job.bias = m->cache.bias;
+    job.bias = m->cache.bias[1];
     job.count = count;
     ssdgs__parallel(context, ssdgs__chunks(count), ssdgs__shadow_task, &job);
     return SSDGS_OK;
@@ -7145,23 +7405,12 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
     ssdgs_context *context = model->context;
     const ssdgs_object object = ssdgs_object_default(model);
     ssdgs_placed placed;
-    ssdgs_frame frame;
     ssdgs__bounds bounds;
     if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
-    if (!context->scratch)
-        context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *context->scratch);
-    if (!context->scratch) return SSDGS_ERR_MEMORY;
-    ssdgs__place(&object, &placed);
-    memset(&frame, 0, sizeof frame);
-    frame.context = context;
-    frame.scratch = context->scratch;
-    frame.options = ssdgs_render_options_exact();
-    frame.objects = &placed;
-    frame.object_count = 1;
-    frame.count = model->count;
     const ssdgs_result result =
-        ssdgs__scene_bounds(&frame, &bounds); /* without strays, but by longest axes */
+        ssdgs__bounds_of_model(model, &bounds); /* without strays, but by longest axes */
     if (result) return result;
+    ssdgs__place(&object, &placed);
     ssdgs_real least[3] = {0, 0, 0}, most[3] = {0, 0, 0};
     for (int i = 0, none = 1; i < model->count; i++) {
         const ssdgs_real *p = model->gaussians + i;
@@ -7631,10 +7880,10 @@ static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {"vertex", "ssdgs_
 enum {
     SSDGS__PLY_NORMAL = SSDGS_CHANNELS,
     SSDGS__PLY_DC = SSDGS_CHANNELS + 3,
-    SSDGS__PLY_RGB = SSDGS_CHANNELS + 6,
+    SSDGS__PLY_RGB = SSDGS_CHANNELS + 22, /* behind all that is written, settings too */
     SSDGS__PLY_WORDS = SSDGS_CHANNELS + 25
 };
-typedef char ssdgs__ply_settings_fit[sizeof(ssdgs_settings) / sizeof(int) <= SSDGS__PLY_WORDS ? 1 : -1];
+typedef char ssdgs__ply_settings_fit[sizeof(ssdgs_settings) / sizeof(int) <= SSDGS__PLY_RGB ? 1 : -1];
 
 typedef struct ssdgs__ply_field {
     int kind;         /* element */
@@ -8141,15 +8390,20 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
         size_t at;
         int index;
         double before;
-    } added[ADDED] = {
-        /* settings of later files, and what held before them */
-        {offsetof(ssdgs_settings, transport), 0, 0},     {offsetof(ssdgs_settings, octaves.view), 0, 4},
-        {offsetof(ssdgs_settings, octaves.light), 0, 4}, {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
-        {offsetof(ssdgs_settings, origin), 0, 0},        {offsetof(ssdgs_settings, origin), 1, 0},
-        {offsetof(ssdgs_settings, origin), 2, 0},        {offsetof(ssdgs_settings, medium), 0, 0},
-        {offsetof(ssdgs_settings, medium), 1, 0},        {offsetof(ssdgs_settings, medium), 2, 0},
-        {offsetof(ssdgs_settings, medium), 3, 0},        {offsetof(ssdgs_settings, medium), 4, 0},
-        {offsetof(ssdgs_settings, medium), 5, 0}};
+    } added[ADDED] = {/* settings of later files, and what held before them */
+                      {offsetof(ssdgs_settings, transport), 0, 0},
+                      {offsetof(ssdgs_settings, octaves.view), 0, 4},
+                      {offsetof(ssdgs_settings, octaves.light), 0, 4},
+                      {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
+                      {offsetof(ssdgs_settings, origin), 0, 0},
+                      {offsetof(ssdgs_settings, origin), 1, 0},
+                      {offsetof(ssdgs_settings, origin), 2, 0},
+                      {offsetof(ssdgs_settings, medium.scattering), 0, 0},
+                      {offsetof(ssdgs_settings, medium.scattering), 1, 0},
+                      {offsetof(ssdgs_settings, medium.scattering), 2, 0},
+                      {offsetof(ssdgs_settings, medium.absorption), 0, 0},
+                      {offsetof(ssdgs_settings, medium.absorption), 1, 0},
+                      {offsetof(ssdgs_settings, medium.absorption), 2, 0}};
     int next = 0;
     uint32_t words[SSDGS__PLY_WORDS];
     memset(words, 0, sizeof words);

@@ -1,6 +1,9 @@
 /* Placed models in one frame, also as real64: one alone is ssdgs_render() to the bit; moved, turned, mirrored
    and scaled ones look as the model does from where the camera would be; parts equal the whole; shadows fall
    from one on another; what is refused, and what is kept. */
+#include <stddef.h>
+static size_t batch_bytes = (size_t)1 << 28; /* of lights' views that are worked on together */
+#define SSDGS__BATCH_BYTES batch_bytes
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "scene.h"
@@ -886,6 +889,131 @@ static void test_left_handed(void) {
     ssdgs_model_destroy(model);
 }
 
+/* ---- what a frame does without ---- */
+
+/* A cloud of 64, somewhere, of some size. */
+static ssdgs_model *somewhere(const ssdgs_settings *settings, int number, const double at[3], double size) {
+    ssdgs_model *model = cloud(settings, 64 * number, 64, 0.3);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (int i = 0; i < 64; i++)
+        for (size_t c = 0; c < 3; c++) {
+            ssdgs_real *x = v.gaussians + (SSDGS_POSITION + c) * v.stride + i;
+            *x = (ssdgs_real)(size * (double)*x + at[c]);
+            v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + (size_t)i] += (ssdgs_real)log(size);
+        }
+    return model;
+}
+
+/* Objects around the camera, near and far, large and small, leave out nothing that a single model of all
+ * shows. */
+static void test_out_of_sight(void) {
+    enum { MANY = 24 };
+    const ssdgs_settings settings = small_settings();
+    ssdgs_light light = parallel_light(0.6, 0, 0.8);
+    light.unshadowed = 1;
+    int left_out = 0;
+    for (int round = 0; round < 12; round++) {
+        ssdgs_model *models[MANY], *all = NULL;
+        ssdgs_object objects[MANY];
+        const ssdgs_render_options options = ssdgs_render_options_exact();
+        const ssdgs_camera camera = camera_from(2 * draw(9000 + (uint64_t)round) - 1, -2.2, 0.8);
+        CHECK(!ssdgs_model_create(context, &settings, 64 * MANY, &all));
+        stir_networks(all, 0);
+        const ssdgs_model_view whole = ssdgs_model_arrays(all);
+        for (int i = 0; i < MANY; i++) {
+            const uint64_t seed = 10000 + 16 * (uint64_t)(MANY * round + i);
+            double at[3];
+            for (uint64_t c = 0; c < 3; c++)
+                at[c] = 8 * pow(draw(seed + c), 2) * (draw(seed + 3 + c) < 0.5 ? -1 : 1);
+            models[i] = somewhere(&settings, i, at, 0.2 + 3 * pow(draw(seed + 7), 3));
+            objects[i] = ssdgs_object_default(models[i]);
+            const ssdgs_model_view part = ssdgs_model_peek(models[i]);
+            for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+                memcpy(whole.gaussians + c * whole.stride + 64 * i, part.gaussians + c * part.stride,
+                       64 * sizeof(ssdgs_real));
+        }
+        together(objects, MANY, &camera, &light, 1, &options, shot);
+        alone(all, &camera, &light, 1, &options, shot + 1);
+        CHECK(same(shot, shot + 1) && shot[0].stats.visible == shot[1].stats.visible);
+        CHECK(shot[0].stats.objects < MANY && shot[1].stats.objects == 1);
+        left_out += MANY - shot[0].stats.objects;
+        for (int i = 0; i < MANY; i++) ssdgs_model_destroy(models[i]);
+        ssdgs_model_destroy(all);
+    }
+    if (!real64) printf("figure objects_left_out %d of %d\n", left_out, 12 * MANY);
+    CHECK(left_out > 12 * MANY / 4);
+}
+
+/* Local lights: what they do not reach changes nothing of what they do; what moves out of their reach leaves
+   their maps; one batch of views or many, kept or not, the picture is the same. */
+static void test_local_lights(void) {
+    enum { MANY = 9, LIGHTS = 4, STEPS = 30 };
+    const ssdgs_settings settings = small_settings();
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    const ssdgs_camera camera = camera_from(0.3, -4, 2);
+    static const double origin[3] = {0, 0, 0};
+    ssdgs_model *models[MANY];
+    ssdgs_object objects[MANY];
+    ssdgs_light lights[LIGHTS];
+    ssdgs_scene *fresh = NULL;
+    int kept = 0, of_some = 0;
+    for (int i = 0; i < MANY; i++) {
+        models[i] = somewhere(&settings, i, origin, 0.7);
+        objects[i] = ssdgs_object_default(models[i]);
+        objects[i].to_world[3] = (ssdgs_real)(i % 3 - 1);
+        objects[i].to_world[7] = (ssdgs_real)(i / 3 - 1);
+    }
+    for (int i = 0; i < LIGHTS; i++) {
+        lights[i] = point_light(i % 2 * 1.6 - 0.8, i / 2 * 1.6 - 0.8, 0.5);
+        lights[i].range = (ssdgs_real)0.9;
+    }
+    lights[3].kind = SSDGS_LIGHT_SPOT;
+    lights[3].position[2] = 2;
+    lights[3].range = 4;
+    lights[3].direction[2] = -1;
+    lights[3].cone[0] = (ssdgs_real)0.2;
+    lights[3].cone[1] = (ssdgs_real)0.3;
+    /* those far behind, out of the first light's reach: there or not */
+    for (int i = 5; i < MANY; i++) objects[i].to_world[7] += 3;
+    together(objects, MANY, &camera, lights, 1, &options, shot);
+    together(objects, 5, &camera, lights, 1, &options, shot + 1);
+    for (int i = 5; i < MANY; i++) objects[i].to_world[7] -= 3;
+    CHECK(!memcmp(shot[0].value, shot[1].value, 3 * PIXELS * sizeof(ssdgs_real)));
+    CHECK(shot[0].stats.light_instances == shot[1].stats.light_instances &&
+          shot[0].stats.light_instances > 0);
+    for (int step = 0; step < STEPS; step++) {
+        const uint64_t seed = 20000 + 8 * (uint64_t)step;
+        const int which = (int)(draw(seed) * MANY);
+        const ssdgs_image planes[2] = {planes_of(shot), planes_of(shot + 1)};
+        if (step % 5 != 4) {
+            objects[which].to_world[3] += (ssdgs_real)(0.8 * draw(seed + 1) - 0.4);
+            objects[which].to_world[7] += (ssdgs_real)(0.8 * draw(seed + 2) - 0.4);
+        } else lights[which % LIGHTS].position[0] += (ssdgs_real)0.1;
+        CHECK(!ssdgs_scene_render(scene, objects, MANY, &camera, lights, LIGHTS, &options, planes,
+                                  &shot[0].stats));
+        batch_bytes = step % 2 ? 0 : (size_t)1 << 28;
+        CHECK(!ssdgs_scene_create(context, &fresh));
+        CHECK(!ssdgs_scene_render(fresh, objects, MANY, &camera, lights, LIGHTS, &options, planes + 1,
+                                  &shot[1].stats));
+        ssdgs_scene_destroy(fresh);
+        CHECK(same(shot, shot + 1) && !shot[1].stats.lights_cached);
+        kept += shot[0].stats.lights_cached;
+        of_some += shot[0].stats.lights_cached > 0 && shot[0].stats.lights_cached < LIGHTS;
+        batch_bytes = step % 3 ? 0 : (size_t)1 << 28;
+    }
+    batch_bytes = (size_t)1 << 28;
+    if (!real64) printf("figure lights_kept %d of %d\n", kept, STEPS * LIGHTS);
+    CHECK(kept > STEPS && of_some > STEPS / 3);
+    /* what moves out of sight and out of all reach leaves everything */
+    objects[8].to_world[7] = -40;
+    together(objects, MANY, &camera, lights, LIGHTS, &options, shot);
+    objects[8].to_world[7] = -41;
+    together(objects, MANY, &camera, lights, LIGHTS, &options, shot + 1);
+    CHECK(same(shot, shot + 1) && shot[1].stats.camera_cached && shot[1].stats.lights_cached == LIGHTS);
+    CHECK(!shot[1].stats.light_instances && shot[1].stats.objects == MANY - 1);
+    for (int i = 0; i < MANY; i++) ssdgs_model_destroy(models[i]);
+}
+
 /* ---- what is kept, and what is not ---- */
 
 static void test_kept(void) {
@@ -1225,6 +1353,8 @@ int main(void) {
     test_matrices();
     test_left_handed();
     test_kept();
+    TEST_ROW("114", "objects out of sight", test_out_of_sight());
+    TEST_ROW("115", "lights that reach some", test_local_lights());
     test_threads_and_memory();
     test_trim();
     test_moved_over();
