@@ -916,7 +916,8 @@ typedef struct ssdgs_frame {
     ssdgs_model_view gaussians;
     ssdgs_placed *objects; /* in training one */
     int object_count;
-    int count; /* Gaussians of all objects and the gaps between them; n below */
+    int count;                 /* Gaussians of all objects and the gaps between them; n below */
+    const uint16_t *object_of; /* (n / 64) of 64 Gaussians; NULL: of the first */
     int material_count;
     const uint16_t *material_of; /* (n / 64) of 64 Gaussians; NULL: all are of one material */
     ssdgs_camera camera;
@@ -1313,8 +1314,8 @@ typedef struct ssdgs__kernels {
                     size_t end, ssdgs_record *record, ssdgs_real *depth);
     void (*project_backward)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride,
                              size_t begin, size_t end, const ssdgs__project_gradient *d);
-    void (*bin)(const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, int begin,
-                int end, uint32_t at);
+    uint32_t (*bin)(const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, int begin,
+                    int end, uint32_t at);
     void (*walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed);
     void (*walk_light)(const ssdgs__tile *tile, ssdgs_real *sums);
     void (*composite)(const ssdgs__tile *tile, int layers, const ssdgs_real *const *color,
@@ -2934,7 +2935,7 @@ typedef struct ssdgs__cached_light {
 /* Of a model or a scene, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
     ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
-        shadow_known, transport, transport_known, objects, material_of, reach;
+        shadow_known, transport, transport_known, objects, object_of, material_of, reach;
     int view_room;
     ssdgs__cache cache;
     ssdgs__bounds scene;
@@ -3195,13 +3196,7 @@ static void ssdgs__turn(const ssdgs_placed *o, int back, const ssdgs_real from[3
 
 /* The object that Gaussian g of the frame belongs to, or stands behind in its gap. */
 static const ssdgs_placed *ssdgs__object_of(const ssdgs_frame *frame, int g) {
-    int low = 0, high = frame->object_count;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        if (frame->objects[middle].first <= g) low = middle;
-        else high = middle;
-    }
-    return frame->objects + low;
+    return frame->objects + (frame->object_of ? frame->object_of[g / SSDGS__BLOCK] : 0);
 }
 
 static int ssdgs__chunks(int count) { return (count + SSDGS__CHUNK - 1) / SSDGS__CHUNK; }
@@ -3447,6 +3442,8 @@ static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *va
     *variance = (ssdgs_real)(*compensate ? 0.2 : 0.3);
 }
 
+SSDGS__SMALL_BEGIN
+
 /* Whether a light has a map: one that is dark needs none. */
 static int ssdgs__casts(const ssdgs_light *light) {
     return !light->unshadowed &&
@@ -3458,6 +3455,28 @@ static int ssdgs__casts(const ssdgs_light *light) {
 static unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
     if (frame->object_count < 2) return NULL;
     return (unsigned char *)frame->memory->reach.memory + (ptrdiff_t)(light + 1) * frame->object_count;
+}
+
+/* Whether an object is out of the reach of a light, or with -1 the camera: nothing is known of it, or asked.
+ */
+static int ssdgs__beyond(const ssdgs_frame *frame, int light, const ssdgs_placed *o) {
+    const unsigned char *reach = ssdgs__reach(frame, light);
+    return reach && !reach[o - frame->objects];
+}
+
+/* From *at on, before end: the next Gaussians of objects that the camera or a light reaches, up to before
+ *stop. 0: there are none. What the stages up to WALK know of the others is not set. */
+static int ssdgs__reached_next(const ssdgs_frame *frame, int light, int *at, int end, int *stop) {
+    const unsigned char *reach = ssdgs__reach(frame, light);
+    *stop = end;
+    if (!reach || *at >= end) return *at < end;
+    const ssdgs_placed *o = ssdgs__object_of(frame, *at), *const last = frame->objects + frame->object_count;
+    for (; o < last && o->first < end && !reach[o - frame->objects]; o++) {}
+    if (o == last || o->first >= end) return 0;
+    if (o->first > *at) *at = o->first;
+    for (; o < last && o->first < end && reach[o - frame->objects]; o++) {}
+    if (o < last && o->first < end) *stop = o->first;
+    return 1;
 }
 
 /* What a light's map must cover: all objects, or those in its reach. */
@@ -3648,6 +3667,8 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     SSDGS__RANGE_OF("render options", o, transport_detail, (ssdgs_real)0.1, 8);
     return SSDGS_OK;
 }
+
+SSDGS__SMALL_END
 
 /* Whether an object's pixels are lit, not its Gaussians. */
 static int ssdgs__is_deferred(const ssdgs_placed *o) {
@@ -3981,6 +4002,12 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         if (near_plane < frame->near_plane) frame->near_plane = near_plane;
         *last = o;
     }
+    uint16_t *object_of;
+    SSDGS__RESERVE(m->object_of, object_of, uint16_t, (size_t)frame->count / SSDGS__BLOCK + 1);
+    frame->object_of = count > 1 ? object_of : NULL;
+    for (int i = 0; i < count; i++)
+        for (int g = 0; g < frame->objects[i].gaussians.count; g += SSDGS__BLOCK)
+            object_of[(frame->objects[i].first + g) / SSDGS__BLOCK] = (uint16_t)i;
     for (int i = 0; i < count; i++) { /* one that is lit says how colours are stored */
         if (i && (frame->objects[i].settings.baked || !frame->settings.baked)) continue;
         frame->model = frame->objects[i].model;
@@ -4373,11 +4400,7 @@ static void ssdgs__project_task(void *data, int index) {
     for (int at = chunk * SSDGS__CHUNK;
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs_placed *o = piece.object;
-        const unsigned char *reach = ssdgs__reach(frame, v->light);
-        if (reach && !reach[o - frame->objects]) {
-            piece.gap += piece.end - piece.begin;
-            piece.end = piece.begin;
-        }
+        if (ssdgs__beyond(frame, v->light, o)) continue;
         const ssdgs__projection p = ssdgs__projection_of(frame, o, v);
         frame->context->k->project(&p, o->gaussians.gaussians, o->gaussians.stride, (size_t)piece.begin,
                                    (size_t)piece.end, v->record + o->first, v->depth + o->first);
@@ -4414,16 +4437,17 @@ static void ssdgs__sort_task(void *data, int index) {
     uint32_t *histogram = (uint32_t *)(to + n);
     int visible = 0;
     memset(histogram, 0, 3 * 2048 * sizeof *histogram);
-    for (int i = 0; i < n; i++) {
-        const float depth = (float)v->depth[i];
-        if (!(depth >= 0)) continue;
-        uint32_t bits;
-        memcpy(&bits, &depth, 4);
-        from[visible++] = (uint64_t)bits << 32 | (uint32_t)i;
-        histogram[bits & 2047]++;
-        histogram[2048 + (bits >> 11 & 2047)]++;
-        histogram[4096 + (bits >> 22)]++;
-    }
+    for (int begin = 0, stop; ssdgs__reached_next(frame, v->light, &begin, n, &stop); begin = stop)
+        for (int i = begin; i < stop; i++) {
+            const float depth = (float)v->depth[i];
+            if (!(depth >= 0)) continue;
+            uint32_t bits;
+            memcpy(&bits, &depth, 4);
+            from[visible++] = (uint64_t)bits << 32 | (uint32_t)i;
+            histogram[bits & 2047]++;
+            histogram[2048 + (bits >> 11 & 2047)]++;
+            histogram[4096 + (bits >> 22)]++;
+        }
     for (int pass = 0; pass < 3; pass++) {
         uint32_t *h = histogram + 2048 * pass, sum = 0;
         for (int i = 0; i < 2048; i++) {
@@ -4484,18 +4508,19 @@ static void ssdgs__bin_room_task(void *data, int index) {
     ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     uint64_t room = 0;
     if (v->cached) return;
-    int begin, end;
+    int begin, end, stop;
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
-    for (int g = begin; g < end; g++) {
-        uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
-        if (v->depth[g] >= 0) {
-            ssdgs__tile_box(v, v->record + g, box);
-            room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
-        } else {
-            box[0] = box[1] = 1;
-            box[2] = box[3] = 0;
+    for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
+        for (int g = begin; g < stop; g++) {
+            uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
+            if (v->depth[g] >= 0) {
+                ssdgs__tile_box(v, v->record + g, box);
+                room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
+            } else {
+                box[0] = box[1] = 1;
+                box[2] = box[3] = 0;
+            }
         }
-    }
     m->chunk_room[chunk] = room;
 }
 
@@ -4504,11 +4529,14 @@ static void ssdgs__bin_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
-    if (frame->views[view].cached) return;
-    int begin, end;
+    const ssdgs_splat_view *v = frame->views + view;
+    uint32_t number = (uint32_t)m->chunk_room[chunk];
+    if (v->cached) return;
+    int begin, end, stop;
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
-    frame->context->k->bin(frame->views + view, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
-                           begin, end, (uint32_t)m->chunk_room[chunk]);
+    for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
+        number = frame->context->k->bin(v, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
+                                        begin, stop, number);
 }
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
@@ -4705,23 +4733,24 @@ static void ssdgs__gather_light_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
     const ssdgs_frame *frame = job->frame;
     const size_t first = (size_t)frame->count * (size_t)job->light;
-    int begin, end;
+    int begin, end, stop;
     ssdgs__bin_range(frame->count, index, &begin, &end);
-    for (int g = begin; g < end; g++) {
-        const size_t at = first + (size_t)g;
-        ssdgs_real sum[4] = {0, 0, 0, 0};
-        for (int view = job->first_view; view < job->end_view; view++) {
-            const ssdgs_splat_view *v = frame->views + view;
-            const ssdgs_instances of = v->of_gaussian[g];
-            for (uint32_t i = of.first; i < of.first + of.count; i++)
-                for (int c = 0; c < 4; c++)
-                    sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
+    for (int g = begin; ssdgs__reached_next(frame, job->light, &g, end, &stop);)
+        for (; g < stop; g++) {
+            const size_t at = first + (size_t)g;
+            ssdgs_real sum[4] = {0, 0, 0, 0};
+            for (int view = job->first_view; view < job->end_view; view++) {
+                const ssdgs_splat_view *v = frame->views + view;
+                const ssdgs_instances of = v->of_gaussian[g];
+                for (uint32_t i = of.first; i < of.first + of.count; i++)
+                    for (int c = 0; c < 4; c++)
+                        sum[c] += v->tile_sums[(size_t)v->instance[i].place * 4 + (size_t)c];
+            }
+            frame->visibility[at] =
+                sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
+            frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
+            if (frame->flux) frame->flux[at] = sum[3];
         }
-        frame->visibility[at] =
-            sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
-        frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
-        if (frame->flux) frame->flux[at] = sum[3];
-    }
 }
 
 /* What the occluder leaves of what comes to so many Gaussians, at points (count,3). */
@@ -4747,6 +4776,7 @@ static void ssdgs__occlude_task(void *data, int index) {
     while (ssdgs__piece_next(frame, &at, end, &piece)) {
         const ssdgs_placed *o = piece.object;
         const ssdgs_model_view *g = &o->gaussians;
+        if (ssdgs__beyond(frame, job->light, o)) continue;
         for (int i = piece.begin; i < piece.end; i++) {
             ssdgs_real local[3], *to = points + 3 * count;
             for (size_t c = 0; c < 3; c++)
@@ -4766,18 +4796,20 @@ static void ssdgs__occlude_task(void *data, int index) {
 static void ssdgs__gather_camera_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views;
-    int begin, end;
+    int begin, end, stop;
     ssdgs__bin_range(frame->count, index, &begin, &end);
-    for (int g = begin; g < end; g++) {
-        const ssdgs_instances of = v->of_gaussian[g];
-        unsigned seen = 0, needed = 0;
-        for (uint32_t i = of.first; i < of.first + of.count; i++) {
-            const uint32_t place = v->instance[i].place;
-            seen |= v->tile_seen[place];
-            needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
+    memset(frame->seen + begin, 0, (size_t)(end - begin));
+    for (int g = begin; ssdgs__reached_next(frame, -1, &g, end, &stop);)
+        for (; g < stop; g++) {
+            const ssdgs_instances of = v->of_gaussian[g];
+            unsigned seen = 0, needed = 0;
+            for (uint32_t i = of.first; i < of.first + of.count; i++) {
+                const uint32_t place = v->instance[i].place;
+                seen |= v->tile_seen[place];
+                needed |= v->tile_needed ? v->tile_needed[place] : v->tile_seen[place];
+            }
+            frame->seen[g] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_SKIPPED : 0);
         }
-        frame->seen[g] = (unsigned char)(needed ? SSDGS_SEEN : seen ? SSDGS_SKIPPED : 0);
-    }
 }
 
 static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
@@ -4933,7 +4965,7 @@ static void ssdgs__leaf_task(void *data, int chunk) {
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
         for (int light = 0; light < frame->light_count; light++) {
-            if (job->lights[light].transport_ready) continue;
+            if (job->lights[light].transport_ready || ssdgs__beyond(frame, light, piece.object)) continue;
             for (size_t leaf = (size_t)piece.begin / SSDGS__LEAF;
                  SSDGS__LEAF * leaf < (size_t)piece.end && tree->leaves; leaf++) {
                 ssdgs__node parts[SSDGS__LEAF];
@@ -4950,7 +4982,8 @@ static void ssdgs__join_task(void *data, int index) {
     const ssdgs__tree *tree = job->trees + index;
     size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels((size_t)tree->object->gaussians.count, first);
-    for (int light = 0; light < job->frame->light_count && tree->leaves; light++)
+    for (int light = 0; light < job->frame->light_count && tree->leaves; light++) {
+        if (ssdgs__beyond(job->frame, light, tree->object)) continue;
         for (int level = job->lights[light].transport_ready ? levels : 1; level < levels; level++) {
             ssdgs__node *const nodes = tree->nodes + tree->count * (size_t)light, *const to =
                                                                                       nodes + first[level];
@@ -4959,6 +4992,7 @@ static void ssdgs__join_task(void *data, int index) {
                 to[i / SSDGS__LEAF] = ssdgs__node_join(nodes + first[level - 1] + i,
                                                        below - i < SSDGS__LEAF ? below - i : SSDGS__LEAF);
         }
+    }
 }
 
 /* A node as a point: x, y, z, flux. */
@@ -4991,9 +5025,11 @@ static void ssdgs__points_task(void *data, int chunk) {
     for (int at = chunk * SSDGS__CHUNK;
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
-        for (int light = 0; light < frame->light_count && tree->leaves; light++)
-            for (int g = piece.begin; g < piece.end && !job->lights[light].transport_ready; g += SSDGS__LEAF)
+        for (int light = 0; light < frame->light_count && tree->leaves; light++) {
+            if (job->lights[light].transport_ready || ssdgs__beyond(frame, light, piece.object)) continue;
+            for (int g = piece.begin; g < piece.end; g += SSDGS__LEAF)
                 ssdgs__points_of(frame, tree, light, (size_t)g / SSDGS__LEAF);
+        }
     }
 }
 
@@ -5229,7 +5265,9 @@ static void ssdgs__transport_task(void *data, int slot) {
         }
         for (int light = 0; light < frame->light_count; light++) {
             const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
-            const int groups = !ssdgs__casts(frame->lights + light) ? 0 : seen & ~job->known[at];
+            const int groups = !ssdgs__casts(frame->lights + light) || ssdgs__beyond(frame, light, o)
+                                   ? 0
+                                   : seen & ~job->known[at];
             if (!groups) continue;
             ssdgs_real sums[SSDGS__LENGTHS * SSDGS__BLOCK];
             ssdgs__transport_block(job, job->tree.trees + (o - frame->objects), light, slot, x, groups, sums);
@@ -5879,8 +5917,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
                    *shadow = NULL, *scattering = NULL;
         const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
         const ssdgs_light *source = frame->lights + light;
-        const unsigned char *in_reach = ssdgs__reach(frame, light);
-        const int off = in_reach && !in_reach[o - frame->objects];
+        const int off = ssdgs__beyond(frame, light, o);
         const int limited = source->kind == SSDGS_LIGHT_SPOT || source->range > 0;
         ssdgs_real reach[SSDGS__BLOCK];
         const int reached =
@@ -6501,6 +6538,15 @@ static void ssdgs__median_store(const ssdgs_frame *frame, const ssdgs__tile *til
     ssdgs__tile_store(tile, values, 1, 0, planes);
 }
 
+/* Whether a light reaches any of the objects that a tile blends. */
+static int ssdgs__reaches_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light) {
+    const unsigned char *reach = ssdgs__reach(frame, light);
+    int any = !reach;
+    for (uint32_t i = 0; i < tile->count && !any; i++)
+        any = tile->seen[i] && reach[frame->object_of[tile->list[i].gaussian / SSDGS__BLOCK]];
+    return any;
+}
+
 static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -6528,7 +6574,8 @@ static void ssdgs__composite_task(void *data, int index) {
         for (int layer = 0; job->deferred && layer < SSDGS__LIGHT_LAYER; layer++)
             ssdgs__layer_pixels_store(frame, &tile, layer, later, pixels + layer * SSDGS__TILE_LAYER);
         for (int light = 0; job->deferred && light < frame->light_count; light++)
-            ssdgs__light_tile(frame, &tile, light, later, pixels);
+            if (frame->layer_pixels || ssdgs__reaches_tile(frame, &tile, light))
+                ssdgs__light_tile(frame, &tile, light, later, pixels);
         ssdgs__tile_store(&tile, pixels, later ? 3 : 4, later, job->planes);
         tile.material = ssdgs__material_after(&tile, tile.material);
     }
@@ -6889,7 +6936,7 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     stats->instances = frame->views[0].instances;
     stats->light_instances = frame->light_instances;
     for (int i = 0; i < frame->object_count; i++)
-        stats->objects += ssdgs__reach(frame, -1) ? ssdgs__reach(frame, -1)[i] : 1;
+        stats->objects += !ssdgs__beyond(frame, -1, frame->objects + i);
     for (int i = 0; i < frame->shaded_count; i++)
         stats->blackened += frame->color[4 * (size_t)frame->shaded[i] + 3] > 0;
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
@@ -12442,8 +12489,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
    tiles with pixels where alpha may reach the threshold, row by row, and their micro-tiles (lanes here). Over
    the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
    the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. */
-SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
-                      int end, uint32_t at) {
+SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
+                          int end, uint32_t at) {
     const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
     const V zero = VSET(0), side = VSET(3);
     for (int g = begin; g < end; g++) {
@@ -12482,6 +12529,7 @@ SSDGS__FN void F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log
         }
         of->count = at - of->first;
     }
+    return at;
 }
 
 /* ==== >>walk_kernels  eqs. 1, 6, 7 over the pixels of a 16x16 tile ==== */

@@ -227,7 +227,7 @@ static double sky_in_highlight(const ssdgs_model *model, double lambda, double f
             glow += log1p(exp(weight)) * exp(-exp((double)v.asg_sharpness[2 * j]) * lambda * (1 - nh * nh));
         }
         const double least = fmax(woh, (double)SSDGS__GRAZING), fresnel = f0 + (1 - f0) * pow(1 - woh, 5);
-        sum += (deferred ? cosine / (least * least) : 1) * fresnel * glow * 4 * pi / MANY;
+        sum += (deferred ? cosine / (least * least) : 1) * fresnel * glow * 4 * pi / (double)MANY;
     }
     return sum;
 }
@@ -334,9 +334,10 @@ enum { WIDE = 64, HIGH = 32, TEXELS = WIDE * HIGH };
 static ssdgs_real sky[3 * TEXELS];
 
 static double texel(int x, int y, double d[3]) {
-    const double top = cos(pi * y / HIGH), bottom = cos(pi * (y + 1) / HIGH), z = (top + bottom) / 2;
-    d[0] = sqrt(1 - z * z) * cos(2 * pi * (x + 0.5) / WIDE);
-    d[1] = sqrt(1 - z * z) * sin(2 * pi * (x + 0.5) / WIDE);
+    const double top = cos(pi * y / (double)HIGH), bottom = cos(pi * (y + 1) / (double)HIGH),
+                 z = (top + bottom) / 2;
+    d[0] = sqrt(1 - z * z) * cos(2 * pi * (x + 0.5) / (double)WIDE);
+    d[1] = sqrt(1 - z * z) * sin(2 * pi * (x + 0.5) / (double)WIDE);
     d[2] = z;
     return 2 * pi / WIDE * (top - bottom);
 }

@@ -85,7 +85,8 @@ static void test_roughness(int asg) {
     g.sharpness[1] = 6;
     CHECK(!ssdgs_model_set(model, 0, &g));
     for (int i = 0; i < MANY; i++) {
-        const double z = 1 - 2 * (i + 0.5) / MANY, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
+        const double z = 1 - 2 * (i + 0.5) / (double)MANY, across = sqrt(1 - z * z),
+                     turn = pi * (3 - sqrt(5.0)) * i;
         lights[i] = parallel_light(across * cos(turn), across * sin(turn), z);
         lights[i].unshadowed = 1;
         /* geometric lobes do not end at the horizon: the sky does */
@@ -140,7 +141,8 @@ static ssdgs_model *ball(const ssdgs_settings *settings, double radius) {
     ssdgs_model *model = NULL;
     if (!CHECK(!ssdgs_model_create(context, settings, BALL, &model))) exit(1);
     for (int i = 0; i < BALL; i++) {
-        const double z = 1 - 2 * (i + 0.5) / BALL, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
+        const double z = 1 - 2 * (i + 0.5) / (double)BALL, across = sqrt(1 - z * z),
+                     turn = pi * (3 - sqrt(5.0)) * i;
         const double n[3] = {across * cos(turn), across * sin(turn), z};
         ssdgs_gaussian g = ssdgs_gaussian_default();
         for (int c = 0; c < 3; c++) {

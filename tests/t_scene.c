@@ -983,7 +983,7 @@ static void test_local_lights(void) {
           shot[0].stats.light_instances > 0);
     for (int step = 0; step < STEPS; step++) {
         const uint64_t seed = 20000 + 8 * (uint64_t)step;
-        const int which = (int)(draw(seed) * MANY);
+        const int which = (int)(draw(seed) * (double)MANY);
         const ssdgs_image planes[2] = {planes_of(shot), planes_of(shot + 1)};
         if (step % 5 != 4) {
             objects[which].to_world[3] += (ssdgs_real)(0.8 * draw(seed + 1) - 0.4);
