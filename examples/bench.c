@@ -948,12 +948,18 @@ static void measure_scaling(bench *b) {
 /* Placed objects of one model of 5,000 Gaussians on a square grid, under point lights that hang over it: a
    frame in which the lights, the camera and an object move, and one in which nothing does. */
 static void measure_scenes(bench *b) {
-    static const int kinds[][2] = {{1, 1}, {3, 2}, {10, 1}, {10, 4}, {100, 1}}; /* objects, lights */
-    enum { KINDS = sizeof kinds / sizeof *kinds, MOST = 100, COUNT = 5000, LIGHTS = 4 };
+    enum { EVERYWHERE, LOCAL, AMBIENT };
+    static const char *const reach[3] = {"", " with a range", ", ambient"};
+    static const int kinds[][3] = {{1, 1, EVERYWHERE}, {3, 2, EVERYWHERE},  {10, 1, EVERYWHERE},
+                                   {10, 1, AMBIENT},   {10, 4, EVERYWHERE}, {100, 1, EVERYWHERE},
+                                   {100, 16, LOCAL}}; /* objects, lights */
+    enum { KINDS = sizeof kinds / sizeof *kinds, MOST = 100, COUNT = 5000, LIGHTS = 16 };
     const ssdgs_real *intensity = b->photos[0].light.intensity;
     table *t = new_table(b, "scenes", "objects lights gaussians ms_moving ms_at_rest mib_held");
     for (int k = 0; k < KINDS - 2 * b->quick; k++) {
         const int objects = kinds[k][0], lights = kinds[k][1], side = (int)ceil(sqrt(objects));
+        const int local = kinds[k][2] == LOCAL, rows = local ? 4 : 2;
+        ssdgs_render_options options = ssdgs_render_options_default();
         static ssdgs_object object[MOST];
         ssdgs_light light[LIGHTS];
         ssdgs_image image = {0, b->color, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
@@ -975,26 +981,31 @@ static void measure_scenes(bench *b) {
             object[i].to_world[7] = step * ((ssdgs_real)(i / side) - (ssdgs_real)(side - 1) / 2);
         }
         memset(light, 0, sizeof light);
+        for (int c = 0; c < 3 && kinds[k][2] == AMBIENT; c++) options.ambient[0][c] = intensity[c] / 10;
         for (int frame = 0; frame < (b->quick ? 8 : 24); frame++) {
             const int moving = frame % 2 == 0; /* the frame after it is the same */
             const ssdgs_real t01 = (ssdgs_real)(frame / 2) / 12, eye[3] = {t01 * width / 4, -width, width};
             const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.9, SIDE, SIDE);
             object[0].to_world[11] = t01 * step / 4;
             for (int l = 0; l < lights; l++) {
-                light[l].position[0] = width * ((ssdgs_real)(l % 2) - (ssdgs_real)0.5 + t01 / 4);
-                light[l].position[1] = width * ((ssdgs_real)(l / 2 % 2) - (ssdgs_real)0.5);
-                light[l].position[2] = width;
-                for (int c = 0; c < 3; c++) light[l].intensity[c] = intensity[c] * width * width;
+                const ssdgs_real apart = width / (ssdgs_real)(rows - 1) * (local ? (ssdgs_real)0.75 : 1);
+                light[l].position[0] =
+                    apart * ((ssdgs_real)(l % rows) - (ssdgs_real)(rows - 1) / 2 + t01 / 4);
+                light[l].position[1] = apart * ((ssdgs_real)(l / rows) - (ssdgs_real)(rows - 1) / 2);
+                light[l].position[2] = local ? step : width;
+                light[l].range = local ? 2 * step : 0;
+                for (int c = 0; c < 3; c++)
+                    light[l].intensity[c] = intensity[c] * light[l].position[2] * light[l].position[2];
             }
             const double start = now();
             check(s.context,
-                  ssdgs_scene_render(scene, object, objects, &camera, light, lights, NULL, &image, NULL));
+                  ssdgs_scene_render(scene, object, objects, &camera, light, lights, &options, &image, NULL));
             const double ms = 1e3 * (now() - start);
             if (frame > 1 && ms < best[!moving]) best[!moving] = ms;
         }
-        char name[48];
-        snprintf(name, sizeof name, "%d object%s, %d light%s", objects, objects > 1 ? "s" : "", lights,
-                 lights > 1 ? "s" : "");
+        char name[64];
+        snprintf(name, sizeof name, "%d object%s, %d light%s%s", objects, objects > 1 ? "s" : "", lights,
+                 lights > 1 ? "s" : "", reach[kinds[k][2]]);
         add_row(t, name, (double)objects, (double)lights, (double)objects * s.model->count, best[0], best[1],
                 (double)m.peak / 1048576);
         ssdgs_scene_destroy(scene);

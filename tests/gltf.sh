@@ -8,7 +8,7 @@ check() { # check NAME COMMAND...
     if "$@"; then passed=$((passed + 1)); else failed=$((failed + 1)); echo "failed: $name"; fi
 }
 mkdir -p "$work"
-[ -d "$work/node_modules/gltf-validator" ] || npm install --silent --no-audit --no-fund --prefix "$work" gltf-validator >/dev/null || {
+[ -d "$work/node_modules/gltf-validator" ] || npm install --silent --no-audit --no-fund --fetch-timeout=20000 --fetch-retries=0 --prefix "$work" gltf-validator >/dev/null || {
     echo "npm has no gltf-validator"; exit 2; }
 [ "${2:-}" != install ] || exit 0
 faults() { # faults FILE: how many errors and warnings it has

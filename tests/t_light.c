@@ -199,7 +199,7 @@ static void test_ambient_terms(int asg) {
     ssdgs_model_destroy(single);
 }
 
-/* What of a sky of radiance 1 the highlight of a Gaussian sends to the eye, by eqs. 10 and 12 as
+/* What of a sky of radiance 1 + 0.3 z the highlight of a Gaussian sends to the eye, by eqs. 10 and 12 as
    >>highlight_kernel and, geometric, >>asg_kernel have them, numerically. */
 static double sky_in_highlight(const ssdgs_model *model, double lambda, double f0, const double n[3],
                                const double wo[3]) {
@@ -216,6 +216,7 @@ static double sky_in_highlight(const ssdgs_model *model, double lambda, double f
             cosine += n[c] * wi[c];
         }
         if (cosine <= 0) continue;
+        const double radiance = 1 + 0.3 * wi[2];
         for (int c = 0; c < 3; c++) {
             h[c] /= sqrt(length2);
             nh += n[c] * h[c];
@@ -227,7 +228,7 @@ static double sky_in_highlight(const ssdgs_model *model, double lambda, double f
             glow += log1p(exp(weight)) * exp(-exp((double)v.asg_sharpness[2 * j]) * lambda * (1 - nh * nh));
         }
         const double least = fmax(woh, (double)SSDGS__GRAZING), fresnel = f0 + (1 - f0) * pow(1 - woh, 5);
-        sum += (deferred ? cosine / (least * least) : 1) * fresnel * glow * 4 * pi / (double)MANY;
+        sum += (deferred ? cosine / (least * least) : 1) * fresnel * glow * radiance * 4 * pi / (double)MANY;
     }
     return sum;
 }
@@ -240,7 +241,10 @@ static void test_ambient_highlight(int asg) {
     ssdgs_model *single = one(&settings, at, normal);
     const int deferred = asg == SSDGS_ASG_DEFERRED;
     ssdgs_render_options options = ssdgs_render_options_exact();
-    for (int c = 0; c < 3; c++) options.ambient[0][c] = (ssdgs_real)pi; /* radiance 1 */
+    for (int c = 0; c < 3; c++) {
+        options.ambient[0][c] = (ssdgs_real)pi;
+        options.ambient[2][c] = (ssdgs_real)(0.2 * pi);
+    }
     for (int i = 0; i < (deferred ? 12 : 9); i++) { /* geometric ones do not end at the horizon */
         const double lambda = deferred ? 0.5 * pow(6, i % 3) : 1, f0 = deferred ? 0.3 : 0.04;
         const double turn = (i / 3) * 0.45; /* from the normal to the eye */
@@ -263,7 +267,7 @@ static void test_ambient_highlight(int asg) {
         const double want = sky_in_highlight(single, lambda, f0, normal, eye);
         const double ratio = got[0] / alpha / (double)g.specular[0] / want;
         if (!real64) printf("figure ambient_highlight_%d_%d %.3f of the integral\n", asg, i, ratio);
-        CHECK(ratio > (deferred ? 0.85 : 0.75) && ratio < 1.2);
+        CHECK(ratio > (deferred ? 0.8 : 0.7) && ratio < 1.2);
     }
     ssdgs_model_destroy(single);
 }
@@ -314,6 +318,14 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
         printf("figure exposure_%d %.3f RMS from that of %d directions, mean %.2f, from %.2f to %.2f\n",
                number, sqrt(error2), MANY, mean, low, high);
     CHECK(sqrt(error2) < 0.1 && high - low > 0.4);
+    /* all that ambient light brings goes with them; they are found once */
+    memcpy(model->exposure, found, (size_t)count * sizeof *found);
+    for (int half = 0; half < 2; half++) {
+        for (int i = 0; i < count; i++) model->exposure[i] = found[i] * (half ? (ssdgs_real)0.5 : 1);
+        alone(model, &camera, NULL, 0, &options, shot + half);
+    }
+    for (int i = 0; i < 3 * PIXELS; i++) shot[0].value[i] *= (ssdgs_real)0.5;
+    CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, exactly(1e-7), exactly(1e-5), "half exposed");
     memcpy(model->exposure, found, (size_t)count * sizeof *found);
     /* once a model, until it changes */
     const uint64_t known = model->exposure_revision;
@@ -328,6 +340,62 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
     CHECK(strstr(ssdgs_error_message(context), "ambient[3]") != NULL);
 }
 
+/* A sheet across each axis hides the sky from what faces it. */
+static void test_exposure_of_a_sheet(void) {
+    enum { ROW = 21, SHEET = ROW * ROW };
+    const ssdgs_settings settings = small_settings();
+    for (int axis = 0; axis < 3; axis++) {
+        ssdgs_model *model = NULL;
+        ssdgs_render_options options = ssdgs_render_options_exact();
+        const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+        options.ambient[0][0] = 1;
+        CHECK(!ssdgs_model_create(context, &settings, SHEET + 2, &model));
+        for (int i = 0; i < SHEET + 2; i++) {
+            ssdgs_gaussian g = ssdgs_gaussian_default();
+            const int probe = i - SHEET;
+            g.position[(axis + 1) % 3] = (ssdgs_real)(probe < 0 ? 0.05 * (i % ROW - ROW / 2) : 0);
+            g.position[(axis + 2) % 3] = (ssdgs_real)(probe < 0 ? 0.05 * (i / ROW - ROW / 2) : 0.05 * probe);
+            g.position[axis] = (ssdgs_real)(probe < 0 ? 0 : 0.12);
+            for (int c = 0; c < 3; c++)
+                g.normal[c] =
+                    (ssdgs_real)(c == axis ? probe == 1 ? -1 : 1 : 0), /* the second probe faces the sheet */
+                    g.scale[c] = (ssdgs_real)(probe >= 0  ? 0.01
+                                              : c == axis ? 0.005
+                                                          : 0.05);
+            g.rotation[0] = 1;
+            g.opacity = (ssdgs_real)(probe < 0 ? 0.99 : 0.1);
+            CHECK(!ssdgs_model_set(model, i, &g));
+        }
+        alone(model, &camera, NULL, 0, &options, shot);
+        CHECK(model->exposure[SHEET] > (ssdgs_real)0.85 && model->exposure[SHEET + 1] < (ssdgs_real)0.25);
+        ssdgs_model_destroy(model);
+    }
+}
+
+/* Two objects, one without shadows of its own: pixels of each are lit as it is alone. */
+static void test_of_two_kinds(void) {
+    ssdgs_settings settings = small_settings();
+    ssdgs_light lights[2] = {point_light(0, -1, 4), parallel_light(0, 0, 1)};
+    const ssdgs_camera camera = camera_from(0, -4, 2);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    double apart = 0, all = 0;
+    ssdgs_object objects[2];
+    lights[0].unshadowed = 1;
+    for (int i = 0; i < 2; i++) {
+        settings.terms = SSDGS_DIFFUSE_TERM | (i ? SSDGS_SHADOW_TERM : 0);
+        objects[i] = ssdgs_object_default(cloud(&settings, 0, 192, 0.4));
+        objects[i].to_world[3] = (ssdgs_real)(i ? 0.7 : -0.7);
+        together(objects + i, 1, &camera, lights, 2, &options, shot + i);
+    }
+    together(objects, 2, &camera, lights, 2, &options, shot + 2);
+    for (int i = 0; i < 3 * PIXELS; i++) {
+        apart += fabs((double)(shot[2].value[i] - shot[0].value[i] - shot[1].value[i]));
+        all += (double)shot[2].value[i];
+    }
+    CHECK(all > 1 && apart < 0.01 * all);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(objects[i].model);
+}
+
 /* ---- environment maps ---- */
 
 enum { WIDE = 64, HIGH = 32, TEXELS = WIDE * HIGH };
@@ -339,7 +407,7 @@ static double texel(int x, int y, double d[3]) {
     d[0] = sqrt(1 - z * z) * cos(2 * pi * (x + 0.5) / (double)WIDE);
     d[1] = sqrt(1 - z * z) * sin(2 * pi * (x + 0.5) / (double)WIDE);
     d[2] = z;
-    return 2 * pi / WIDE * (top - bottom);
+    return 2 * pi / (double)WIDE * (top - bottom);
 }
 
 /* Blue above, brown below, a sun and a window. */
@@ -384,6 +452,32 @@ static void test_environment_sums(void) {
                                     lights[i].position[2] * lights[i].position[2]) -
                            1) < 1e-5);
         }
+    /* with both, ambient light has what is less than twice the mean, as bright as that of what is more */
+    double mean = 0, left = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int y = 0; y < HIGH; y++)
+            for (int x = 0; x < WIDE; x++) {
+                const ssdgs_real *rgb = sky + 3 * (y * WIDE + x);
+                const double size = texel(x, y, direction);
+                const double light =
+                    0.2126 * (double)rgb[0] + 0.7152 * (double)rgb[1] + 0.0722 * (double)rgb[2];
+                if (!pass) mean += light * size / (4 * pi);
+                else left += (double)rgb[0] * size * (light > 2 * mean ? 2 * mean / light : 1);
+            }
+    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 4, ambient));
+    CHECK(fabs(4 * (double)ambient[0][0] / left - 1) < (real64 ? 1e-12 : 1e-5) && left < 0.9 * total[0]);
+    /* two spots are two lights */
+    memset(sky, 0, sizeof sky);
+    sky[3 * (8 * WIDE + 20)] = sky[3 * (21 * WIDE + 23)] = 5;
+    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 2, NULL));
+    for (int i = 0; i < 2; i++) {
+        double to[2][3], off[2] = {0, 0};
+        texel(20, 8, to[0]);
+        texel(23, 21, to[1]);
+        for (int k = 0; k < 2; k++)
+            for (int c = 0; c < 3; c++) off[k] += fabs((double)lights[i].position[c] - to[k][c]);
+        CHECK(fmin(off[0], off[1]) < 1e-5 && lights[i].intensity[0] > 0);
+    }
     /* the irradiance: exact for a sky of these terms */
     for (int turn = 0; turn < 2; turn++) {
         static const double terms[9] = {2, 0.3, -0.2, 0.4, 0.25, -0.3, 0.1, 0.2, -0.15}; /* of radiance */
@@ -478,16 +572,18 @@ int main(void) {
         ssdgs_settings settings = small_settings();
         if (kind) settings.asg = SSDGS_ASG_GEOMETRIC;
         ssdgs_model *model = cloud(&settings, 0, 300, 0.6);
-        TEST_ROW("108", "lights without shadow", test_unshadowed(model));
-        TEST_ROW("109", "lights with a range", test_range(model));
+        TEST_ROW("88", "lights without shadow", test_unshadowed(model));
+        TEST_ROW("89", "lights with a range", test_range(model));
         test_ambient_terms(settings.asg);
-        TEST_ROW("110", "ambient light", test_ambient_cloud(model, kind));
+        TEST_ROW("90", "ambient light", test_ambient_cloud(model, kind));
         if (!kind && !real64) test_environment_pictures(model);
         ssdgs_model_destroy(model);
     }
     test_ambient_highlight(SSDGS_ASG_DEFERRED);
     test_ambient_highlight(SSDGS_ASG_GEOMETRIC);
-    TEST_ROW("111", "environment maps", test_environment_sums());
+    test_exposure_of_a_sheet();
+    test_of_two_kinds();
+    TEST_ROW("91", "environment maps", test_environment_sums());
     test_refused();
     ssdgs_scene_destroy(scene);
     ssdgs_context_destroy(context);

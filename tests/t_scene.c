@@ -909,9 +909,15 @@ static ssdgs_model *somewhere(const ssdgs_settings *settings, int number, const 
 static void test_out_of_sight(void) {
     enum { MANY = 24 };
     const ssdgs_settings settings = small_settings();
-    ssdgs_light light = parallel_light(0.6, 0, 0.8);
-    light.unshadowed = 1;
+    ssdgs_light lights[3] = {parallel_light(0.6, 0, 0.8), point_light(0.5, -1, 1), point_light(-1, -2, 1)};
     int left_out = 0;
+    for (int i = 0; i < 3; i++) lights[i].unshadowed = 1; /* so no map, which would cover other things */
+    lights[1].range = (ssdgs_real)1.4;
+    lights[2].kind = SSDGS_LIGHT_SPOT;
+    lights[2].direction[0] = (ssdgs_real)0.6;
+    lights[2].direction[1] = (ssdgs_real)0.8;
+    lights[2].cone[0] = (ssdgs_real)0.2;
+    lights[2].cone[1] = (ssdgs_real)0.5;
     for (int round = 0; round < 12; round++) {
         ssdgs_model *models[MANY], *all = NULL;
         ssdgs_object objects[MANY];
@@ -925,15 +931,20 @@ static void test_out_of_sight(void) {
             double at[3];
             for (uint64_t c = 0; c < 3; c++)
                 at[c] = 8 * pow(draw(seed + c), 2) * (draw(seed + 3 + c) < 0.5 ? -1 : 1);
-            models[i] = somewhere(&settings, i, at, 0.2 + 3 * pow(draw(seed + 7), 3));
+            if (!i) /* around the camera */
+                for (int c = 0; c < 3; c++)
+                    at[c] = -(double)(camera.view[c] * camera.view[3] + camera.view[4 + c] * camera.view[7] +
+                                      camera.view[8 + c] * camera.view[11]) -
+                            0.1 * (double)camera.view[8 + c];
+            models[i] = somewhere(&settings, i, at, i ? 0.2 + 3 * pow(draw(seed + 7), 3) : 0.8);
             objects[i] = ssdgs_object_default(models[i]);
             const ssdgs_model_view part = ssdgs_model_peek(models[i]);
             for (size_t c = 0; c < SSDGS_CHANNELS; c++)
                 memcpy(whole.gaussians + c * whole.stride + 64 * i, part.gaussians + c * part.stride,
                        64 * sizeof(ssdgs_real));
         }
-        together(objects, MANY, &camera, &light, 1, &options, shot);
-        alone(all, &camera, &light, 1, &options, shot + 1);
+        together(objects, MANY, &camera, lights, 3, &options, shot);
+        alone(all, &camera, lights, 3, &options, shot + 1);
         CHECK(same(shot, shot + 1) && shot[0].stats.visible == shot[1].stats.visible);
         CHECK(shot[0].stats.objects < MANY && shot[1].stats.objects == 1);
         left_out += MANY - shot[0].stats.objects;
@@ -948,7 +959,7 @@ static void test_out_of_sight(void) {
    their maps; one batch of views or many, kept or not, the picture is the same. */
 static void test_local_lights(void) {
     enum { MANY = 9, LIGHTS = 4, STEPS = 30 };
-    const ssdgs_settings settings = small_settings();
+    ssdgs_settings settings = small_settings();
     const ssdgs_render_options options = ssdgs_render_options_exact();
     const ssdgs_camera camera = camera_from(0.3, -4, 2);
     static const double origin[3] = {0, 0, 0};
@@ -957,6 +968,7 @@ static void test_local_lights(void) {
     ssdgs_light lights[LIGHTS];
     ssdgs_scene *fresh = NULL;
     int kept = 0, of_some = 0;
+    settings.light_map.size = 0; /* as fine as the Gaussians in reach ask for */
     for (int i = 0; i < MANY; i++) {
         models[i] = somewhere(&settings, i, origin, 0.7);
         objects[i] = ssdgs_object_default(models[i]);
@@ -981,6 +993,23 @@ static void test_local_lights(void) {
     CHECK(!memcmp(shot[0].value, shot[1].value, 3 * PIXELS * sizeof(ssdgs_real)));
     CHECK(shot[0].stats.light_instances == shot[1].stats.light_instances &&
           shot[0].stats.light_instances > 0);
+    /* the same, twice as large: as fine a map */
+    ssdgs_object large[MANY];
+    ssdgs_camera further = camera;
+    ssdgs_light brighter = lights[0];
+    memcpy(large, objects, sizeof large);
+    for (int i = 0; i < 12 * MANY; i++) large[i / 12].to_world[i % 12] *= 2;
+    for (int c = 0; c < 3; c++) {
+        further.view[4 * c + 3] *= 2;
+        brighter.position[c] *= 2;
+        brighter.intensity[c] *= 4;
+    }
+    brighter.range *= 2;
+    together(objects, MANY, &camera, lights, 1, &options, shot);
+    together(large, MANY, &further, &brighter, 1, &options, shot + 1);
+    CHECK(shot[0].stats.light_instances == shot[1].stats.light_instances);
+    CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, real64 ? 1e-9 : 2e-4, real64 ? 1e-9 : 2e-3,
+               "twice as large");
     for (int step = 0; step < STEPS; step++) {
         const uint64_t seed = 20000 + 8 * (uint64_t)step;
         const int which = (int)(draw(seed) * (double)MANY);
@@ -988,7 +1017,12 @@ static void test_local_lights(void) {
         if (step % 5 != 4) {
             objects[which].to_world[3] += (ssdgs_real)(0.8 * draw(seed + 1) - 0.4);
             objects[which].to_world[7] += (ssdgs_real)(0.8 * draw(seed + 2) - 0.4);
-        } else lights[which % LIGHTS].position[0] += (ssdgs_real)0.1;
+        } else if (step < 5) lights[which % LIGHTS].position[0] += (ssdgs_real)0.1;
+        else if (step < 10) lights[which % LIGHTS].range *= (ssdgs_real)1.1;
+        else if (step < 15) lights[3].cone[1] += (ssdgs_real)0.1;
+        else { /* sideways */ lights[3].direction[0] = (ssdgs_real)0.28;
+            lights[3].direction[2] = (ssdgs_real)-0.96;
+        }
         CHECK(!ssdgs_scene_render(scene, objects, MANY, &camera, lights, LIGHTS, &options, planes,
                                   &shot[0].stats));
         batch_bytes = step % 2 ? 0 : (size_t)1 << 28;
@@ -1001,7 +1035,15 @@ static void test_local_lights(void) {
         of_some += shot[0].stats.lights_cached > 0 && shot[0].stats.lights_cached < LIGHTS;
         batch_bytes = step % 3 ? 0 : (size_t)1 << 28;
     }
-    batch_bytes = (size_t)1 << 28;
+    for (int batch = 0; batch < 2; batch++) { /* no view is walked twice */
+        const ssdgs_image image = planes_of(shot);
+        batch_bytes = (size_t)batch << 28;
+        CHECK(!ssdgs_scene_create(context, &fresh));
+        CHECK(!ssdgs_scene_render(fresh, objects, MANY, &camera, lights, LIGHTS, &options, &image,
+                                  &shot[batch].stats));
+        ssdgs_scene_destroy(fresh);
+    }
+    CHECK(shot[0].stats.light_instances == shot[1].stats.light_instances);
     if (!real64) printf("figure lights_kept %d of %d\n", kept, STEPS * LIGHTS);
     CHECK(kept > STEPS && of_some > STEPS / 3);
     /* what moves out of sight and out of all reach leaves everything */
@@ -1292,10 +1334,11 @@ static void test_refused(void) {
 static void test_extremes(void) {
     ssdgs_settings s = small_settings();
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
-    ssdgs_light lights[60];
+    static ssdgs_light lights[1000];
     ssdgs_model *model = cloud(&s, 0, 100, 0.3), *empty = NULL;
     CHECK(!ssdgs_model_create(context, &s, 0, &empty));
-    for (int i = 0; i < 60; i++) lights[i] = point_light(2 * cos(0.1 * i), 2 * sin(0.1 * i), 1 + 0.02 * i);
+    for (int i = 0; i < 1000; i++)
+        lights[i] = point_light(2 * cos(0.1 * i), 2 * sin(0.1 * i), 1 + 0.02 * (i % 60));
     ssdgs_object object[3] = {ssdgs_object_default(model), ssdgs_object_default(empty),
                               ssdgs_object_default(model)};
     together(object, 1, &camera, lights, 1, NULL, shot);
@@ -1320,7 +1363,7 @@ static void test_extremes(void) {
     CHECK(shot[1].value[15 * PIXELS + PIXELS / 2 + SIDE / 2] > (ssdgs_real)0.1);
     object[0] = ssdgs_object_default(model);
     object[1] = placed(model, 0.3, 0.5, 0, 0.3, 0, 0);
-    for (int count = 0; count <= 60; count += 60) {
+    for (int count = 0; count <= 1000; count = count ? 50 * count : 20) {
         together(object, 2, &camera, lights, count, NULL, shot + 1);
         CHECK(finite_picture(shot + 1) && (shot[1].value[3 * (PIXELS + SIDE) / 2] > 0) == (count > 0));
     }
@@ -1353,14 +1396,14 @@ int main(void) {
     test_matrices();
     test_left_handed();
     test_kept();
-    TEST_ROW("114", "objects out of sight", test_out_of_sight());
-    TEST_ROW("115", "lights that reach some", test_local_lights());
+    TEST_ROW("94", "objects out of sight", test_out_of_sight());
+    TEST_ROW("95", "lights that reach some", test_local_lights());
     test_threads_and_memory();
     test_trim();
     test_moved_over();
     test_jobs();
     test_refused();
-    test_extremes();
+    TEST_ROW("87", "scenes: tiny, huge, far away, at one place, under 1,000 lights", test_extremes());
     ssdgs_scene_destroy(scene);
     ssdgs_context_destroy(context);
     TEST_END();
