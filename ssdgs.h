@@ -424,10 +424,9 @@ typedef struct ssdgs_light {
     ssdgs_real direction[3]; /* spot, not in photographs: unit vector along which it shines */
     ssdgs_real cone[2]; /* spot: angles to it in radians, full inside the first, 0 outside the second; between
                            them as in glTF. No light scatters across its rim */
-    ssdgs_real
-        range;      /* point, spot, not in photographs: world units; fades to 0 there, as in glTF. 0: none */
-    int unshadowed; /* not in photographs; 1: nothing is in its way, and it costs no map. What scatters does
-                       so as beneath a plane */
+    ssdgs_real range;   /* point, spot, not in photographs: where it fades to 0, as in glTF; 0: nowhere */
+    int unshadowed; /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
+                       beneath a plane */
 } ssdgs_light;
 
 /* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. */
@@ -527,8 +526,7 @@ typedef struct ssdgs_object {
     ssdgs_real roughness;    /* 0.1 .. 10: factor of its highlights' widths. What they reflect of an even sky
                                 stays; 1 */
     ssdgs_real specular;     /* 0 or more: factor of its highlights; 1 */
-    ssdgs_real
-        translucency; /* 0.1 .. 10: factor of how far light travels inside; needs settings.transport; 1 */
+    ssdgs_real translucency; /* 0.1 .. 10: factor of how far light travels in it, by true transport; 1 */
     const unsigned char *mask; /* (Gaussians of the model) how much of tint, roughness and specular each
                                   takes, of 255; geometric lobes take roughness whole. NULL: all; NULL */
 } ssdgs_object;
@@ -935,8 +933,7 @@ typedef struct ssdgs_frame {
     int frozen[2];         /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
-    int batch[2]; /* from which view, to before which one the CPU's stages up to WALK work: all, where hooks
-                     are set */
+    int batch[2]; /* views at work in the CPU's stages up to WALK: from, to before; all, with hooks */
     /* SSDGS_STAGE_WALK */
     size_t light_instances; /* of all lights' views that were walked */
     unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
@@ -3459,7 +3456,7 @@ static unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
     return (unsigned char *)frame->memory->reach.memory + (ptrdiff_t)(light + 1) * frame->object_count;
 }
 
-/* Whether an object is out of the reach of a light, or with -1 the camera: nothing is known of it, or asked.
+/* Whether an object is out of the reach of a light, or with -1 the camera: nothing is known of it or asked.
  */
 static int ssdgs__beyond(const ssdgs_frame *frame, int light, const ssdgs_placed *o) {
     const unsigned char *reach = ssdgs__reach(frame, light);
@@ -3774,8 +3771,7 @@ static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
 
 SSDGS__SMALL_BEGIN
 
-/* What true dipole transport, by soft distances, brings to an evenly lit plane, in units of the irradiance.
- */
+/* What true dipole transport, by soft distances, brings to an evenly lit plane, over the irradiance. */
 static double ssdgs__beneath_plane(int length) { return exp(-SSDGS__SOFT / (0.04 * (1 << length))); }
 
 /* The dipole of settings.medium (eq. 5 with Jensen's distances) as weights of true transport's lengths, for
@@ -4121,12 +4117,8 @@ static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
     const double distance = sqrt(distance2);
     if (light->range > 0 && distance - o->radius > (double)light->range) return 0;
     if (light->kind != SSDGS_LIGHT_SPOT || distance <= o->radius) return 1;
-    const double ratio = along / distance;
-    return acos(ratio > 1    ? 1
-                : ratio < -1 ? -1
-                             : ratio) -
-               asin(o->radius / distance) <=
-           (double)light->cone[1] + 1e-3;
+    const double cosine = along / distance, angle = acos(cosine > 1 ? 1 : cosine < -1 ? -1 : cosine);
+    return angle - asin(o->radius / distance) <= (double)light->cone[1] + 1e-3;
 }
 
 /* Where the objects of several are, and which of them the camera and the lights reach. stirred: (1 + lights)
