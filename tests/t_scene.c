@@ -931,12 +931,20 @@ static void test_out_of_sight(void) {
             double at[3];
             for (uint64_t c = 0; c < 3; c++)
                 at[c] = 8 * pow(draw(seed + c), 2) * (draw(seed + 3 + c) < 0.5 ? -1 : 1);
-            if (!i) /* around the camera */
-                for (int c = 0; c < 3; c++)
-                    at[c] = -(double)(camera.view[c] * camera.view[3] + camera.view[4 + c] * camera.view[7] +
-                                      camera.view[8 + c] * camera.view[11]) -
-                            0.1 * (double)camera.view[8 + c];
+            for (int c = 0; c < 3 && i < 2; c++) { /* one around the camera, one beside the picture */
+                at[c] = -(double)(camera.view[c] * camera.view[3] + camera.view[4 + c] * camera.view[7] +
+                                  camera.view[8 + c] * camera.view[11]);
+                at[c] += i ? 2.5 * (double)camera.view[8 + c] + 1.4 * (double)camera.view[c]
+                           : -0.1 * (double)camera.view[8 + c];
+            }
             models[i] = somewhere(&settings, i, at, i ? 0.2 + 3 * pow(draw(seed + 7), 3) : 0.8);
+            const ssdgs_model_view wide = ssdgs_model_arrays(models[i]);
+            for (int g = 0; i == 1 && g < 64; g++) /* whose Gaussians are wide, and near each other */
+                for (size_t c = 0; c < 3; c++) {
+                    ssdgs_real *x = wide.gaussians + (SSDGS_POSITION + c) * wide.stride + g;
+                    *x = (ssdgs_real)(at[c] + 0.02 * ((double)*x - at[c]));
+                    wide.gaussians[(SSDGS_LOG_SCALE + c) * wide.stride + (size_t)g] = (ssdgs_real)log(0.2);
+                }
             objects[i] = ssdgs_object_default(models[i]);
             const ssdgs_model_view part = ssdgs_model_peek(models[i]);
             for (size_t c = 0; c < SSDGS_CHANNELS; c++)
