@@ -478,6 +478,18 @@ static void test_environment_sums(void) {
             for (int c = 0; c < 3; c++) off[k] += fabs((double)lights[i].position[c] - to[k][c]);
         CHECK(fmin(off[0], off[1]) < 1e-5 && lights[i].intensity[0] > 0);
     }
+    /* of three, the two that are close share one */
+    memset(sky, 0, sizeof sky);
+    sky[3 * (15 * WIDE + 10)] = sky[3 * (16 * WIDE + 12)] = sky[3 * (17 * WIDE + 50)] = 5;
+    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 2, NULL));
+    texel(50, 17, direction);
+    double closest = 9;
+    for (int i = 0; i < 2; i++) {
+        double off = 0;
+        for (int c = 0; c < 3; c++) off += fabs((double)lights[i].position[c] - direction[c]);
+        closest = fmin(closest, off);
+    }
+    CHECK(closest < 1e-5);
     /* the irradiance: exact for a sky of these terms */
     for (int turn = 0; turn < 2; turn++) {
         static const double terms[9] = {2, 0.3, -0.2, 0.4, 0.25, -0.3, 0.1, 0.2, -0.15}; /* of radiance */
