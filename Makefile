@@ -21,7 +21,7 @@ PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
 HEADERS = ssdgs.h examples/olat.h tests/test.h tests/scene.h tests/kernels.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/bench
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
@@ -30,13 +30,16 @@ BUILDS = builds examples
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/bench
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
 	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
 	  --out $(DEMO) --sheet $(DEMO)/sheet.png
+
+view: $(BUILD)/view ## a trained model in the browser: prints the address to open
+	$(BUILD)/view examples/data/waxcow.ply
 
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
@@ -76,6 +79,9 @@ $(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 $(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
+
+test-browser: $(BUILD)/view ## examples/view.html in headless Chromium; needs node and chromium
+	node tests/browser.js $(BUILD)
 
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry
 	sh tests/gltf.sh $(BUILD)

@@ -40,20 +40,6 @@ static void *make(size_t count, size_t size) {
     return memory;
 }
 
-static double now(void) {
-#ifdef _WIN32
-    LARGE_INTEGER ticks;
-    QueryPerformanceCounter(&ticks);
-    LARGE_INTEGER rate;
-    QueryPerformanceFrequency(&rate);
-    return (double)ticks.QuadPart / (double)rate.QuadPart;
-#else
-    struct timeval time;
-    gettimeofday(&time, NULL);
-    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
-#endif
-}
-
 /* ---- what is found: tables of named rows, and facts, the figures that others quote ---- */
 
 typedef struct row {
@@ -334,15 +320,15 @@ static kernel make_kernel(kind work, ssdgs_context *context, int isa, const netw
 
 /* All in turn until the seconds are over: what disturbs one disturbs its neighbours too. */
 static void time_kernels(kernel *kernels, int count, double seconds) {
-    const double end = now() + seconds;
+    const double end = olat_seconds() + seconds;
     double elapsed;
-    for (int round = 0; round < 4 || now() < end; round++)
+    for (int round = 0; round < 4 || olat_seconds() < end; round++)
         for (int i = 0; i < count; i++) {
             kernel *k = kernels + i;
             for (;; k->repeat *= 2) {
-                const double start = now();
+                const double start = olat_seconds();
                 ssdgs__parallel(k->context, k->context->threads, kernel_task, k);
-                elapsed = now() - start;
+                elapsed = olat_seconds() - start;
                 if (elapsed > 8e-3) break; /* the processor's clock has settled after the one before */
             }
             const double rate = 1e-9 * k->operations * (double)k->repeat / elapsed;
@@ -364,16 +350,16 @@ static void check(ssdgs_context *context, ssdgs_result result) {
 }
 
 static ssdgs_result time_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
-    const double start = now();
+    const double start = olat_seconds();
     session *s = (session *)user;
     ssdgs_result result = SSDGS_OK;
     if (stage == SSDGS_STAGE_SHADE && frame->flux) { /* shading finds it done */
         const ssdgs_real *sums;
         result = ssdgs__transport(frame, &sums);
-        s->stage[TRANSPORT] += now() - start;
+        s->stage[TRANSPORT] += olat_seconds() - start;
     }
     if (!result) result = ssdgs_stage_cpu(frame, stage);
-    s->stage[stage] += now() - start;
+    s->stage[stage] += olat_seconds() - start;
     return result;
 }
 
@@ -470,19 +456,19 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
 /* Jobs in turn, for at least two passes; the first also warms up. */
 static void time_jobs(bench *b, job *jobs, int count, double seconds) {
     static double best[MAX_JOBS][MAX_PHOTOS][TIMES + 1];
-    const double end = now() + seconds * (b->quick ? 0.2 : 1);
+    const double end = olat_seconds() + seconds * (b->quick ? 0.2 : 1);
     if (count > MAX_JOBS) die("jobs", "too many");
-    for (int round = 0; round < 2 || (round < 40 && now() < end); round++)
+    for (int round = 0; round < 2 || (round < 40 && olat_seconds() < end); round++)
         for (int i = 0; i < count; i++) {
             job *j = jobs + i;
             run(b, j, j->views - 1, NULL); /* what is fixed must have been so in the frame before */
             ssdgs_render_stats stats;
             for (int v = 0; v < j->views; v++) {
                 memset(j->s->stage, 0, sizeof j->s->stage);
-                const double start = now();
+                const double start = olat_seconds();
                 run(b, j, v, round ? NULL : &stats);
                 double took[TIMES + 1];
-                took[TIMES] = now() - start;
+                took[TIMES] = olat_seconds() - start;
                 if (!round && stats.gaussians) j->shaded += (double)stats.shaded / stats.gaussians / j->views;
                 memcpy(took, j->s->stage, sizeof j->s->stage);
                 for (int stage = 0; stage <= TIMES; stage++)
@@ -997,10 +983,10 @@ static void measure_scenes(bench *b) {
                 for (int c = 0; c < 3; c++)
                     light[l].intensity[c] = intensity[c] * light[l].position[2] * light[l].position[2];
             }
-            const double start = now();
+            const double start = olat_seconds();
             check(s.context,
                   ssdgs_scene_render(scene, object, objects, &camera, light, lights, &options, &image, NULL));
-            const double ms = 1e3 * (now() - start);
+            const double ms = 1e3 * (olat_seconds() - start);
             if (frame > 1 && ms < best[!moving]) best[!moving] = ms;
         }
         char name[64];
@@ -1380,7 +1366,7 @@ int main(int argc, char **argv) {
     static bench b;
     const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
     int files = 0;
-    double start = now();
+    double start = olat_seconds();
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--help")) {
             for (size_t line = 0; line < sizeof help / sizeof *help; line++) puts(help[line]);
@@ -1416,7 +1402,7 @@ int main(int argc, char **argv) {
     measure_model(&b, "", paths[0]);
     measure_model(&b, "published_", paths[1]);
     b.prefix = "";
-    add_facts(&b, "bench_seconds", now() - start);
+    add_facts(&b, "bench_seconds", olat_seconds() - start);
     printf("\n");
     for (int i = 0; i < b.fact_count; i++)
         if (b.facts[i].value > none) printf("%-46s %.7g\n", b.facts[i].key, b.facts[i].value);

@@ -43,6 +43,7 @@
 #define OLAT__READ_FLAGS (O_RDONLY | O_BINARY)
 #define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
 #else
+#include <sys/time.h>
 #include <unistd.h>
 #define OLAT__SEPARATORS "/"
 #define OLAT__READ_FLAGS (O_RDONLY | O_NONBLOCK) /* opening a FIFO must not wait for its writer */
@@ -90,6 +91,20 @@ enum {
     OLAT__MAX_STRING = 1 << 20,
     OLAT__MAX_FRAMES = 1 << 20
 };
+
+/* Seconds since whenever, of a clock on the wall. */
+OLAT__API double olat_seconds(void) {
+#ifdef _WIN32
+    LARGE_INTEGER ticks, rate;
+    QueryPerformanceCounter(&ticks);
+    QueryPerformanceFrequency(&rate);
+    return (double)ticks.QuadPart / (double)rate.QuadPart;
+#else
+    struct timeval time;
+    gettimeofday(&time, NULL);
+    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
+#endif
+}
 
 /* ==== errors and files ==== */
 

@@ -1,0 +1,304 @@
+/* examples/view.c from outside, by raw sockets: what it serves, what it refuses, and that visitors who are
+   slow, broken or many harm nobody. */
+int view_main(int argc, char **argv);
+#define main view_main
+#include "../examples/view.c"
+#undef main
+#include "test.h"
+#ifdef _WIN32
+int main(void) { TEST_END(); } /* the server runs there; this program's threads do not */
+#else
+#include <pthread.h>
+#ifndef MSG_NOSIGNAL
+#define MSG_NOSIGNAL 0
+#endif
+
+static server here;
+
+/* A ball of two dozen Gaussians. */
+static void make_model(void) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    settings.shadow.layers = 0;
+    CHECK(!ssdgs_context_create(NULL, &here.context));
+    CHECK(!ssdgs_model_create(here.context, &settings, 24, here.models));
+    for (int i = 0; i < 24; i++) {
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        const float turn = 2.4f * (float)i, z = 1 - (float)(2 * i + 1) / 24, across = sqrtf(1 - z * z);
+        g.position[0] = 0.4f * across * cosf(turn), g.position[1] = 0.4f * across * sinf(turn),
+        g.position[2] = 0.4f * z;
+        for (int c = 0; c < 3; c++) g.scale[c] = 0.1f, g.normal[c] = g.position[c];
+        g.opacity = 0.8f;
+        CHECK(!ssdgs_model_set(here.models[0], i, &g));
+    }
+}
+
+static void *run(void *unused) {
+    listen_on(&here);
+    return unused;
+}
+
+static int visit(void) {
+    struct sockaddr_in address;
+    const struct timeval patience = {5, 0};
+    const int s = socket(AF_INET, SOCK_STREAM, 0);
+    memset(&address, 0, sizeof address);
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons((unsigned short)here.port);
+    setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    CHECK(s >= 0 && !connect(s, (struct sockaddr *)&address, sizeof address));
+    return s;
+}
+
+static void tell(int s, const char *text, size_t size) {
+    CHECK(send(s, text, size, MSG_NOSIGNAL) == (long)size);
+}
+
+/* One whole answer; its status, 0 where none came. body may be NULL. */
+static int hear(int s, char **body, size_t *size) {
+    static char head[4096];
+    size_t got = 0, length = 0;
+    int status = 0;
+    while (got + 1 < sizeof head && recv(s, head + got, 1, 0) == 1) {
+        head[++got] = 0;
+        if (got > 3 && !strcmp(head + got - 4, "\r\n\r\n")) break;
+    }
+    head[got] = 0;
+    const char *at = strstr(head, "Content-Length: ");
+    if (sscanf(head, "HTTP/1.1 %d ", &status) != 1 || !at) return 0;
+    length = (size_t)strtoul(at + 16, NULL, 10);
+    char *bytes = (char *)malloc(length + 1);
+    for (got = 0; got < length;) {
+        const long part = (long)recv(s, bytes + got, length - got, 0);
+        if (part <= 0) break;
+        got += (size_t)part;
+    }
+    bytes[got] = 0;
+    if (got < length) status = 0;
+    if (body) *body = bytes, *size = length;
+    else free(bytes);
+    return status;
+}
+
+/* What one request of a visitor of its own is answered; %d in it is the port. */
+static int asks(const char *format, const char *want) {
+    char request[512], *body = NULL;
+    size_t size = 0;
+    snprintf(request, sizeof request, format, here.port);
+    const int s = visit();
+    tell(s, request, strlen(request));
+    const int status = hear(s, &body, &size);
+    if (want && !test_check(body && strstr(body, want), __FILE__, __LINE__, format))
+        printf("    answered %d: %s\n", status, body ? body : "nothing");
+    free(body);
+    close(s);
+    return status;
+}
+
+static void test_wishes(void) {
+    static const struct {
+        const char *text;
+        int good;
+    } wishes[] = {
+        {"", 1},
+        {"w=320&h=240&eye=0,-2,1.5e0&plane=normal&preset=exact", 1},
+        {"light=1,2,3,1,1,1&light=-1,2,3,0,0,0.5", 1},
+        {"w=15", 0},
+        {"w=2561", 0},
+        {"w=1e99", 0},
+        {"w=", 0},
+        {"w", 0},
+        {"w=12x", 0},
+        {"=3", 0},
+        {"eye=1,2", 0},
+        {"eye=1,2,3,4", 0},
+        {"eye=1,2,", 0},
+        {"eye=nan,0,0", 0},
+        {"eye=1,2,3&&", 0},
+        {"nothing=1", 0},
+        {"plane=", 0},
+        {"plane=colo", 0},
+        {"plane=colors", 0},
+        {"preset=best", 0},
+        {"light=0,0,0,-1,0,0", 0},
+        {"roughness=0", 0},
+        {"light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1&"
+         "light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1",
+         0}};
+    for (size_t i = 0; i < sizeof wishes / sizeof *wishes; i++) {
+        wish w;
+        char problem[128] = "";
+        if (!test_check(read_wish(wishes[i].text, &w, problem, sizeof problem) == wishes[i].good, __FILE__,
+                        __LINE__, "a wish"))
+            printf("    %s\n", wishes[i].text);
+        CHECK(wishes[i].good == !*problem);
+    }
+    wish w;
+    char problem[128];
+    CHECK(read_wish("w=320&eye=1,-2.5,3&plane=depth&preset=fast&light=1,2,3,4,5,6", &w, problem,
+                    sizeof problem));
+    CHECK(fabs(w.value[WIDTH][0] - 320) < 1e-9 && fabs(w.value[EYE][1] + 2.5) < 1e-9 && w.plane == DEPTH);
+    CHECK(w.preset == FAST && w.lights == 1 && fabs(w.light[0][5] - 6) < 1e-9 &&
+          fabs(w.value[TINT][2] - 1) < 1e-9);
+}
+
+static void test_answers(void) {
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "the page") == 200);
+    CHECK(asks("GET / HTTP/1.0\r\nHOST:localhost:%d\r\nConnection: close\r\n\r\n", "the page") == 200);
+    CHECK(asks("GET /models HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n",
+               "\"name\":\"a?b.ply\",\"gaussians\":24") == 200);
+    CHECK(asks("GET /picture?w=16&h=16 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", NULL) == 200);
+    CHECK(asks("GET /picture?w=3 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "no such wish: w=3") == 400);
+    CHECK(asks("GET /../view.c HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "nothing here") == 404);
+    CHECK(asks("GET /etc/passwd HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "nothing here") == 404);
+    CHECK(asks("GET / HTTP/1.1\r\n\r\n", "another host") == 403);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: evil.example:%d\r\n\r\n", "another host") == 403);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d1\r\n\r\n", "another host") == 403);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nOrigin: http://evil.example\r\n\r\n",
+               "another page") == 403);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
+               "the page") == 200);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nSec-Fetch-Site: cross-site\r\n\r\n",
+               "another page") == 403);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nSec-Fetch-Site: same-origin\r\n\r\n", "the page") ==
+          200);
+    CHECK(asks("POST / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "GET alone") == 405);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: 4\r\n\r\n", "no body") == 400);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: 0\r\n\r\n", "the page") == 200);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nTransfer-Encoding: chunked\r\n\r\n", "no body") ==
+          400);
+    CHECK(asks("GET / HTTP/3\r\nHost: 127.0.0.1:%d\r\n\r\n", "no HTTP") == 400);
+    CHECK(asks("GET /\r\nHost: 127.0.0.1:%d\r\n\r\n", "no HTTP") == 400);
+    CHECK(asks("Host: 127.0.0.1:%d\r\n\r\n", "host") == 403);
+}
+
+/* Several requests of one visitor, in pieces and at once; the bytes are those of the library. */
+static void test_pictures(void) {
+    char request[512], *body[2];
+    size_t size[2];
+    const int s = visit();
+    const int length = snprintf(
+        request, sizeof request,
+        "GET /picture?w=48&h=32&eye=0,-2,0.5&light=1,-2,2,3,2,1&plane=diffuse HTTP/1.1\r\n"
+        "Host: 127.0.0.1:%d\r\n\r\nGET /picture?w=48&h=32&plane=alpha HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n",
+        here.port, here.port);
+    for (int i = 0; i < length; i++) tell(s, request + i, 1);
+    for (int i = 0; i < 2; i++) CHECK(hear(s, body + i, size + i) == 200 && size[i] == 4 * 48 * 32);
+    close(s);
+    const float eye[3] = {0, -2, 0.5f}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, 48, 32);
+    ssdgs_light light;
+    static float diffuse[3 * 48 * 32];
+    ssdgs_image image;
+    ssdgs_context *context = NULL;
+    (void)context;
+    memset(&light, 0, sizeof light);
+    memset(&image, 0, sizeof image);
+    image.diffuse = diffuse;
+    float distance2 = 0;
+    const float at[3] = {1, -2, 2};
+    for (int c = 0; c < 3; c++) {
+        light.position[c] = at[c];
+        distance2 += (at[c] - here.middle[c]) * (at[c] - here.middle[c]);
+    }
+    for (int c = 0; c < 3; c++) light.intensity[c] = (float)(3 - c) * distance2;
+    CHECK(!ssdgs_render(here.models[0], &camera, &light, 1, &image));
+    int worst = 0, brightest = 0;
+    for (int i = 0; i < 48 * 32; i++)
+        for (int c = 0; c < 3; c++) {
+            const int got = (unsigned char)body[0][4 * i + c];
+            const int want = (int)(fminf(1, ssdgs_srgb_encode(fmaxf(0, diffuse[3 * i + c]))) * 255 + 0.5f);
+            worst = abs(got - want) > worst ? abs(got - want) : worst;
+            brightest = got > brightest ? got : brightest;
+        }
+    CHECK(worst <= 1 && brightest > 100);
+    CHECK((unsigned char)body[1][4 * (16 * 48 + 24)] > 150 && (unsigned char)body[1][3] == 255);
+    free(body[0]), free(body[1]);
+}
+
+static void test_trouble(void) {
+    static char junk[2 * REQUEST];
+    char request[128];
+    int slow[VISITORS], refused = 0;
+    memset(junk, 'x', sizeof junk);
+    int s = visit(); /* longer than any request */
+    (void)!send(s, junk, sizeof junk, MSG_NOSIGNAL);
+    CHECK(hear(s, NULL, NULL) == 431);
+    close(s);
+    s = visit();
+    tell(s, "GET /\0 HTTP/1.1\r\n", 17);
+    CHECK(hear(s, NULL, NULL) == 400);
+    close(s);
+    for (int i = 0; i < 20; i++) { /* who leave before their answer */
+        const int length =
+            snprintf(request, sizeof request,
+                     "GET /picture?w=640&h=640 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", here.port);
+        s = visit();
+        tell(s, request, i % 2 ? (size_t)length : 10);
+        close(s);
+    }
+    for (int i = 0; i < VISITORS - 1; i++) { /* who never finish what they say: others are served */
+        slow[i] = visit();
+        tell(slow[i], "GET / HT", 8);
+    }
+    CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "the page") == 200);
+    slow[VISITORS - 1] = visit();
+    tell(slow[VISITORS - 1], "GET / HT", 8);
+    for (int tries = 0; tries < 50 && !refused;
+         tries++) { /* more than there is room for are turned away at once */
+        s = visit();
+        char byte;
+        refused = recv(s, &byte, 1, 0) <= 0;
+        close(s);
+    }
+    CHECK(refused);
+    for (int i = 0; i < VISITORS; i++) close(slow[i]);
+    int status = 0;
+    for (int tries = 0; tries < 50 && status != 200; tries++) { /* and there is room again */
+        s = visit();
+        const int length =
+            snprintf(request, sizeof request, "GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", here.port);
+        (void)!send(s, request, (size_t)length, MSG_NOSIGNAL);
+        status = hear(s, NULL, NULL);
+        close(s);
+    }
+    CHECK(status == 200);
+}
+
+int main(void) {
+    static unsigned char page[] = "<p>the page";
+    char error[512] = "";
+    pthread_t thread;
+    here.listener = NO_SOCKET;
+    for (int i = 0; i < VISITORS; i++) here.visitors[i].socket = NO_SOCKET;
+    here.count = 1;
+    here.names[0] = "folder/a\"b.ply";
+    here.page = page;
+    here.page_size = sizeof page - 1;
+    here.planes = (float *)malloc(4 * (size_t)SIDE * SIDE * sizeof *here.planes);
+    make_model();
+    CHECK(!arrange(&here));
+    test_wishes();
+    if (!test_check(!open_port(&here, error), __FILE__, __LINE__, error) ||
+        pthread_create(&thread, NULL, run, NULL))
+        TEST_END();
+    test_answers();
+    test_trouble();
+    ended = 1;
+    pthread_join(thread, NULL);
+    ended = 0;
+    if (!pthread_create(&thread, NULL, run, NULL)) { /* pictures: the library is this thread's in between */
+        test_pictures();
+        ended = 1;
+        pthread_join(thread, NULL);
+    }
+    for (visitor *v = here.visitors; v < here.visitors + VISITORS; v++)
+        if (v->socket != NO_SOCKET) leave(v);
+    close_socket(here.listener);
+    ssdgs_model_destroy(here.models[0]);
+    ssdgs_context_destroy(here.context);
+    free(here.planes);
+    TEST_END();
+}
+#endif
