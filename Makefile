@@ -20,7 +20,7 @@ OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
 PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
-HEADERS = ssdgs.h examples/olat.h tests/test.h tests/scene.h tests/kernels.h
+HEADERS = ssdgs.h examples/olat.h examples/view.h tests/test.h tests/scene.h tests/kernels.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
@@ -80,7 +80,7 @@ $(BUILD)/builds.log: %.log: $(OBJECTS)
 $(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
-test-browser: $(BUILD)/view ## examples/view.html in headless Chromium; needs node and chromium
+test-browser: $(BUILD)/view $(BUILD)/train ## examples/view.html in headless Chromium; needs node and chromium
 	node tests/browser.js $(BUILD)
 
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry

@@ -1,8 +1,12 @@
 /* cc -O2 examples/train.c -o train -lm -lpthread: trains a relightable model from a folder of OLAT
    photographs */
 #define SSDGS_IMPLEMENTATION
+#ifdef _WIN32
+#include <winsock2.h> /* before windows.h */
+#endif
 #include "../ssdgs.h"
 #include "olat.h"
+#include "view.h"
 #include <errno.h>
 #include <signal.h>
 #include <time.h>
@@ -35,12 +39,14 @@ enum {
     REFIT,
     RESUME,
     REFINE,
+    VIEW,
     OPTION_COUNT /* the flags, RESUME and on, take no value */
 };
 static const char *const option_names[OPTION_COUNT] = {
     "-o",      "--iterations", "--background", "--preset",        "--transfer", "--schedule",
     "--terms", "--seed",       "--threads",    "--max-gaussians", "--points",   "--checkpoint-every",
-    "--isa",   "--train-json", "--set",        "--refit",         "--resume",   "--refine"};
+    "--isa",   "--train-json", "--set",        "--refit",         "--resume",   "--refine",
+    "--view"};
 
 static const char *const help[] = {
     "usage: train DATASET -o MODEL.ply [OPTION...]",
@@ -61,6 +67,7 @@ static const char *const help[] = {
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
+    "  --view                   shows the model as it trains in the browser: prints the address to open",
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again",
     "  --points N               random points at the start, of which those outside of the outlines go;",
     "                           10000",
@@ -245,16 +252,6 @@ static int number(const char *const *given, int option, int least, int *value) {
     return 1;
 }
 
-static double seconds_now(void) {
-#ifdef _WIN32
-    return (double)clock() / CLOCKS_PER_SEC; /* wall time there */
-#else
-    struct timeval now;
-    gettimeofday(&now, NULL);
-    return (double)now.tv_sec + 1e-6 * (double)now.tv_usec;
-#endif
-}
-
 static const char *clock_text(double seconds, char text[32]) {
     int s = seconds < 3e6 ? (int)(seconds + 0.5) : 3000000;
     if (s >= 3600) snprintf(text, 32, "%d:%02d:%02d", s / 3600, s / 60 % 60, s % 60);
@@ -276,13 +273,26 @@ typedef struct run {
     int done; /* iterations of this run */
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
+    view_server *view; /* who watches; NULL */
 } run;
+
+/* Answers those who watch, and waits while they ask for it. What they see changes no bit of the run. */
+static void show(run *r, const ssdgs_train_stats *stats) {
+    r->view->training.iteration = stats->iteration;
+    r->view->training.loss = stats->loss;
+    r->view->training.psnr = r->psnr;
+    r->view->training.left = r->speed > 0 ? (r->iterations - stats->iteration) / r->speed : 0;
+    for (int rounds = 0; rounds < 16 && view_poll(r->view, 0); rounds++) {}
+    const double begun = olat_seconds();
+    while (r->view->training.paused && !interrupted) view_poll(r->view, 100);
+    r->drawn += olat_seconds() - begun; /* a pause is no part of the speed */
+}
 
 static int progress(void *user, const ssdgs_train_stats *stats) {
     run *r = (run *)user;
     int done = stats->iteration, total = r->iterations;
     int percent = (int)(100.0 * done / total), finished = done >= total;
-    double now = seconds_now();
+    double now = olat_seconds();
     r->done = done;
     if (r->first < 0) { /* the first step also allocates: time starts after it */
         r->first = r->drawn_at = done;
@@ -310,6 +320,7 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
         r->drawn_at = done;
         r->percent = percent / 5;
     }
+    if (r->view) show(r, stats);
     return !interrupted && (finished || !r->checkpoint_every ||
                             done / r->checkpoint_every == (done - r->batch) / r->checkpoint_every);
 }
@@ -329,6 +340,7 @@ typedef struct job {
     ssdgs_context *context;
     ssdgs_model *model;
     ssdgs_trainer *trainer;
+    view_server view;
 } job;
 
 /* The library's notes; failures are told where they end the program. */
@@ -519,13 +531,33 @@ static int save_refined(job *j, char error[512]) {
     return failed;
 }
 
+/* Opens the page that shows the model as it trains. */
+static int watch(job *j, char error[512]) {
+    char page[512];
+    j->view.context = j->context;
+    j->view.models[0] = j->model;
+    j->view.names[0] = j->given[OUTPUT];
+    j->view.objects[0] = ssdgs_object_default(j->model);
+    j->view.count = j->view.training.on = 1;
+    j->view.training.iterations = j->options.iterations;
+    for (int c = 0; c < 3; c++) {
+        j->view.middle[c] = (j->options.bounds_min[c] + j->options.bounds_max[c]) / 2;
+        j->view.radius = fmaxf(j->view.radius, (j->options.bounds_max[c] - j->options.bounds_min[c]) / 2);
+    }
+    view_page(__FILE__, page, sizeof page);
+    if (view_open(&j->view, page, error)) return 1;
+    fprintf(stderr, "to watch: http://127.0.0.1:%d\n", j->view.port);
+    j->progress.view = &j->view;
+    return 0;
+}
+
 static int train(job *j) {
     const char *output = j->given[OUTPUT],
                *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
     char error[512] = "", *test_json = (char *)malloc(strlen(j->dataset) + 32);
     int width = 0, height = 0;
     const int refines = j->options.refine != 0;
-    double start = seconds_now();
+    double start = olat_seconds();
     j->checkpoint = (char *)malloc(strlen(output) + 8);
     if (refines) j->refined = (char *)malloc(strlen(output) + 16);
     if (!j->checkpoint || !test_json || (refines && !j->refined))
@@ -576,6 +608,7 @@ static int train(job *j) {
     if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint))
         return fail(ssdgs_error_message(j->context));
 
+    if (j->given[VIEW] && watch(j, error)) return fail(error);
     j->progress.iterations = j->options.iterations;
     j->progress.batch = j->options.batch;
     j->progress.terminal = on_terminal();
@@ -597,6 +630,7 @@ static int train(job *j) {
         }
     }
     signal(SIGINT, SIG_DFL);
+    view_close(&j->view);
     if (result) return fail(ssdgs_error_message(j->context));
     if (ssdgs_model_save(j->model, output)) {
         fail(ssdgs_error_message(j->context));
@@ -606,7 +640,7 @@ static int train(job *j) {
     }
     char text[32];
     printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_arrays(j->model).count,
-           clock_text(seconds_now() - start, text));
+           clock_text(olat_seconds() - start, text));
     print_peak_memory();
     printf("\n");
     if (refines && save_refined(j, error)) return fail(error);
@@ -634,6 +668,7 @@ int main(int argc, char **argv) {
         if (!strcmp(argv[i], "--help")) return print_help(), 0;
     int status = parse(&j, argc, argv);
     if (!status) status = train(&j);
+    view_close(&j.view);
     ssdgs_trainer_destroy(j.trainer);
     ssdgs_model_destroy(j.model);
     ssdgs_context_destroy(j.context);

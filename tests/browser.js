@@ -127,7 +127,35 @@ const test = async () => {
     await sleep(500)
     check('the page says that nobody answers', /^No picture/.test(await ask('$("problem").textContent')))
 }
-test().catch(error => check(error.stack, false)).then(() => {
+// a model as it trains: its pictures follow, the page makes it wait and go on
+const watch = async () => {
+    const trainer = spawn(path.join(build, 'train'), ['examples/data/waxcow', '-o', path.join(folder, 'trained.ply'), '--iterations', '100000', '--threads', '1', '--view'])
+    let told = ''
+    trainer.stderr.on('data', text => told += text)
+    for (let tries = 0; tries < 200 && !/to watch: http.*\n/.test(told); tries++) await sleep(50)
+    const address = (told.match(/to watch: (http\S+)/) || [])[1]
+    check('train --view says where', !!address)
+    await resize(1100, 760)
+    await send('Page.navigate', { url: address })
+    const until = async what => {
+        for (let tries = 0; tries < 400; tries++, await sleep(50)) if (await ask(what).catch(() => false)) return true
+        return false
+    }
+    check('a curve and a picture', await until('curve.length > 4 && shown != "" && curve[curve.length - 1][0] > curve[0][0]'))
+    check('a picture of something', await until('ink.getImageData(0, 0, canvas.width, canvas.height).data.some((v, i) => i % 4 < 3 && v > 60)'))
+    await ask('$("pause").click()')
+    check('pause', await until('$("pause").textContent == "go on"'))
+    const at = await ask('fetch("/models").then(r => r.json()).then(m => m.iteration)')
+    await sleep(1500)
+    check('it waits', await ask('fetch("/models").then(r => r.json()).then(m => m.iteration)') == at)
+    await picture('training')
+    await ask('$("pause").click()')
+    check('it goes on', await until(`curve[curve.length - 1][0] > ${at}`))
+    trainer.kill('SIGINT')
+    check('Ctrl-C stops the training', await new Promise(done => trainer.once('exit', code => done(code === 130))))
+    check('the page says so', await until('/ended/.test($("progress").textContent)'))
+}
+test().then(watch).catch(error => check(error.stack, false)).then(() => {
     console.log(`${passed} passed, ${failed} failed`)
     end(failed ? 1 : 0)
 })

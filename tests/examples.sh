@@ -39,6 +39,8 @@ train() { "$build/train" "$set" -o "$model" --iterations 40 --points 400 --threa
 relight() { "$build/relight" "$model" "$set" --threads 1 "$@"; }
 
 check "train" says 0 "^test: PSNR" train --checkpoint-every 30
+check "train --view" says 0 "^to watch: http://127.0.0.1:" train --view -o "$out/viewed.ply"
+check "changes no byte" cmp "$model" "$out/viewed.ply"
 
 # no output may be an input
 ln -s tiny/test "$out/link"

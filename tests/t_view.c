@@ -1,9 +1,12 @@
-/* examples/view.c from outside, by raw sockets: what it serves, what it refuses, and that visitors who are
+/* examples/view.h from outside, by raw sockets: what it serves, what it refuses, and that visitors who are
    slow, broken or many harm nobody. */
-int view_main(int argc, char **argv);
-#define main view_main
-#include "../examples/view.c"
-#undef main
+#define SSDGS_IMPLEMENTATION
+#ifdef _WIN32
+#include <winsock2.h>
+#endif
+#include "../ssdgs.h"
+#include "../examples/olat.h"
+#include "../examples/view.h"
 #include "test.h"
 #ifdef _WIN32
 int main(void) { TEST_END(); } /* the server runs there; this program's threads do not */
@@ -13,7 +16,8 @@ int main(void) { TEST_END(); } /* the server runs there; this program's threads 
 #define MSG_NOSIGNAL 0
 #endif
 
-static server here;
+static view_server here;
+static volatile int ended;
 
 /* A ball of two dozen Gaussians. */
 static void make_model(void) {
@@ -34,13 +38,13 @@ static void make_model(void) {
 }
 
 static void *run(void *unused) {
-    listen_on(&here);
+    while (!ended) view_poll(&here, 100);
     return unused;
 }
 
 static int visit(void) {
     struct sockaddr_in address;
-    const struct timeval patience = {5, 0};
+    const struct timeval patience = {20, 0};
     const int s = socket(AF_INET, SOCK_STREAM, 0);
     memset(&address, 0, sizeof address);
     address.sin_family = AF_INET;
@@ -127,20 +131,21 @@ static void test_wishes(void) {
          "light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1&light=1,1,1,1,1,1",
          0}};
     for (size_t i = 0; i < sizeof wishes / sizeof *wishes; i++) {
-        wish w;
+        view__wish w;
         char problem[128] = "";
-        if (!test_check(read_wish(wishes[i].text, &w, problem, sizeof problem) == wishes[i].good, __FILE__,
-                        __LINE__, "a wish"))
+        if (!test_check(view__read_wish(wishes[i].text, &w, problem, sizeof problem) == wishes[i].good,
+                        __FILE__, __LINE__, "a wish"))
             printf("    %s\n", wishes[i].text);
         CHECK(wishes[i].good == !*problem);
     }
-    wish w;
+    view__wish w;
     char problem[128];
-    CHECK(read_wish("w=320&eye=1,-2.5,3&plane=depth&preset=fast&light=1,2,3,4,5,6", &w, problem,
-                    sizeof problem));
-    CHECK(fabs(w.value[WIDTH][0] - 320) < 1e-9 && fabs(w.value[EYE][1] + 2.5) < 1e-9 && w.plane == DEPTH);
-    CHECK(w.preset == FAST && w.lights == 1 && fabs(w.light[0][5] - 6) < 1e-9 &&
-          fabs(w.value[TINT][2] - 1) < 1e-9);
+    CHECK(view__read_wish("w=320&eye=1,-2.5,3&plane=depth&preset=fast&light=1,2,3,4,5,6", &w, problem,
+                          sizeof problem));
+    CHECK(fabs(w.value[VIEW__WIDTH][0] - 320) < 1e-9 && fabs(w.value[VIEW__EYE][1] + 2.5) < 1e-9 &&
+          w.plane == VIEW__DEPTH);
+    CHECK(w.preset == VIEW__FAST && w.lights == 1 && fabs(w.light[0][5] - 6) < 1e-9 &&
+          fabs(w.value[VIEW__TINT][2] - 1) < 1e-9);
 }
 
 static void test_answers(void) {
@@ -174,7 +179,7 @@ static void test_answers(void) {
 }
 
 /* Several requests of one visitor, in pieces and at once; the bytes are those of the library. */
-static void test_pictures(void) {
+static void test_pictures(pthread_t server) {
     char request[512], *body[2];
     size_t size[2];
     const int s = visit();
@@ -186,13 +191,13 @@ static void test_pictures(void) {
     for (int i = 0; i < length; i++) tell(s, request + i, 1);
     for (int i = 0; i < 2; i++) CHECK(hear(s, body + i, size + i) == 200 && size[i] == 4 * 48 * 32);
     close(s);
+    ended = 1; /* the library is this thread's now */
+    pthread_join(server, NULL);
     const float eye[3] = {0, -2, 0.5f}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, 48, 32);
     ssdgs_light light;
     static float diffuse[3 * 48 * 32];
     ssdgs_image image;
-    ssdgs_context *context = NULL;
-    (void)context;
     memset(&light, 0, sizeof light);
     memset(&image, 0, sizeof image);
     image.diffuse = diffuse;
@@ -218,9 +223,9 @@ static void test_pictures(void) {
 }
 
 static void test_trouble(void) {
-    static char junk[2 * REQUEST];
+    static char junk[2 * VIEW__REQUEST];
     char request[128];
-    int slow[VISITORS], refused = 0;
+    int slow[VIEW__VISITORS], refused = 0;
     memset(junk, 'x', sizeof junk);
     int s = visit(); /* longer than any request */
     (void)!send(s, junk, sizeof junk, MSG_NOSIGNAL);
@@ -233,18 +238,18 @@ static void test_trouble(void) {
     for (int i = 0; i < 20; i++) { /* who leave before their answer */
         const int length =
             snprintf(request, sizeof request,
-                     "GET /picture?w=640&h=640 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", here.port);
+                     "GET /picture?w=256&h=256 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", here.port);
         s = visit();
         tell(s, request, i % 2 ? (size_t)length : 10);
         close(s);
     }
-    for (int i = 0; i < VISITORS - 1; i++) { /* who never finish what they say: others are served */
+    for (int i = 0; i < VIEW__VISITORS - 1; i++) { /* who never finish what they say: others are served */
         slow[i] = visit();
         tell(slow[i], "GET / HT", 8);
     }
     CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "the page") == 200);
-    slow[VISITORS - 1] = visit();
-    tell(slow[VISITORS - 1], "GET / HT", 8);
+    slow[VIEW__VISITORS - 1] = visit();
+    tell(slow[VIEW__VISITORS - 1], "GET / HT", 8);
     for (int tries = 0; tries < 50 && !refused;
          tries++) { /* more than there is room for are turned away at once */
         s = visit();
@@ -253,7 +258,7 @@ static void test_trouble(void) {
         close(s);
     }
     CHECK(refused);
-    for (int i = 0; i < VISITORS; i++) close(slow[i]);
+    for (int i = 0; i < VIEW__VISITORS; i++) close(slow[i]);
     int status = 0;
     for (int tries = 0; tries < 50 && status != 200; tries++) { /* and there is room again */
         s = visit();
@@ -266,39 +271,52 @@ static void test_trouble(void) {
     CHECK(status == 200);
 }
 
+/* A model that trains may be told to wait, by this page alone. */
+static void test_pause(void) {
+    CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
+               "GET alone") == 405);
+    here.training.on = 1;
+    here.training.iteration = 7;
+    CHECK(asks("GET /models HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n",
+               "\"training\":true,\"paused\":false,\"iteration\":7") == 200);
+    CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "GET alone") == 405 &&
+          !here.training.paused);
+    CHECK(asks("GET /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
+               NULL) == 404);
+    CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nOrigin: http://evil\r\n\r\n", NULL) == 403 &&
+          !here.training.paused);
+    CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
+               "\"paused\":true") == 200);
+    CHECK(here.training.paused);
+    CHECK(asks("POST /go-on HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
+               "\"paused\":false") == 200);
+    CHECK(!here.training.paused);
+    here.training.on = 0;
+}
+
 int main(void) {
-    static unsigned char page[] = "<p>the page";
+    static const char page[] = "build/t_view.html";
     char error[512] = "";
     pthread_t thread;
-    here.listener = NO_SOCKET;
-    for (int i = 0; i < VISITORS; i++) here.visitors[i].socket = NO_SOCKET;
     here.count = 1;
     here.names[0] = "folder/a\"b.ply";
-    here.page = page;
-    here.page_size = sizeof page - 1;
-    here.planes = (float *)malloc(4 * (size_t)SIDE * SIDE * sizeof *here.planes);
     make_model();
-    CHECK(!arrange(&here));
+    CHECK(!view_arrange(&here));
     test_wishes();
-    if (!test_check(!open_port(&here, error), __FILE__, __LINE__, error) ||
+    CHECK(view_open(&here, "build/no/such/page", error) && strstr(error, "no/such/page"));
+    view_close(&here);
+    CHECK(!olat__write_file(page, (const unsigned char *)"<p>the page", 11, error));
+    if (!test_check(!view_open(&here, page, error), __FILE__, __LINE__, error) ||
         pthread_create(&thread, NULL, run, NULL))
         TEST_END();
+    remove(page);
     test_answers();
+    test_pause();
     test_trouble();
-    ended = 1;
-    pthread_join(thread, NULL);
-    ended = 0;
-    if (!pthread_create(&thread, NULL, run, NULL)) { /* pictures: the library is this thread's in between */
-        test_pictures();
-        ended = 1;
-        pthread_join(thread, NULL);
-    }
-    for (visitor *v = here.visitors; v < here.visitors + VISITORS; v++)
-        if (v->socket != NO_SOCKET) leave(v);
-    close_socket(here.listener);
+    test_pictures(thread);
+    view_close(&here);
     ssdgs_model_destroy(here.models[0]);
     ssdgs_context_destroy(here.context);
-    free(here.planes);
     TEST_END();
 }
 #endif
