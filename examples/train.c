@@ -1,5 +1,5 @@
-/* cc -O2 examples/train.c -o train -lm -lpthread: trains a relightable model from a folder of OLAT
-   photographs */
+/* cc -O2 examples/train.c -o train -lm -lpthread (Windows: -lws2_32): trains a relightable model from a
+   folder of OLAT photographs */
 #define SSDGS_IMPLEMENTATION
 #ifdef _WIN32
 #include <winsock2.h> /* before windows.h */
