@@ -61,7 +61,7 @@ static const char *const view__plane_names[VIEW__PLANES] = {"color",  "diffuse",
 enum { VIEW__EXACT, VIEW__DEFAULT, VIEW__FAST, VIEW__PREVIEW, VIEW__PRESETS };
 static const char *const view__preset_names[VIEW__PRESETS] = {"exact", "default", "fast", "preview"};
 
-/* Names and how many view__numbers each has; in the order of the struct below. */
+/* Names and how many numbers each has; in the order of the struct below. */
 enum {
     VIEW__WIDTH,
     VIEW__HEIGHT,
@@ -161,10 +161,10 @@ typedef struct view__visitor {
     view__socket socket;
     char in[VIEW__REQUEST + 1]; /* what came, and is not answered yet */
     size_t got;
-    unsigned char *out; /* the view__answer, so far sent */
+    unsigned char *out; /* the answer, so far sent */
     size_t size, sent, room;
     time_t heard; /* when something last went to or fro */
-    int leaves;   /* once the view__answer is sent */
+    int leaves;   /* once the answer is sent */
     ssdgs_scene *scene;
 } view__visitor;
 
@@ -288,7 +288,7 @@ static int view__draw(view_server *s, view__visitor *v, const view__wish *w, uns
 
 /* ---- answers ---- */
 
-/* Room for an view__answer of so many bytes behind its head; NULL: there is none. */
+/* Room for an answer of so many bytes behind its head; NULL: there is none. */
 static unsigned char *view__answer(view__visitor *v, const char *status, const char *type, size_t size,
                                    const char *more) {
     char head[1024];
@@ -459,7 +459,7 @@ static void view__leave(view__visitor *v) {
     v->socket = VIEW__NO_SOCKET;
 }
 
-/* The first whole request among what came, if no view__answer is on its way. */
+/* The first whole request among what came, if no answer is on its way. */
 static void view__next_request(view_server *s, view__visitor *v) {
     v->in[v->got] = 0;
     char *stop = strlen(v->in) == v->got ? strstr(v->in, "\r\n\r\n") : NULL;
