@@ -330,7 +330,7 @@ typedef struct ssdgs_settings {
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
     } medium; /* of models made in code, where scattering.layers is 0 and transport 1: light travels in it by
-                 true transport, without a network. Its lengths show from 0.04 to 0.64 length units */
+                 true transport, without a network. Lengths are told apart from 0.04 to 0.64 length_unit */
 } ssdgs_settings;
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
@@ -364,9 +364,9 @@ typedef struct ssdgs_gaussian {
 
 SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void); /* grey, opacity 0.1, 0.02 wide, at 0 */
 /* Gives a Gaussian, of a model made in code, the highlight of a mirror of microfacets: roughness, along its
-   first and second axis across the normal, is Beckmann's alpha. Sets sharpness and specular, and makes the
-   model's lobes such. For metals let f0 be 0.9 and multiply specular by their colour. ERR_ARGUMENT:
-   highlights are not deferred, or a roughness is not 0.01 .. 1. */
+   first and second axis across the normal, is Beckmann's alpha. Sets sharpness and specular, and gives the
+   model the one lobe that this needs, for all its Gaussians. For metals let f0 be 0.9 and multiply specular
+   by their colour. ERR_ARGUMENT: highlights are not deferred, or a roughness is not 0.01 .. 1. */
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                              ssdgs_gaussian *gaussian);
 /* Writes and reads Gaussian `index`. ERR_ARGUMENT: no such Gaussian, or a value out of range. */
@@ -490,7 +490,7 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_preview(void);
 
 typedef struct ssdgs_render_stats {
     int gaussians;       /* in the model */
-    int objects;         /* in sight: what the others are asked for is their shadows */
+    int objects;         /* in sight; the others only cast shadows */
     int visible;         /* inside the camera's frustum */
     int shaded;          /* contributing to a pixel */
     int skipped;         /* contributing, but not shaded, within max_error: drawn in a neighbour's colour */
@@ -502,7 +502,7 @@ typedef struct ssdgs_render_stats {
     int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
     double network_work; /* share of the networks' multiplications done */
     size_t instances;    /* (tile, splat) pairs of the camera */
-    size_t light_instances; /* and of the lights' maps that were not the last frame's */
+    size_t light_instances; /* the same of the lights' maps made for this frame */
 } ssdgs_render_stats;
 
 /* Renders model as camera sees it under lights[0 .. light_count). After the first frame of a size nothing is
@@ -527,8 +527,8 @@ typedef struct ssdgs_object {
                                 stays; 1 */
     ssdgs_real specular;     /* 0 or more: factor of its highlights; 1 */
     ssdgs_real translucency; /* 0.1 .. 10: factor of how far light travels in it, by true transport; 1 */
-    const unsigned char *mask; /* (Gaussians of the model) how much of tint, roughness and specular each
-                                  takes, of 255; geometric lobes take roughness whole. NULL: all; NULL */
+    const unsigned char *mask; /* (Gaussians of the model) 255: takes tint, roughness and specular whole; 0:
+                                  stays as it is. Geometric lobes take roughness whole. NULL: all do; NULL */
 } ssdgs_object;
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* where and as it was trained */
 
@@ -570,10 +570,10 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
 /* An environment map, (height,width,3) linear radiance, as lights. Its first row lies around the z axis, its
    first column at the x axis, from where columns go towards y: to_world (3,3), row-major, turns it; NULL = as
    it is. lights (light_count) become directional ones, each for a part of the sky; ambient may be
-   options.ambient or NULL. With both, ambient has what of the sky is less than twice its mean. Pictures of
-   two trained models were, from those under 256 lights, with ambient alone 32 and 25 dB, under 4 lights 33
-   and 27, 16 lights 40 and 34, 64 lights 48 and 40; under 2 lights with ambient 34 and 27. Takes two
-   seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT, ERR_MEMORY. */
+   options.ambient or NULL. With both, ambient takes of each pixel what is below twice the sky's mean, the
+   lights take the rest. Pictures of two trained models were, from those under 256 lights, with ambient alone
+   32 and 25 dB, under 4 lights 33 and 27, 16 lights 40 and 34, 64 lights 48 and 40; under 2 lights with
+   ambient 34 and 27. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT, ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_real *pixels, int width,
                                          int height, const ssdgs_real *to_world, ssdgs_light *lights,
                                          int light_count, ssdgs_real ambient[9][3]);
@@ -1169,7 +1169,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #define SSDGS__BAND 16      /* image rows of a task */
 #define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
 #ifndef SSDGS__BATCH_BYTES
-#define SSDGS__BATCH_BYTES ((size_t)1 << 28) /* of views that are projected and walked together */
+#define SSDGS__BATCH_BYTES ((size_t)1 << 28) /* of views walked together, 80 a Gaussian */
 #endif
 #define SSDGS__SOFT 0.02   /* true dipole transport, length units: distances are sqrt(r^2 + soft^2) */
 #define SSDGS__LENGTHS 5   /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
@@ -2373,9 +2373,9 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field, \
                        (double)(s)->field, (double)(low), (double)(high))
 
-/* Whether light scatters by settings.medium, not by a network. */
-static int ssdgs__has_medium(const ssdgs_settings *s) {
-    return !s->scattering.layers && (s->terms & SSDGS_SCATTERING_TERM);
+/* Whether, with these terms, light scatters by settings.medium, not by a network. */
+static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
+    return !s->scattering.layers && (terms & SSDGS_SCATTERING_TERM);
 }
 
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
@@ -2418,7 +2418,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(origin[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(origin[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(origin[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    for (int i = 0; i < 3 && ssdgs__has_medium(s); i++) {
+    for (int i = 0; i < 3 && ssdgs__has_medium(s, s->terms); i++) {
         if (!s->transport)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
         const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
@@ -2426,8 +2426,8 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
             !(absorption >= 0 && absorption <= (ssdgs_real)1e12))
             return ssdgs__fail(
                 context, SSDGS_ERR_ARGUMENT,
-                "settings: medium.scattering[%d] = %g, medium.absorption[%d] = %g: within 1e-12 .. "
-                "1e12 and 0 .. 1e12",
+                "settings: medium.scattering[%d] = %g, medium.absorption[%d] = %g, where 1e-12 .. "
+                "1e12 and 0 .. 1e12 are allowed",
                 i, (double)scattering, i, (double)absorption);
     }
 #undef SSDGS__RANGE
@@ -3271,8 +3271,8 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
             !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6))
             return ssdgs__fail(
                 context, SSDGS_ERR_ARGUMENT,
-                "object %d: roughness = %g, specular = %g, translucency = %g: within 0.1 .. 10, 0 .. "
-                "1e6, 0.1 .. 10; ssdgs_object_default() makes them 1",
+                "object %d: roughness = %g, specular = %g, translucency = %g, where 0.1 .. 10, "
+                "0 .. 1e6 and 0.1 .. 10 are allowed; ssdgs_object_default() makes them 1",
                 i, (double)o->roughness, (double)o->specular, (double)o->translucency);
         if (!o->model->settings.baked) {
             if (first && first->settings.transfer != o->model->settings.transfer)
@@ -3848,7 +3848,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     k.diffuse = (o->terms & SSDGS_DIFFUSE_TERM) != 0;
     k.specular = (o->terms & SSDGS_SPECULAR_TERM) != 0;
     k.shadow = (o->terms & SSDGS_SHADOW_TERM) && ssdgs__casts(from);
-    k.scattering = (o->terms & SSDGS_SCATTERING_TERM) && !ssdgs__has_medium(s);
+    k.scattering = (o->terms & SSDGS_SCATTERING_TERM) && !ssdgs__has_medium(s, o->terms);
     k.residual_shadow = s->residual_shadow;
     k.refined_shadow = s->shadow.layers > 0;
     k.per_channel_optics = s->per_channel_optics;
@@ -3986,7 +3986,8 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
                   memcmp(last->offset, o.offset, sizeof o.offset);
         const int retuned = kept && memcmp(&last->translucency, &o.translucency, sizeof o.translucency);
         if (kept && !retuned) memcpy(o.medium, last->medium, sizeof o.medium);
-        else if (ssdgs__has_medium(&o.settings)) ssdgs__medium_weights(&o.settings, o.translucency, o.medium);
+        else if (ssdgs__has_medium(&o.settings, o.settings.terms))
+            ssdgs__medium_weights(&o.settings, o.translucency, o.medium);
         *tuned |= retuned;
         o.first = (int)at;
         o.terms = o.settings.terms & frame->options.terms;
@@ -4209,7 +4210,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->maps = request->maps;
     frame->light_count = request->maps ? light_count : 0;
     frame->training = training;
-    if (training && ssdgs__has_medium(&request->objects->model->settings))
+    if (training &&
+        ssdgs__has_medium(&request->objects->model->settings, request->objects->model->settings.terms))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "settings: scattering.layers = 0: a medium is not trained");
     for (int i = 0; i < 3; i++)
@@ -5189,7 +5191,8 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs_
                                    int slot, const ssdgs_real *x, int groups, ssdgs_real *sums) {
     const ssdgs_frame *frame = job->tree.frame;
     const ssdgs_real soft = (ssdgs_real)SSDGS__SOFT * tree->object->settings.length_unit;
-    const ssdgs_real longer = ssdgs__has_medium(&tree->object->settings) ? 1 : tree->object->translucency;
+    const ssdgs_real longer =
+        ssdgs__has_medium(&tree->object->settings, tree->object->terms) ? 1 : tree->object->translucency;
     const ssdgs_real unit = tree->object->settings.length_unit * longer; /* a medium's weights have it */
     size_t first[SSDGS__LEVELS + 1], stack[SSDGS__LEAF * SSDGS__LEVELS];
     int level_of[SSDGS__LEAF * SSDGS__LEVELS], depth = 0;
@@ -5797,8 +5800,10 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
         rows[SSDGS__COSINE * SSDGS__BLOCK + s] = rows[SSDGS__GLOSS * SSDGS__BLOCK + s] = 1;
         part[l->visibility + s] = 1;
         part[l->cue + s] = 0;
-        for (size_t i = 0; o->settings.transport && i < SSDGS__LENGTHS; i++)
-            part[l->transport + i * SSDGS__BLOCK + s] = (ssdgs_real)ssdgs__beneath_plane((int)i);
+    }
+    for (int i = 0; o->settings.transport && i < SSDGS__LENGTHS; i++) {
+        const ssdgs_real even = (ssdgs_real)ssdgs__beneath_plane(i);
+        for (size_t s = 0; s < SSDGS__BLOCK; s++) part[l->transport + (size_t)i * SSDGS__BLOCK + s] = even;
     }
     if (l->scattering_layers) {
         const ssdgs__network net = {l->scattering, l->scattering_layers, o->gaussians.scattering};
@@ -5808,7 +5813,7 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
     }
     const ssdgs__colour_in in = {gauss, rows, part + l->visibility, NULL, optics};
     k->colour(lighting, &in, own);
-    if (ssdgs__has_medium(&o->settings) && (o->terms & SSDGS_SCATTERING_TERM))
+    if (ssdgs__has_medium(&o->settings, o->terms))
         ssdgs__medium_rows(lighting, o->medium, gauss, rows, part + l->transport, own);
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         ssdgs_real n[3], wo[3], mirrored[3], light[3], shine[3], facing = 0;
@@ -5907,7 +5912,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     ssdgs_real factors[4 * SSDGS__BLOCK];
     const int edited = ssdgs__edit(frame, o, at, gauss, factors);
-    const int medium = ssdgs__has_medium(settings) && (o->terms & SSDGS_SCATTERING_TERM);
+    const int medium = ssdgs__has_medium(settings, o->terms);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     if (frame->layer_count && o->turned) ssdgs__lobe_turn(o, scratch + l->lobe);
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, o->gaussians.scattering};
@@ -5937,17 +5942,20 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             part[l->cue + (size_t)s] = lighting->scattering && settings->depth_cue && ssdgs__casts(source)
                                            ? frame->depth_cue[of_light] / (o->scale * o->translucency)
                                            : 0;
-            for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS;
-                 i++) /* in units of the irradiance of its own */
-                part[l->transport + (size_t)(i * SSDGS__BLOCK + s)] =
-                    !ssdgs__casts(source)
-                        ? part[l->rows + (size_t)(SSDGS__COSINE * SSDGS__BLOCK + s)] *
-                              (ssdgs_real)ssdgs__beneath_plane(i)
-                        : job->transport[((blocks * (size_t)light + at[s] / SSDGS__BLOCK) * SSDGS__LENGTHS +
-                                          (size_t)i) *
-                                             SSDGS__BLOCK +
-                                         at[s] % SSDGS__BLOCK] /
-                              part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
+        }
+        const ssdgs_real *irradiance = part + l->rows + SSDGS__IRRADIANCE * SSDGS__BLOCK,
+                         *cosine = part + l->rows + SSDGS__COSINE * SSDGS__BLOCK;
+        for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS; i++) {
+            ssdgs_real *to =
+                part + l->transport + i * SSDGS__BLOCK; /* in units of the irradiance of its own */
+            const ssdgs_real even = ssdgs__casts(source) ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
+            const size_t first = (blocks * (size_t)light * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK;
+            for (int s = 0; s < SSDGS__BLOCK; s++) {
+                const size_t from =
+                    at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
+                to[s] =
+                    ssdgs__casts(source) ? job->transport[first + from] / irradiance[s] : cosine[s] * even;
+            }
         }
         if (l->shadow_layers && lighting->shadow) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;
@@ -6823,9 +6831,8 @@ static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
     return SSDGS_OK;
 }
 
-/* The stages up to WALK run once for every batch of views: what these leave for the others is small. A batch
-   is as many lights as do with SSDGS__BATCH_BYTES, or one. Without hooks alone: those take all views at once.
- */
+/* The stages up to WALK run once for every batch of views: what they leave for the others is small. A batch
+   is as many lights as do with SSDGS__BATCH_BYTES, or one. Hooks take all views at once. */
 static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     const int walks = last < SSDGS_STAGE_WALK ? last : SSDGS_STAGE_WALK;
     const size_t room = SSDGS__BATCH_BYTES / (80 * ((size_t)frame->count + 1));

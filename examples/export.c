@@ -30,7 +30,7 @@ typedef struct exporter {
     double *sums;   /* (count, 4) colours, weighted by how much a Gaussian faces the eye, and these weights */
     int listening;
     unsigned char *bytes; /* of the file at hand */
-    size_t size, room;
+    size_t size;
 } exporter;
 
 /* ---- the colours: a frame's stages, listened to ---- */
@@ -481,11 +481,10 @@ int main(int argc, char **argv) {
         failed = olat__fail(error, "%s: %s", names[0],
                             e.count < 1 ? "has no Gaussians" : "is no relightable model");
     if (!failed && !result) {
-        e.room = 8192 + 72 * (size_t)e.count;
         e.splats = (splat *)calloc((size_t)e.count, sizeof *e.splats);
         e.normals = (float *)calloc((size_t)e.count, 3 * sizeof *e.normals);
         e.sums = (double *)calloc((size_t)e.count, 4 * sizeof *e.sums);
-        e.bytes = (unsigned char *)malloc(e.room);
+        e.bytes = (unsigned char *)malloc(8192 + 72 * (size_t)e.count);
         if (!e.splats || !e.normals || !e.sums || !e.bytes) failed = olat__fail(error, "out of memory");
     }
     if (!failed && !result) result = look(&e, lit ? from : NULL);
