@@ -20,7 +20,7 @@ OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
 PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
-HEADERS = ssdgs.h examples/olat.h examples/view.h tests/test.h tests/scene.h tests/kernels.h
+HEADERS = ssdgs.h examples/olat.h examples/picture.h examples/view.h tests/test.h tests/scene.h tests/kernels.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/bench
 SOURCES = $(wildcard tests/t_*.c)
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
@@ -29,6 +29,7 @@ TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 BUILDS = builds examples
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
+MODEL = examples/data/waxcow.ply
 
 all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/bench
 
@@ -40,6 +41,14 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 
 view: $(BUILD)/view ## a trained model in the browser: prints the address to open
 	$(BUILD)/view examples/data/waxcow.ply
+
+web: $(BUILD)/view.html ## the same as one page that needs no server (MODEL=file.ply); needs emscripten
+$(BUILD)/view.html: examples/view.html examples/web.c $(HEADERS) $(MODEL) | $(BUILD)
+	emcc -O2 -msimd128 -matomics -mbulk-memory --no-entry -sALLOW_MEMORY_GROWTH=1 examples/web.c -o $(BUILD)/web.wasm \
+	  -Wl,--shared-memory,--max-memory=2147483648,--import-memory,--no-check-features
+	{ echo '<script type="text/plain" id="code">'; base64 <$(BUILD)/web.wasm; echo '</script>'; \
+	  echo '<script type="text/plain" id="model" data-name="$(notdir $(MODEL))">'; base64 <$(MODEL); echo '</script>'; } >$(BUILD)/web.txt
+	sed -e '/<!-- make web/{r $(BUILD)/web.txt' -e 'd;}' examples/view.html >$@
 
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
@@ -80,7 +89,8 @@ $(BUILD)/builds.log: %.log: $(OBJECTS)
 $(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
-test-browser: $(BUILD)/view $(BUILD)/train ## examples/view.html in headless Chromium; needs node and chromium
+test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.html in headless Chromium, and make web's page where emscripten is; needs node and chromium
+	@if command -v emcc >/dev/null; then $(MAKE) web; fi
 	node tests/browser.js $(BUILD)
 
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry

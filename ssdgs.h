@@ -90,14 +90,14 @@ MEMORY
 
 THREADS
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
-  allocator, log and progress run on the caller's thread, an occluder on any. A call made while another is at
-  work on the context, from a hook or another thread, returns ERR_ARGUMENT; progress may call all but the
-  trainer's destruction. After fork() the child may use its copies, without threads.
+  allocator, log, tracer and progress run on the caller's thread, an occluder on any. A call made while
+  another is at work on the context, from a hook or another thread, returns ERR_ARGUMENT; progress may call
+  all but the trainer's destruction. After fork() the child may use its copies, without threads.
 
 DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
-  training (options.sum). AVX2, AVX-512 and NEON give the same bits, and so do SSE2 and scalar code; the two
-  groups differ, as FMA rounds once. Builds agree as far as their libm does.
+  training (options.sum). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, WebAssembly's SIMD128 and
+  scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm does.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
@@ -154,7 +154,7 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
-  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside SSE2 or NEON
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside others
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
@@ -223,8 +223,8 @@ typedef enum ssdgs_result { SSDGS_RESULTS(SSDGS__RESULT_ENUM) SSDGS_RESULT_COUNT
 
 /* clang-format off */
 typedef enum ssdgs_isa {
-    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512, SSDGS_ISA_NEON,
-    SSDGS_ISA_COUNT
+    SSDGS_ISA_AUTO = 0, SSDGS_ISA_SCALAR, SSDGS_ISA_SSE2, SSDGS_ISA_WASM, SSDGS_ISA_AVX2, SSDGS_ISA_AVX512,
+    SSDGS_ISA_NEON, SSDGS_ISA_COUNT
 } ssdgs_isa;
 /* clang-format on */
 
@@ -252,10 +252,17 @@ typedef struct ssdgs_parallel {
     void *user;
 } ssdgs_parallel;
 
+/* For profilers: hears the name of a frame's or training step's stage as it begins, and NULL as it ends. */
+typedef struct ssdgs_tracer {
+    void (*stage)(void *user, const char *name);
+    void *user;
+} ssdgs_tracer;
+
 typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_allocator allocator;        /* malloc and free */
     ssdgs_logger logger;              /* none */
     ssdgs_parallel parallel;          /* threads of the context's own */
+    ssdgs_tracer tracer;              /* none */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
     int threads;   /* how many of its own, the caller counted; 0 = one per CPU. With `parallel`: how many that
                       has; 0 = 4. It is given thrice as many tasks at once */
@@ -597,9 +604,6 @@ SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int heigh
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored);
 
-#ifndef SSDGS_NO_TRAINER
-/* ---- train ---- */
-
 typedef enum ssdgs_pixels {
     SSDGS_PIXELS_RGBA8 = 0,
     SSDGS_PIXELS_RGBA16
@@ -610,6 +614,9 @@ typedef struct ssdgs_photo {
     const void *pixels; /* (h,w,4) packed, straight alpha, stored values; must outlive the trainer */
     ssdgs_pixels format;
 } ssdgs_photo;
+
+#ifndef SSDGS_NO_TRAINER
+/* ---- train ---- */
 
 /* clang-format off */
 typedef enum ssdgs_schedule { /* the paper's orders H to K */
@@ -1019,7 +1026,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says
    so. */
 #if defined(__clang__)
-#if __clang_major__ >= 12 && !defined(__wasm__)
+#if defined(__wasm__) && defined(__FAST_MATH__)
+#pragma clang fp reassociate(off)
+#elif __clang_major__ >= 12 && !defined(__wasm__)
 #pragma float_control(precise, on, push) /* which lets expressions fuse */
 #endif
 #pragma STDC FP_CONTRACT OFF
@@ -1084,9 +1093,10 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 
 #define SSDGS__ISA_SCALAR 1
 #define SSDGS__ISA_SSE2 2
-#define SSDGS__ISA_AVX2 3
-#define SSDGS__ISA_AVX512 4
-#define SSDGS__ISA_NEON 5
+#define SSDGS__ISA_WASM 3
+#define SSDGS__ISA_AVX2 4
+#define SSDGS__ISA_AVX512 5
+#define SSDGS__ISA_NEON 6
 
 #if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && !defined(__TINYC__)
 #if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)) && \
@@ -1102,6 +1112,8 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 #elif defined(__aarch64__) || defined(_M_ARM64)
 #define SSDGS__NEON 1
+#elif defined(__wasm_simd128__)
+#define SSDGS__WASM 1
 #endif
 #endif
 #ifndef SSDGS__X86
@@ -1110,10 +1122,14 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #ifndef SSDGS__NEON
 #define SSDGS__NEON 0
 #endif
-#if defined(SSDGS_SCALAR) || !(SSDGS__NEON || (SSDGS__X86 && (defined(__x86_64__) || defined(_M_X64))))
+#ifndef SSDGS__WASM
+#define SSDGS__WASM 0
+#endif
+#if defined(SSDGS_SCALAR) || \
+    !(SSDGS__NEON || SSDGS__WASM || (SSDGS__X86 && (defined(__x86_64__) || defined(_M_X64))))
 #define SSDGS__SCALAR 1
 #else
-#define SSDGS__SCALAR 0 /* every CPU that this is compiled for has SSE2 or NEON */
+#define SSDGS__SCALAR 0 /* every CPU that this is compiled for has SSE2, NEON or SIMD128 */
 #endif
 
 #if SSDGS__X86
@@ -1138,6 +1154,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
 #endif
 #if SSDGS__NEON
 #include <arm_neon.h>
+#endif
+#if SSDGS__WASM
+#include <wasm_simd128.h>
 #endif
 
 #if defined(_WIN32)
@@ -1453,10 +1472,15 @@ static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *l
 /* ---- scalar lanes ---- */
 
 static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties to even */
+#if defined(__wasm__) && !defined(SSDGS_REAL64) /* one instruction, and LLVM 14 loses volatile values here \
+                                                 */
+    return __builtin_rintf(x);
+#else
     const ssdgs_real magic =
         sizeof(ssdgs_real) == 4 ? (ssdgs_real)12582912.0 : (ssdgs_real)6755399441055744.0;
     volatile ssdgs_real shifted = x + magic; /* volatile: -ffast-math would fold it away */
     return shifted - magic;
+#endif
 }
 
 static SSDGS__INLINE float ssdgs__pow2(float n) {
@@ -1545,6 +1569,11 @@ static int ssdgs__finite(ssdgs_real x) {
 #include SSDGS_SELF
 #undef SSDGS__ISA
 #endif
+#if SSDGS__WASM
+#define SSDGS__ISA SSDGS__ISA_WASM
+#include SSDGS_SELF
+#undef SSDGS__ISA
+#endif
 
 #pragma pop_macro("R")
 #pragma pop_macro("V")
@@ -1611,6 +1640,7 @@ static int ssdgs__exchange(volatile int *p, int value) {
 struct ssdgs_context {
     ssdgs_allocator allocator;
     ssdgs_logger logger;
+    ssdgs_tracer tracer;
     ssdgs_parallel parallel;
     ssdgs_gpu_hook gpu;
     const ssdgs__kernels *k;
@@ -2125,6 +2155,9 @@ static const ssdgs__kernels *ssdgs__table(int isa) {
 #if SSDGS__NEON
     case SSDGS_ISA_NEON: return &ssdgs__kernels_neon;
 #endif
+#if SSDGS__WASM
+    case SSDGS_ISA_WASM: return &ssdgs__kernels_wasm;
+#endif
     default: return NULL;
     }
 }
@@ -2137,7 +2170,8 @@ SSDGS_API const char *ssdgs_result_string(ssdgs_result result) {
 }
 
 SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
-    static const char *const names[] = {"auto", "scalar", "sse2", "avx2", "avx512", "neon", "unknown"};
+    static const char *const names[] = {"auto", "scalar", "sse2", "wasm",
+                                        "avx2", "avx512", "neon", "unknown"};
     return names[(int)isa >= 0 && isa < SSDGS_ISA_COUNT ? (int)isa : (int)SSDGS_ISA_COUNT];
 }
 
@@ -2163,6 +2197,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     if (!context) return SSDGS_ERR_MEMORY;
     context->allocator = zero.allocator;
     context->logger = zero.logger;
+    context->tracer = zero.tracer;
     if (zero.gpu) context->gpu = *zero.gpu;
     context->isa = (int)zero.isa;
     for (int isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
@@ -6822,10 +6857,22 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
 }
 
 static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
+    static const char *const names[SSDGS_STAGE_COUNT] = {"project",
+                                                         "sort",
+                                                         "bin",
+                                                         "walk",
+                                                         "shade",
+                                                         "composite",
+                                                         "composite backward",
+                                                         "shade backward",
+                                                         "project backward"};
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
+    const ssdgs_tracer *tracer = &frame->context->tracer;
     for (int stage = first; stage <= last; stage++) {
+        if (tracer->stage) tracer->stage(tracer->user, names[stage]);
         const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
                                                       : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+        if (tracer->stage) tracer->stage(tracer->user, NULL);
         if (result) return result;
     }
     return SSDGS_OK;
@@ -7509,6 +7556,8 @@ SSDGS__SMALL_END
 #define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_sse2 /* the widest that needs no look at the CPU */
 #elif SSDGS__NEON
 #define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_neon
+#elif SSDGS__WASM
+#define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_wasm
 #else
 #define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_scalar
 #endif
@@ -11844,7 +11893,9 @@ SSDGS__SMALL_END
 #endif /* SSDGS_NO_TRAINER */
 
 #if defined(__clang__)
-#if __clang_major__ >= 12 && !defined(__wasm__)
+#if defined(__wasm__) && defined(__FAST_MATH__)
+#pragma clang fp reassociate(on)
+#elif __clang_major__ >= 12 && !defined(__wasm__)
 #pragma float_control(pop)
 #endif
 #pragma STDC FP_CONTRACT DEFAULT
@@ -12023,6 +12074,37 @@ SSDGS__SMALL_END
 #define VEXPONENT(x) \
     vcvtq_f32_s32( \
         vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
+
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+#define SSDGS__NAME(name) ssdgs__##name##_wasm
+#define SSDGS__TR 5
+#define SSDGS__TV 2
+#define SSDGS__TARGET
+#define R float
+#define V v128_t
+#define VM v128_t
+#define SSDGS__VW 4
+#define VLOAD(p) wasm_v128_load(p)
+#define VSTORE(p, v) wasm_v128_store(p, v)
+#define VSET(c) wasm_f32x4_splat((float)(c))
+#define VADD(a, b) wasm_f32x4_add(a, b)
+#define VSUB(a, b) wasm_f32x4_sub(a, b)
+#define VMUL(a, b) wasm_f32x4_mul(a, b)
+#define VDIV(a, b) wasm_f32x4_div(a, b)
+#define VFMA(a, b, c) wasm_f32x4_add(wasm_f32x4_mul(a, b), c)
+#define VFNMA(a, b, c) wasm_f32x4_sub(c, wasm_f32x4_mul(a, b))
+#define VMIN(a, b) wasm_f32x4_pmin(b, a) /* a < b ? a : b */
+#define VMAX(a, b) wasm_f32x4_pmax(b, a)
+#define VSQRT(a) wasm_f32x4_sqrt(a)
+#define VLT(a, b) wasm_f32x4_lt(a, b)
+#define VGE(a, b) wasm_f32x4_ge(a, b)
+#define VAND(m, n) wasm_v128_and(m, n)
+#define VBITS(m) ((int)wasm_i32x4_bitmask(m))
+#define VSEL(m, a, b) wasm_v128_bitselect(a, b, m)
+#define VROUND(a) wasm_f32x4_nearest(a)
+/* 1.5 x 2^23 more than a whole number has that number in its low bits */
+#define VLDEXP(x, n) wasm_i32x4_add(x, wasm_i32x4_shl(VADD(n, VSET(12582912)), 23))
+#define VEXPONENT(x) wasm_f32x4_convert_i32x4(wasm_i32x4_sub(wasm_u32x4_shr(x, 23), wasm_i32x4_splat(127)))
 #endif
 
 #define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
@@ -12081,6 +12163,12 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     const __m128 cd = _mm_add_ps(_mm_unpacklo_ps(c1, d1), _mm_unpackhi_ps(c1, d1));
     _mm_storeu_ps(out,
                   _mm_add_ps(_mm_loadu_ps(out), _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab))));
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+    const v128_t a1 = VADD(VADD(a[0], a[2]), VADD(a[1], a[3])), b1 = VADD(VADD(b[0], b[2]), VADD(b[1], b[3]));
+    const v128_t c1 = VADD(VADD(c[0], c[2]), VADD(c[1], c[3])), d1 = VADD(VADD(d[0], d[2]), VADD(d[1], d[3]));
+    const v128_t ab = VADD(wasm_i32x4_shuffle(a1, b1, 0, 4, 1, 5), wasm_i32x4_shuffle(a1, b1, 2, 6, 3, 7));
+    const v128_t cd = VADD(wasm_i32x4_shuffle(c1, d1, 0, 4, 1, 5), wasm_i32x4_shuffle(c1, d1, 2, 6, 3, 7));
+    VSTORE(out, VADD(VLOAD(out), VADD(wasm_i64x2_shuffle(ab, cd, 0, 2), wasm_i64x2_shuffle(ab, cd, 1, 3))));
 #else
     out[0] += F(sum)(a);
     out[1] += F(sum)(b);
@@ -12096,6 +12184,15 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
     VUNROLL for (int i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
     VUNROLL for (int i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+    for (int i = 0; i < 4; i += 2) {
+        const v128_t a = VLOAD(in), b = VLOAD(in + in_stride), c = VLOAD(in + 2 * in_stride),
+                     d = VLOAD(in + 3 * in_stride);
+        const v128_t ab = i ? wasm_i32x4_shuffle(a, b, 2, 6, 3, 7) : wasm_i32x4_shuffle(a, b, 0, 4, 1, 5);
+        const v128_t cd = i ? wasm_i32x4_shuffle(c, d, 2, 6, 3, 7) : wasm_i32x4_shuffle(c, d, 0, 4, 1, 5);
+        VSTORE(out + (size_t)i * out_stride, wasm_i64x2_shuffle(ab, cd, 0, 2));
+        VSTORE(out + (size_t)(i + 1) * out_stride, wasm_i64x2_shuffle(ab, cd, 1, 3));
+    }
 #else
     for (int i = 0; i < 16; i++)
         out[(size_t)(i & 3) * out_stride + (size_t)(i >> 2)] =
@@ -12369,7 +12466,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         field[7] = ey;
         R fields[8][SSDGS__VW];
         for (int f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
-#if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
+#if SSDGS__VW >= 4
         for (int f = 0; f < 8; f += 4)
             for (int l = 0; l < SSDGS__VW; l += 4)
                 F(transpose4)(fields[f] + l, SSDGS__VW, (R *)(void *)(record + i + (size_t)l) + f, 8);
@@ -12569,6 +12666,18 @@ SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
         VUNROLL for (int micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
             batch->entries[micro] |= (uint64_t)(unsigned)_mm_movemask_epi8(half[micro / 8]) << i;
             half[micro / 8] = _mm_add_epi8(half[micro / 8], half[micro / 8]);
+        }
+    }
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+    for (int i = count; i & 15; i++) batch->mask[i] = 0;
+    for (int i = 0; i < count; i += 16) {
+        const v128_t a = wasm_v128_load(batch->mask + i), b = wasm_v128_load(batch->mask + i + 8);
+        v128_t half[2];
+        half[0] = wasm_i8x16_shuffle(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        half[1] = wasm_i8x16_shuffle(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        VUNROLL for (int micro = 15; micro >= 0; micro--) {
+            batch->entries[micro] |= (uint64_t)wasm_i8x16_bitmask(half[micro / 8]) << i;
+            half[micro / 8] = wasm_i8x16_add(half[micro / 8], half[micro / 8]);
         }
     }
 #else

@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "olat.h"
+#include "picture.h"
 #include "view.h"
 #include <errno.h>
 #include <signal.h>
@@ -278,13 +279,13 @@ typedef struct run {
 
 /* Answers those who watch, and waits while they ask for it. What they see changes no bit of the run. */
 static void show(run *r, const ssdgs_train_stats *stats) {
-    r->view->training.iteration = stats->iteration;
-    r->view->training.loss = stats->loss;
-    r->view->training.psnr = r->psnr;
-    r->view->training.left = r->speed > 0 ? (r->iterations - stats->iteration) / r->speed : 0;
+    r->view->show.training.iteration = stats->iteration;
+    r->view->show.training.loss = stats->loss;
+    r->view->show.training.psnr = r->psnr;
+    r->view->show.training.left = r->speed > 0 ? (r->iterations - stats->iteration) / r->speed : 0;
     for (int rounds = 0; rounds < 16 && view_poll(r->view, 0); rounds++) {}
     const double begun = olat_seconds();
-    while (r->view->training.paused && !interrupted) view_poll(r->view, 100);
+    while (r->view->show.training.paused && !interrupted) view_poll(r->view, 100);
     r->drawn += olat_seconds() - begun; /* a pause is no part of the speed */
 }
 
@@ -534,15 +535,18 @@ static int save_refined(job *j, char error[512]) {
 /* Opens the page that shows the model as it trains. */
 static int watch(job *j, char error[512]) {
     char page[512];
-    j->view.context = j->context;
-    j->view.models[0] = j->model;
-    j->view.names[0] = j->given[OUTPUT];
-    j->view.objects[0] = ssdgs_object_default(j->model);
-    j->view.count = j->view.training.on = 1;
-    j->view.training.iterations = j->options.iterations;
+    view_show *show = &j->view.show;
+    show->context = j->context;
+    show->models[0] = j->model;
+    show->names[0] = j->given[OUTPUT];
+    show->objects[0] = ssdgs_object_default(j->model);
+    show->count = show->training.on = 1;
+    show->training.iterations = j->options.iterations;
+    show->training.photos = j->photos;
+    show->training.count = j->train_set.count;
     for (int c = 0; c < 3; c++) {
-        j->view.middle[c] = (j->options.bounds_min[c] + j->options.bounds_max[c]) / 2;
-        j->view.radius = fmaxf(j->view.radius, (j->options.bounds_max[c] - j->options.bounds_min[c]) / 2);
+        show->middle[c] = (j->options.bounds_min[c] + j->options.bounds_max[c]) / 2;
+        show->radius = fmaxf(show->radius, (j->options.bounds_max[c] - j->options.bounds_min[c]) / 2);
     }
     view_page(__FILE__, page, sizeof page);
     if (view_open(&j->view, page, error)) return 1;
@@ -571,6 +575,10 @@ static int train(job *j) {
     free(test_json);
     if (check_outputs(j, train_json, error)) return fail(error);
 
+    if (j->given[VIEW]) {
+        j->desc.tracer.stage = view_stage;
+        j->desc.tracer.user = &j->view.show;
+    }
     ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
     double origin[3] = {0, 0, 0};

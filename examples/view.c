@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "olat.h"
+#include "picture.h"
 #include "view.h"
 
 static volatile sig_atomic_t ended;
@@ -30,14 +31,18 @@ int main(int argc, char **argv) {
             s.port = (int)strtol(argv[++i], &rest, 10);
             if (*rest || s.port < 1 || s.port > 65535) return usage();
         } else if (!strcmp(argv[i], "--page") && i + 1 < argc) snprintf(page, sizeof page, "%s", argv[++i]);
-        else if (argv[i][0] != '-' && s.count < VIEW__MODELS) s.names[s.count++] = argv[i];
+        else if (argv[i][0] != '-' && s.show.count < VIEW__MODELS) s.show.names[s.show.count++] = argv[i];
         else return usage();
     }
-    if (!s.count) return usage();
-    ssdgs_result result = ssdgs_context_create(NULL, &s.context);
-    for (int i = 0; i < s.count && !result; i++)
-        result = ssdgs_model_load(s.context, s.names[i], s.models + i, NULL);
-    if (!result) result = view_arrange(&s);
+    if (!s.show.count) return usage();
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.tracer.stage = view_stage;
+    desc.tracer.user = &s.show;
+    ssdgs_result result = ssdgs_context_create(&desc, &s.show.context);
+    for (int i = 0; i < s.show.count && !result; i++)
+        result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, NULL);
+    if (!result) result = view_arrange(&s.show);
     if (!result) failed = view_open(&s, page, error);
     if (!result && !failed) {
         signal(SIGINT, end);
@@ -48,9 +53,9 @@ int main(int argc, char **argv) {
     }
     if (failed) fprintf(stderr, "view: %s\n", error);
     if (result)
-        fprintf(stderr, "view: %s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s.context));
+        fprintf(stderr, "view: %s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s.show.context));
     view_close(&s);
-    for (int i = 0; i < s.count; i++) ssdgs_model_destroy(s.models[i]);
-    ssdgs_context_destroy(s.context);
+    for (int i = 0; i < s.show.count; i++) ssdgs_model_destroy(s.show.models[i]);
+    ssdgs_context_destroy(s.show.context);
     return failed || result;
 }

@@ -1,7 +1,7 @@
 // usage: node browser.js BUILD [CHROMIUM]: examples/view.html in headless Chromium, by its debugging pipe: what the canvas shows is
 // what the server draws, and mouse, keys and buttons change it. Pictures go to BUILD/browser. Closes with "N passed, N failed".
 'use strict'
-const { spawn } = require('child_process'), fs = require('fs'), os = require('os'), path = require('path')
+const { spawn } = require('child_process'), fs = require('fs'), http = require('http'), os = require('os'), path = require('path')
 const build = process.argv[2], folder = path.join(build, 'browser'), home = fs.mkdtempSync(path.join(os.tmpdir(), 'ssdgs-'))
 let passed = 0, failed = 0
 const check = (name, ok) => { if (ok) passed++; else failed++, console.log('failed: ' + name) }
@@ -16,7 +16,7 @@ const end = code => {
     server.kill('SIGINT')
     setTimeout(() => { fs.rmSync(home, { recursive: true, force: true }); process.exit(code) }, 500)
 }
-setTimeout(() => { console.log('failed: three minutes are over'); end(1) }, 180000).unref()
+setTimeout(() => { console.log('failed: five minutes are over'); end(1) }, 300000).unref()
 
 const waiting = new Map()
 let said = '', number = 0, session
@@ -33,6 +33,7 @@ const send = (method, params = {}) => new Promise((...done) => {
     waiting.set(++number, done)
     browser.stdio[3].write(JSON.stringify({ id: number, method, params, sessionId: session }) + '\0')
 })
+const ink = 'canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data'
 const ask = async expression => {
     const reply = await send('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true })
     if (reply.exceptionDetails) throw new Error(expression + ': ' + JSON.stringify(reply.exceptionDetails.exception || reply.exceptionDetails.text))
@@ -47,7 +48,7 @@ const rest = async () => {
 }
 // the sum of the canvas's bytes, and how many of them differ from the server's picture of the same wish
 const pixels = () => ask(`(async () => {
-    const mine = ink.getImageData(0, 0, canvas.width, canvas.height).data
+    const mine = ${ink}
     const reply = await fetch('/picture?' + wish(true).query), theirs = new Uint8Array(await reply.arrayBuffer())
     let sum = 0, other = mine.length == theirs.length ? 0 : 1e9
     for (let i = 0; i < mine.length; i++) sum += mine[i] * (i % 251), other += mine[i] != theirs[i]
@@ -69,20 +70,43 @@ const resize = async (width, height) => {
     await sleep(200)
 }
 
-const test = async () => {
+// opens a page, and waits for its first picture
+const open = async (name, url) => {
+    await send('Page.navigate', { url: 'about:blank' })
+    const begun = Date.now()
+    await send('Page.navigate', { url })
+    for (let tries = 0; tries < 500 && !await ask('typeof shown == "string" && shown != ""').catch(() => false); tries++) await sleep(20)
+    console.log(`figure view_${name}_first_picture_ms ${Date.now() - begun}`)
+}
+const moves = async name => {
+    const [frames, slowest] = await ask(`new Promise(done => {
+        let n = 0, seen = shown, last = performance.now(), slowest = 0
+        const until = last + 3000, count = now => {
+            turn(0.01, 0)
+            if (shown != seen) n++, seen = shown, slowest = Math.max(slowest, now - last), last = now
+            now < until ? requestAnimationFrame(count) : done([n / 3, slowest])
+        }
+        requestAnimationFrame(count)
+    })`)
+    console.log(`figure view_${name}_frames_per_second ${frames.toFixed(1)} at ${await ask('canvas.width + "x" + canvas.height')}, the slowest after ${slowest.toFixed(0)} ms`)
+    check(`${name}: moves`, frames > 5)
+    check(`${name}: comes to rest again`, await rest())
+}
+const served = async () => {
     const address = await new Promise(done => server.stdout.once('data', text => done(String(text).trim())))
     check('the address: ' + address, /^http:\/\/127\.0\.0\.1:\d+$/.test(address))
     const { targetId } = await send('Target.createTarget', { url: 'about:blank' })
     session = (await send('Target.attachToTarget', { targetId, flatten: true })).sessionId
     await resize(960, 600)
-    const begun = Date.now()
-    await send('Page.navigate', { url: address })
-    for (let tries = 0; tries < 100 && !await ask('typeof shown == "string" && shown != ""').catch(() => false); tries++) await sleep(20)
-    console.log(`figure view_first_picture_ms ${Date.now() - begun}`)
+    await open('served', address)
     check('comes to rest', await rest())
     let last = await pixels()
     check('the first picture is the server\'s', last[0] > 0 && last[1] == 0)
     await picture('first')
+    await like_relight('served')
+    await ask('$("reset").click()')
+    await rest()
+    last = await pixels()
     const step = async (name, action, moves) => {
         const before = await ask('$("text").value')
         await action()
@@ -107,11 +131,7 @@ const test = async () => {
     await step('strength', () => ask('$("strength").value = 1; $("strength").dispatchEvent(new Event("input"))'), 'light')
     for (const name of ['diffuse', 'specular', 'scattering', 'shadow', 'normal', 'depth', 'alpha', 'color'])
         await step(name, () => ask(`[...$("strip").children].find(b => b.textContent == "${name}").click()`))
-    // while something moves
-    const frames = ask('new Promise(done => { let n = 0, seen = shown; const until = performance.now() + 2000, count = () => { turn(0.01, 0); n += shown != seen; seen = shown; performance.now() < until ? requestAnimationFrame(count) : done(n / 2) }; count() })')
-    console.log(`figure view_frames_per_second ${await frames}`)
-    check('moves', await frames > 5)
-    check('comes to rest again', await rest())
+    await moves('served')
     for (const [width, height] of [[360, 640], [2560, 1440]]) {
         await resize(width, height)
         check(width + ' pixels: comes to rest', await rest())
@@ -119,6 +139,7 @@ const test = async () => {
         check(width + ' pixels: the server\'s picture', (await pixels())[1] == 0)
         await picture('wide_' + width)
     }
+    check('bars of the stages', await ask('[...$("stages").children].map(row => row.firstChild.textContent).join()') === 'project,sort,bin,walk,shade,composite,picture')
     check('every control has a name', await ask('[...document.querySelectorAll("input, select, textarea, button, canvas")].every(e => e.labels && e.labels.length || e.getAttribute("aria-label") || e.textContent.trim())'))
     check('no problem', await ask('$("problem").textContent') === '')
     server.kill('SIGINT')
@@ -128,7 +149,7 @@ const test = async () => {
     check('the page says that nobody answers', /^No picture/.test(await ask('$("problem").textContent')))
 }
 // a model as it trains: its pictures follow, the page makes it wait and go on
-const watch = async () => {
+const trained = async () => {
     const trainer = spawn(path.join(build, 'train'), ['examples/data/waxcow', '-o', path.join(folder, 'trained.ply'), '--iterations', '100000', '--threads', '1', '--view'])
     let told = ''
     trainer.stderr.on('data', text => told += text)
@@ -142,7 +163,10 @@ const watch = async () => {
         return false
     }
     check('a curve and a picture', await until('curve.length > 4 && shown != "" && curve[curve.length - 1][0] > curve[0][0]'))
-    check('a picture of something', await until('ink.getImageData(0, 0, canvas.width, canvas.height).data.some((v, i) => i % 4 < 3 && v > 60)'))
+    check('a picture of something', await until(`${ink}.some((v, i) => i % 4 < 3 && v > 60)`))
+    check('a photograph beside the model', await until('$("photograph").width == 256 && $("photograph").height == 128'))
+    await ask('$("later").click()')
+    check('the next photograph', await until('/^photograph 2 of [0-9]+,/.test($("which").textContent)'))
     await ask('$("pause").click()')
     check('pause', await until('$("pause").textContent == "go on"'))
     const at = await ask('fetch("/models").then(r => r.json()).then(m => m.iteration)')
@@ -155,7 +179,96 @@ const watch = async () => {
     check('Ctrl-C stops the training', await new Promise(done => trainer.once('exit', code => done(code === 130))))
     check('the page says so', await until('/ended/.test($("progress").textContent)'))
 }
-test().then(watch).catch(error => check(error.stack, false)).then(() => {
+// what build/relight makes of a query, as the page's browser reads it, and the most and mean difference of the page's own picture where
+// the model is opaque: over the ground relight blends stored values, as photographs are, and the page light
+const beside = async query => {
+    const value = key => query.match(new RegExp(`${key}=([^&]*)`))[1].split(',').map(Number)
+    const about = await ask('about'), [w] = value('w'), [h] = value('h'), eye = value('eye'), target = value('target'), light = value('light')
+    const minus = (a, b) => a.map((x, c) => x - b[c]), dot = (a, b) => a.reduce((sum, x, c) => sum + x * b[c], 0)
+    const unit = a => a.map(x => x / Math.sqrt(dot(a, a))), cross = (a, b) => [0, 1, 2].map(c => a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
+    const back = unit(minus(eye, target)), right = unit(cross([0, 0, 1], back)), up = cross(back, right), from = minus(light.slice(0, 3), about.middle)
+    const frame = { file_path: './relit', transform_matrix: [0, 1, 2].map(c => [right[c], up[c], back[c], eye[c]]).concat([[0, 0, 0, 1]]),
+        pl_pos: light.slice(0, 3), pl_intensity: light.slice(3).map(x => x * dot(from, from) / about.light_scale) }
+    fs.writeFileSync(path.join(folder, 'transforms_valid.json'), JSON.stringify({ camera_angle_x: value('angle')[0], w, h, frames: [frame] }))
+    const relight = spawn(path.join(build, 'relight'), ['examples/data/waxcow.ply', folder, '--split', 'valid', '--out', path.join(folder, 'relit'), '--isa', 'sse2'])
+    if (await new Promise(done => relight.once('exit', done)) !== 0) return [255, 255]
+    const png = fs.readFileSync(path.join(folder, 'relit', 'relit.png')).toString('base64')
+    return ask(`(async () => {
+        const image = new Image(), other = document.createElement('canvas'), pen = other.getContext('2d')
+        image.src = 'data:image/png;base64,${png}'
+        await image.decode()
+        other.width = ${w}, other.height = ${h}
+        pen.drawImage(image, 0, 0)
+        const theirs = pen.getImageData(0, 0, ${w}, ${h}).data, mine = (await source.picture('picture', '${query}')).pixels
+        const alpha = (await source.picture('picture', '${query.replace('plane=color', 'plane=alpha')}')).pixels
+        let most = 0, sum = 0, count = 0
+        for (let i = 0; i < mine.length; i++)
+            if (alpha[i - i % 4] == 255) { const d = Math.abs(mine[i] - theirs[i]); count++, sum += d, most = Math.max(most, d) }
+        return count > 10000 ? [most, sum / count] : [255, 255]
+    })()`)
+}
+const like_relight = async name => {
+    for (const preset of ['default', 'preview']) {
+        await ask('$("ambient").value = 0, touch()')
+        const [most, mean] = await beside((await ask('wish(true).query')).replace('exact', preset)), bounds = preset === 'default' ? [1, 0.15] : [30, 0.7]
+        console.log(`figure view_${name}_${preset}_from_relight ${most} ${mean.toPrecision(3)}`)
+        check(`${name}, ${preset}: build/relight's picture`, most <= bounds[0] && mean <= bounds[1])
+    }
+}
+// the page that needs no server: from a file, and from a host that isolates it, where it has threads
+const alone = async () => {
+    const page = path.join(build, 'view.html')
+    if (!fs.existsSync(page)) return console.log('build/view.html is missing, as emscripten is: the page without a server not tested')
+    const native = spawn(path.join(build, 'view'), ['examples/data/waxcow.ply', '--page', 'examples/view.html'])
+    const address = await new Promise(done => native.stdout.once('data', text => done(String(text).trim())))
+    const host = http.createServer((request, reply) => {
+        reply.writeHead(200, { 'Content-Type': 'text/html', 'Cross-Origin-Opener-Policy': 'same-origin', 'Cross-Origin-Embedder-Policy': 'require-corp' })
+        reply.end(fs.readFileSync(page))
+    }).listen(0, '127.0.0.1')
+    await new Promise(done => host.once('listening', done))
+    console.log(`figure view_page_bytes ${fs.statSync(page).size}`)
+    console.log(`figure view_code_bytes ${fs.statSync(path.join(build, 'web.wasm')).size}`)
+    check('code below 400 KB', fs.statSync(path.join(build, 'web.wasm')).size < 400000)
+    await resize(960, 600)
+    const drawn = { file: {}, isolated: {} }
+    for (const [name, url] of [['file', 'file://' + path.resolve(page)], ['isolated', `http://127.0.0.1:${host.address().port}/`]]) {
+        await open(name, url)
+        check(`${name}: isolated or not`, await ask('crossOriginIsolated') === (name === 'isolated'))
+        for (const plane of ['diffuse', 'specular', 'scattering', 'shadow', 'normal', 'depth', 'alpha', 'color']) {
+            await ask(`[...$("strip").children].find(b => b.textContent == "${plane}").click()`)
+            check(`${name}, ${plane}: comes to rest`, await rest())
+            const mine = drawn[name][plane] = Buffer.from(await ask(`(() => { let text = ''; for (const v of ${ink}) text += String.fromCharCode(v); return btoa(text) })()`), 'base64')
+            const theirs = Buffer.from(await (await fetch(`${address}/picture?${await ask('wish(true).query')}`)).arrayBuffer())
+            let most = 0, other = 0
+            for (let i = 0; i < mine.length; i++) most = Math.max(most, Math.abs(mine[i] - theirs[i])), other += mine[i] !== theirs[i]
+            check(`${name}, ${plane}: the server's picture but for rounding, not ${other} values by ${most}`, mine.length === theirs.length && most <= 3 && other < 1e-4 * mine.length)
+        }
+        await like_relight(name)
+        await moves(name)
+        await picture('alone_' + name)
+    }
+    for (const plane in drawn.file) check(`${plane}: the same bytes with threads`, drawn.file[plane].equals(drawn.isolated[plane]))
+    // files are dropped on it
+    const drop = (name, bytes) => ask(`(async () => {
+        const files = new DataTransfer(), bytes = Uint8Array.from(atob('${bytes.toString('base64')}'), c => c.charCodeAt(0))
+        files.items.add(new File([bytes], '${name}'))
+        dispatchEvent(new DragEvent('drop', { dataTransfer: files, cancelable: true }))
+    })()`)
+    const says = async (what, like) => {
+        for (let tries = 0; tries < 60; tries++, await sleep(50)) if (like.test(await ask(what))) return true
+        return false
+    }
+    await drop('broken.ply', Buffer.from('ply\nformat nonsense\n'))
+    check('a file that is no model: the page says why', await says('$("problem").textContent', /byte|line|format/))
+    check('and keeps its model', await says('$("name").textContent', /^waxcow.ply, 2500 /) && await rest())
+    await drop('plain.ply', Buffer.from('ply\nformat ascii 1.0\nelement vertex 1\n' + ['x', 'y', 'z', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3', 'opacity', 'f_dc_0', 'f_dc_1', 'f_dc_2']
+        .map(name => `property float ${name}\n`).join('') + 'end_header\n0 0 0 -1 -1 -1 1 0 0 0 4 1 1 1\n'))
+    check('a model that is dropped', await says('$("name").textContent', /^plain.ply, 1 Gaussian/) && await rest())
+    await picture('dropped')
+    host.close()
+    native.kill('SIGINT')
+}
+served().then(alone).then(trained).catch(error => check(error.stack, false)).then(() => {
     console.log(`${passed} passed, ${failed} failed`)
     end(failed ? 1 : 0)
 })

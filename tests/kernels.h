@@ -19,6 +19,8 @@
 #define ssdgs__srgb_encode_sse2 test_kernels_sse2->srgb_encode
 #elif SSDGS__ISA == SSDGS__ISA_NEON
 #define ssdgs__srgb_encode_neon test_kernels_neon->srgb_encode
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+#define ssdgs__srgb_encode_wasm test_kernels_wasm->srgb_encode
 #endif
 #endif
 
@@ -37,5 +39,8 @@ KERNELS(avx512)
 #elif SSDGS__ISA == SSDGS__ISA_NEON
 KERNELS(neon)
 #define ssdgs__kernels_neon (*test_kernels_neon)
+#elif SSDGS__ISA == SSDGS__ISA_WASM
+KERNELS(wasm)
+#define ssdgs__kernels_wasm (*test_kernels_wasm)
 #endif
 #undef KERNELS

@@ -76,7 +76,10 @@ for machine in aarch64:linux-gnu arm:linux-gnueabihf riscv64:linux-gnu s390x:lin
     row "${machine%%:*}" "qemu-$emulator" "$few" "${machine%%:*}-${machine##*:}-gcc -static" -O2
 done
 export NODE_PATH="${NODE_PATH-/usr/share/nodejs}" # where Debian's emcc has its modules, should node be another's
-row emscripten 'node --no-experimental-fetch' 't_golden t_fast t_brute' emcc '-O2 -s NODERAWFS=1 -s ALLOW_MEMORY_GROWTH=1'
+for level in -O2 '-O2 -msimd128' '-O3 -msimd128' '-Os -msimd128' '-O2 -msimd128 -DSSDGS_NO_SIMD' '-O2 -msimd128 -ffast-math'; do
+    row "emscripten$(echo "$level" | tr -d ' ' | sed 's/-DSSDGS_NO_SIMD/-scalar/')" 'node --no-experimental-fetch' 't_golden t_fast t_brute' emcc \
+        "$level -s NODERAWFS=1 -s ALLOW_MEMORY_GROWTH=1"
+done
 sort "$build/matrix/hashes" | awk '{ key = $1 " FMA " $2 " " $3 " " $4; if (key != last) printf "%shash %s:", last ? "\n" : "", key; last = key; printf " %s", $5 }
     END { if (NR) print "" }'
 echo "figure compilers_passed $good"

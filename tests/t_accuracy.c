@@ -99,6 +99,12 @@ static const ssdgs__kernels *k;
 #else
 #define OF_NEON(f, rest)
 #endif
+#if SSDGS__WASM
+#define OF_WASM(f, rest) \
+    if (isa == SSDGS_ISA_WASM) f##_wasm rest
+#else
+#define OF_WASM(f, rest)
+#endif
 #define OF_ISA(f, rest) \
     do { \
         OF_SCALAR(f, rest); \
@@ -106,6 +112,7 @@ static const ssdgs__kernels *k;
         OF_AVX2(f, rest); \
         OF_AVX512(f, rest); \
         OF_NEON(f, rest); \
+        OF_WASM(f, rest); \
     } while (0)
 
 static const char *isa_name(void) { return ssdgs_isa_string((ssdgs_isa)isa); }

@@ -137,8 +137,13 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     CHECK(!strcmp(before, message)); /* what is being told stays */
 }
 
+static void trace(void *user, const char *name) {
+    (void)user, (void)name;
+    call_everything();
+}
+
 static void test_from_within(void) {
-    for (int from = 0; from < 4; from++)
+    for (int from = 0; from < 5; from++)
         for (int with_trainer = 0; with_trainer < 2; with_trainer++) {
             ssdgs_context_desc desc;
             ssdgs_real bad = photo.camera.near_plane;
@@ -151,6 +156,7 @@ static void test_from_within(void) {
             if (from == 1) desc.parallel.run = run;
             if (from == 2) desc.allocator.allocate = allocate, desc.allocator.release = release;
             if (from == 3) desc.logger.write = hear;
+            if (from == 4) desc.tracer.stage = trace;
             set_up(&desc, with_trainer);
             all.tries = all.calls = 0;
             if (from == 3) { /* makes the log hear something */
@@ -163,12 +169,40 @@ static void test_from_within(void) {
             if (!CHECK(all.tries > 0 && all.calls == all.tries))
                 printf("    %d: %d of %d refused\n", from, all.calls, all.tries);
             CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image)); /* all are still there */
-            if (from < 2)
+            if (from < 2 || from == 4)
                 CHECK(strstr(ssdgs_error_message(all.context),
                              "ssdgs_context_destroy: another call on this context is at work") != NULL);
             all.depth = 1;
             tear_down();
         }
+}
+
+/* ---- what a tracer hears ---- */
+
+static void note_stage(void *user, const char *name) {
+    char *heard = (char *)user;
+    const size_t length = strlen(heard);
+    snprintf(heard + length, 1024 - length, "%s", name ? name : ". ");
+}
+
+/* Every stage in order, each closed before the next; frames that keep all but the last stages as well. */
+static void test_tracer(void) {
+    static const char rendered[] = "project. sort. bin. walk. shade. composite. ";
+    char heard[1024] = "", trained[1024];
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.tracer.stage = note_stage;
+    desc.tracer.user = heard;
+    set_up(&desc, 1);
+    CHECK(!*heard);
+    for (int i = 0; i < 2; i++, *heard = 0)
+        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) && !strcmp(heard, rendered));
+    *trained = 0;
+    for (int i = 0; i < 3; i++)
+        snprintf(trained + strlen(trained), sizeof trained - strlen(trained),
+                 "%scomposite backward. shade backward. project backward. ", rendered);
+    CHECK(!ssdgs_trainer_run(all.trainer, NULL, NULL) && !strcmp(heard, trained));
+    tear_down();
 }
 
 /* ---- the progress callback ---- */
@@ -597,6 +631,7 @@ static void test_pixels(void) {
 
 int main(void) {
     test_from_within();
+    test_tracer();
     test_progress();
     test_order();
     test_fork();

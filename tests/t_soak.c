@@ -28,7 +28,12 @@ static int locked_check(int ok, int line, const char *what) {
 
 enum { PHOTOS = 6, SIDE = 24, LARGEST = SIDE * SIDE, TRUTH = 60 };
 /* an instruction set that every CPU has */
-enum { PLAIN = SSDGS__SCALAR ? SSDGS_ISA_SCALAR : SSDGS__NEON ? SSDGS_ISA_NEON : SSDGS_ISA_SSE2 };
+enum {
+    PLAIN = SSDGS__SCALAR ? SSDGS_ISA_SCALAR
+            : SSDGS__NEON ? SSDGS_ISA_NEON
+            : SSDGS__WASM ? SSDGS_ISA_WASM
+                          : SSDGS_ISA_SSE2
+};
 #ifdef __TINYC__
 enum { SLOW = 4 }; /* no optimiser: shorter runs */
 #else

@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "../examples/olat.h"
+#include "../examples/picture.h"
 #include "../examples/view.h"
 #include "test.h"
 #ifdef _WIN32
@@ -24,8 +25,12 @@ static void make_model(void) {
     ssdgs_settings settings = ssdgs_settings_default();
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     settings.shadow.layers = 0;
-    CHECK(!ssdgs_context_create(NULL, &here.context));
-    CHECK(!ssdgs_model_create(here.context, &settings, 24, here.models));
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.tracer.stage = view_stage;
+    desc.tracer.user = &here.show;
+    CHECK(!ssdgs_context_create(&desc, &here.show.context));
+    CHECK(!ssdgs_model_create(here.show.context, &settings, 24, here.show.models));
     for (int i = 0; i < 24; i++) {
         ssdgs_gaussian g = ssdgs_gaussian_default();
         const float turn = 2.4f * (float)i, z = 1 - (float)(2 * i + 1) / 24, across = sqrtf(1 - z * z);
@@ -33,7 +38,7 @@ static void make_model(void) {
         g.position[2] = 0.4f * z;
         for (int c = 0; c < 3; c++) g.scale[c] = 0.1f, g.normal[c] = g.position[c];
         g.opacity = 0.8f;
-        CHECK(!ssdgs_model_set(here.models[0], i, &g));
+        CHECK(!ssdgs_model_set(here.show.models[0], i, &g));
     }
 }
 
@@ -155,6 +160,10 @@ static void test_answers(void) {
                "\"name\":\"a?b.ply\",\"gaussians\":24") == 200);
     CHECK(asks("GET /picture?w=16&h=16 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", NULL) == 200);
     CHECK(asks("GET /picture?w=3 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "no such wish: w=3") == 400);
+    CHECK(asks("GET /photograph?1 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", NULL) == 200);
+    CHECK(asks("GET /photograph?2 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "no such photograph") == 404);
+    CHECK(asks("GET /photograph HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "no such photograph") == 404);
+    CHECK(asks("GET /photograph?-1 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "no such photograph") == 404);
     CHECK(asks("GET /../view.c HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "nothing here") == 404);
     CHECK(asks("GET /etc/passwd HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "nothing here") == 404);
     CHECK(asks("GET / HTTP/1.1\r\n\r\n", "another host") == 403);
@@ -193,6 +202,11 @@ static void test_pictures(pthread_t server) {
     close(s);
     ended = 1; /* the library is this thread's now */
     pthread_join(server, NULL);
+    static const char *const stages[] = {"project", "sort", "bin", "walk", "shade", "composite"};
+    for (int i = 0; i < 6; i++)
+        CHECK(here.show.stages[i].name && !strcmp(here.show.stages[i].name, stages[i]) &&
+              here.show.stages[i].seconds >= 0 && here.show.stages[i].seconds < 60);
+    CHECK(!here.show.stages[6].name && !here.show.stage);
     const float eye[3] = {0, -2, 0.5f}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, 48, 32);
     ssdgs_light light;
@@ -205,10 +219,10 @@ static void test_pictures(pthread_t server) {
     const float at[3] = {1, -2, 2};
     for (int c = 0; c < 3; c++) {
         light.position[c] = at[c];
-        distance2 += (at[c] - here.middle[c]) * (at[c] - here.middle[c]);
+        distance2 += (at[c] - here.show.middle[c]) * (at[c] - here.show.middle[c]);
     }
     for (int c = 0; c < 3; c++) light.intensity[c] = (float)(3 - c) * distance2;
-    CHECK(!ssdgs_render(here.models[0], &camera, &light, 1, &image));
+    CHECK(!ssdgs_render(here.show.models[0], &camera, &light, 1, &image));
     int worst = 0, brightest = 0;
     for (int i = 0; i < 48 * 32; i++)
         for (int c = 0; c < 3; c++) {
@@ -275,33 +289,86 @@ static void test_trouble(void) {
 static void test_pause(void) {
     CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
                "GET alone") == 405);
-    here.training.on = 1;
-    here.training.iteration = 7;
+    here.show.training.on = 1;
+    here.show.training.iteration = 7;
     CHECK(asks("GET /models HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n",
-               "\"training\":true,\"paused\":false,\"iteration\":7") == 200);
+               "\"training\":true,\"paused\":false,\"photographs\":2,\"iteration\":7") == 200);
     CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "GET alone") == 405 &&
-          !here.training.paused);
+          !here.show.training.paused);
     CHECK(asks("GET /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
                NULL) == 404);
     CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nOrigin: http://evil\r\n\r\n", NULL) == 403 &&
-          !here.training.paused);
+          !here.show.training.paused);
     CHECK(asks("POST /pause HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
                "\"paused\":true") == 200);
-    CHECK(here.training.paused);
+    CHECK(here.show.training.paused);
     CHECK(asks("POST /go-on HTTP/1.1\r\nHost: 127.0.0.1:%1$d\r\nOrigin: http://127.0.0.1:%1$d\r\n\r\n",
                "\"paused\":false") == 200);
-    CHECK(!here.training.paused);
-    here.training.on = 0;
+    CHECK(!here.show.training.paused);
+    here.show.training.on = 0;
+}
+
+enum { WIDE = 8, HIGH = 6, PIXELS = WIDE * HIGH };
+static unsigned char bytes[4 * PIXELS];
+static uint16_t words[4 * PIXELS];
+static ssdgs_photo photos[2]; /* the same, in bytes and in words */
+static void make_photos(void) {
+    const float eye[3] = {0, -2, 0.5f}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    for (int i = 0; i < 4 * PIXELS; i++) {
+        bytes[i] = (unsigned char)(i * 37 % 256);
+        words[i] = (uint16_t)(bytes[i] << 8 | 200);
+    }
+    for (int i = 0; i < 2; i++) {
+        photos[i].camera = ssdgs_camera_look_at(eye, target, up, 0.6f, WIDE, HIGH);
+        photos[i].light.position[1] = -3;
+        for (int c = 0; c < 3; c++) photos[i].light.intensity[c] = 9;
+        photos[i].pixels = i ? (const void *)words : (const void *)bytes;
+        photos[i].format = i ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
+    }
+    here.show.training.photos = photos;
+    here.show.training.count = 2;
+}
+
+/* Both photographs over black, each with its rendering, once no server is at work. */
+static void test_photographs(void) {
+    static float color[3 * PIXELS], alpha[PIXELS];
+    const float black[3] = {0, 0, 0};
+    char note[256];
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    image.alpha = alpha;
+    CHECK(!ssdgs_render(here.show.models[0], &photos[0].camera, &photos[0].light, 1, &image));
+    ssdgs_compose(color, alpha, PIXELS, ssdgs_model_settings(here.show.models[0])->transfer, black, color);
+    for (int number = 0; number < 2; number++) {
+        size_t size = 0;
+        int wrong = 0, bright = 0;
+        CHECK(!view__photograph(&here.show, number, &size, note, sizeof note) && size == 8 * PIXELS);
+        CHECK(!strcmp(note, "{\"w\":16,\"h\":6}"));
+        for (int y = 0; y < HIGH; y++)
+            for (int x = 0; x < WIDE; x++)
+                for (int c = 0; c < 4; c++) {
+                    const unsigned char *row = here.show.bytes + (size_t)y * 8 * WIDE;
+                    const int at = y * WIDE + x;
+                    const double photo = c < 3 ? bytes[4 * at + c] * bytes[4 * at + 3] / 255.0 : 255;
+                    const double render = c < 3 ? 255 * fmin(1, (double)color[3 * at + c]) : 255;
+                    wrong += !(fabs(row[4 * x + c] - photo) <= 1);
+                    wrong += !(fabs(row[4 * (WIDE + x) + c] - render) <= 1);
+                    bright += c < 3 && row[4 * (WIDE + x) + c] > 60;
+                }
+        CHECK(!wrong && bright > 10);
+    }
 }
 
 int main(void) {
     static const char page[] = "build/t_view.html";
     char error[512] = "";
     pthread_t thread;
-    here.count = 1;
-    here.names[0] = "folder/a\"b.ply";
+    here.show.count = 1;
+    here.show.names[0] = "folder/a\"b.ply";
     make_model();
-    CHECK(!view_arrange(&here));
+    make_photos();
+    CHECK(!view_arrange(&here.show));
     test_wishes();
     CHECK(view_open(&here, "build/no/such/page", error) && strstr(error, "no/such/page"));
     view_close(&here);
@@ -314,9 +381,10 @@ int main(void) {
     test_pause();
     test_trouble();
     test_pictures(thread);
+    test_photographs();
     view_close(&here);
-    ssdgs_model_destroy(here.models[0]);
-    ssdgs_context_destroy(here.context);
+    ssdgs_model_destroy(here.show.models[0]);
+    ssdgs_context_destroy(here.show.context);
     TEST_END();
 }
 #endif
