@@ -276,6 +276,10 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
 /* Gives back the memory that frames and training have left for the next; those that follow take it anew. What
    models and scenes keep stays theirs. */
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context);
+/* Runs task(data, 0) .. task(data, count - 1) on the context's threads, in any order, for what a program has
+   to do beside: it returns when all are done. Tasks may not call into the context. */
+SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
+                                         void (*task)(void *data, int index), void *data);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
 SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
@@ -606,12 +610,15 @@ SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, s
 
 typedef enum ssdgs_pixels {
     SSDGS_PIXELS_RGBA8 = 0,
-    SSDGS_PIXELS_RGBA16
-} ssdgs_pixels; /* 16: native-endian */
+    SSDGS_PIXELS_RGBA16,  /* native-endian, as all that follow */
+    SSDGS_PIXELS_RGBA16F, /* halves and floats are linear light, which may exceed 1; settings.transfer encodes
+                             it */
+    SSDGS_PIXELS_RGBA32F
+} ssdgs_pixels;
 typedef struct ssdgs_photo {
     ssdgs_camera camera;
     ssdgs_light light;
-    const void *pixels; /* (h,w,4) packed, straight alpha, stored values; must outlive the trainer */
+    const void *pixels; /* (h,w,4) packed, straight alpha; must outlive the trainer */
     ssdgs_pixels format;
 } ssdgs_photo;
 
@@ -2083,6 +2090,16 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
     if (count < 1) return;
     if (job.groups == count) context->parallel.run(context->parallel.user, count, task, data);
     else context->parallel.run(context->parallel.user, job.groups, ssdgs__group_task, &job);
+}
+
+SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
+                                         void (*task)(void *data, int index), void *data) {
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(context, "ssdgs_context_run");
+    if (result) return result;
+    if (!task && count > 0) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_context_run", "task"));
+    ssdgs__parallel(context, count, task, data);
+    return ssdgs__leave(context, SSDGS_OK);
 }
 
 /* ==== >>cpu  which tables this machine can run ==== */
@@ -9252,37 +9269,60 @@ static double ssdgs__group_rate(const ssdgs_trainer *trainer, int group, double 
 
 /* ---- one photograph ---- */
 
+static int ssdgs__is_light(const ssdgs_photo *photo) {
+    return photo->format == SSDGS_PIXELS_RGBA16F || photo->format == SSDGS_PIXELS_RGBA32F;
+}
+
+/* A number as it is in memory, bytes and words from 0 to 1. */
+static ssdgs_real ssdgs__photo_number(const ssdgs_photo *photo, size_t at) {
+    switch (photo->format) {
+    case SSDGS_PIXELS_RGBA8:
+        return (ssdgs_real)(1.0 / 255) * (ssdgs_real)((const uint8_t *)photo->pixels)[at];
+    case SSDGS_PIXELS_RGBA16:
+        return (ssdgs_real)(1.0 / 65535) * (ssdgs_real)((const uint16_t *)photo->pixels)[at];
+    case SSDGS_PIXELS_RGBA16F: return (ssdgs_real)ssdgs__from_half(((const uint16_t *)photo->pixels)[at]);
+    default: return (ssdgs_real)((const float *)photo->pixels)[at];
+    }
+}
+
 /* A stored value, 3: alpha. */
-static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, size_t pixel, int c) {
-    return photo->format == SSDGS_PIXELS_RGBA8
-               ? (ssdgs_real)(1.0 / 255) * (ssdgs_real)((const uint8_t *)photo->pixels)[4 * pixel + (size_t)c]
-               : (ssdgs_real)(1.0 / 65535) *
-                     (ssdgs_real)((const uint16_t *)photo->pixels)[4 * pixel + (size_t)c];
+static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, int transfer, size_t pixel, int c) {
+    const ssdgs_real number = ssdgs__photo_number(photo, 4 * pixel + (size_t)c);
+    return c < 3 && transfer == SSDGS_TRANSFER_SRGB && ssdgs__is_light(photo) ? ssdgs_srgb_encode(number)
+                                                                              : number;
 }
 
 /* A pixel's stored values on the background. */
-static void ssdgs__photo_pixel(const ssdgs_photo *photo, const ssdgs_real background[3], size_t pixel,
-                               ssdgs_real value[3]) {
-    const ssdgs_real alpha = ssdgs__photo_value(photo, pixel, 3);
+static void ssdgs__photo_pixel(const ssdgs_photo *photo, int transfer, const ssdgs_real background[3],
+                               size_t pixel, ssdgs_real value[3]) {
+    const ssdgs_real alpha = ssdgs__photo_value(photo, transfer, pixel, 3);
     for (int c = 0; c < 3; c++)
-        value[c] = alpha * ssdgs__photo_value(photo, pixel, c) + (1 - alpha) * background[c];
+        value[c] = alpha * ssdgs__photo_value(photo, transfer, pixel, c) + (1 - alpha) * background[c];
 }
 
 /* Those of pixels begin .. end, as planes. */
-static void ssdgs__photo_planes(const ssdgs_photo *photo, const ssdgs_real background[3], size_t begin,
-                                size_t end, ssdgs_real *planes) {
+static void ssdgs__photo_planes(const ssdgs__kernels *k, const ssdgs_photo *photo, int transfer,
+                                const ssdgs_real background[3], size_t begin, size_t end,
+                                ssdgs_real *planes) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    for (size_t i = begin; i < end; i++) {
-        ssdgs_real value[3];
-        ssdgs__photo_pixel(photo, background, i, value);
-        for (size_t c = 0; c < 3; c++) planes[pixels * c + i] = value[c];
-    }
+    const int encodes = transfer == SSDGS_TRANSFER_SRGB && ssdgs__is_light(photo);
+    for (size_t c = 0; c < 3; c++)
+        for (size_t first = begin; first < end; first += SSDGS__BLOCK) {
+            ssdgs_real value[SSDGS__BLOCK];
+            const size_t n = first + SSDGS__BLOCK < end ? SSDGS__BLOCK : end - first;
+            for (size_t i = 0; i < SSDGS__BLOCK; i++)
+                value[i] = i < n ? ssdgs__photo_number(photo, 4 * (first + i) + c) : 0;
+            if (encodes) k->srgb_encode(value, NULL, value, SSDGS__BLOCK);
+            for (size_t i = 0; i < n; i++) {
+                const ssdgs_real alpha = ssdgs__photo_number(photo, 4 * (first + i) + 3);
+                planes[pixels * c + first + i] = alpha * value[i] + (1 - alpha) * background[c];
+            }
+        }
 }
 
 /* 0 .. 65535, in steps of 257 where values are bytes. */
 static int ssdgs__photo_alpha(const ssdgs_photo *photo, size_t pixel) {
-    return photo->format == SSDGS_PIXELS_RGBA8 ? 257 * ((const uint8_t *)photo->pixels)[4 * pixel + 3]
-                                               : ((const uint16_t *)photo->pixels)[4 * pixel + 3];
+    return (int)(65535 * ssdgs__photo_number(photo, 4 * pixel + 3) + (ssdgs_real)0.5);
 }
 
 /* exp(w) as a matrix, and the left Jacobian; both by series where the angle is small. */
@@ -9360,7 +9400,8 @@ typedef struct ssdgs__exposure_job {
 
 /* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 -
    T), image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u
-   encode'(u). A photograph's 1 may stand for anything brighter, so there encode(u) is at most 1. */
+   encode'(u). A photograph's 1 may stand for anything brighter, so there encode(u) is at most 1; halves and
+   floats stand for what they are. */
 static void ssdgs__exposure_task(void *data, int index) {
     const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -9368,7 +9409,9 @@ static void ssdgs__exposure_task(void *data, int index) {
                  begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
     const ssdgs_real *t = frame->transmittance + begin;
-    ssdgs__photo_planes(job->photo, job->background, begin, begin + n, job->target);
+    const int light = ssdgs__is_light(job->photo);
+    ssdgs__photo_planes(frame->context->k, job->photo, frame->settings.transfer, job->background, begin,
+                        begin + n, job->target);
     ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
     for (int c = 0; c < 3; c++) {
         const size_t at = pixels * (size_t)c + begin;
@@ -9380,8 +9423,8 @@ static void ssdgs__exposure_task(void *data, int index) {
         for (size_t i = 0; i < n; i++) {
             const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
             const ssdgs_real rendered = linear ? straight[i] : stored[i],
-                             shown = ssdgs__photo_value(job->photo, begin + i, c);
-            const int clipped = shown > SSDGS__CLIPPED && rendered > shown;
+                             shown = ssdgs__photo_number(job->photo, 4 * (begin + i) + (size_t)c);
+            const int clipped = !light && shown > SSDGS__CLIPPED && rendered > shown;
             const ssdgs_real s = clipped ? shown : rendered, d = clipped ? 0 : linear ? 1 : slope[i];
             job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
             job->slope[at + i] = d;
@@ -10579,8 +10622,16 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                              "a photograph's light is a point or a direction, without range, with shadow");
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
-    if (!result && photo->format != SSDGS_PIXELS_RGBA8 && photo->format != SSDGS_PIXELS_RGBA16)
+    if (!result && ((int)photo->format < 0 || photo->format > SSDGS_PIXELS_RGBA32F))
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
+    const size_t numbers = 4 * (size_t)photo->camera.width * (size_t)photo->camera.height;
+    for (size_t i = 0; !result && ssdgs__is_light(photo) && i < numbers; i++) {
+        const ssdgs_real number = ssdgs__photo_number(photo, i);
+        if (!ssdgs__finite(number))
+            result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "pixel %z is not finite", i / 4);
+        else if (i % 4 == 3 && (number < 0 || number > 1))
+            result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "pixel %z has alpha %g", i / 4, (double)number);
+    }
     for (int i = 0; i < 3 && !result; i++)
         if (!ssdgs__finite(background[i]))
             result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
@@ -10739,13 +10790,14 @@ typedef struct ssdgs__shading {
 
 /* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture,
    less what has the colour of its border. */
-static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], ssdgs__shading *s) {
+static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const double centre[3],
+                             ssdgs__shading *s) {
     static const ssdgs_real black[3] = {0, 0, 0};
     const ssdgs_camera *camera = &photo->camera;
     const int w = camera->width, h = camera->height, step = 1 + (w > h ? w : h) / 128; /* some pixels tell */
     double area = 0, light = 0, middle[2] = {0, 0}, square[2] = {0, 0}, bright[2] = {0, 0}, intensity = 0;
     ssdgs_real corner[3];
-    ssdgs__photo_pixel(photo, black, 0, corner);
+    ssdgs__photo_pixel(photo, transfer, black, 0, corner);
     for (int y = step / 2; y < h; y += step)
         for (int x = step / 2; x < w; x += step) {
             const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
@@ -10754,7 +10806,7 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, const double centre[3], s
                                   (y + 0.5 - (double)camera->cy) / (double)camera->fy};
             double value = 0, apart = 0;
             ssdgs_real stored[3];
-            ssdgs__photo_pixel(photo, black, pixel, stored);
+            ssdgs__photo_pixel(photo, transfer, black, pixel, stored);
             for (int c = 0; c < 3; c++) {
                 value += (double)stored[c] * (double)stored[c]; /* about linear */
                 apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c]))
@@ -10886,7 +10938,8 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     ssdgs__reading found = as_given;
     int n = 0;
     if (!s) return SSDGS_ERR_MEMORY;
-    for (int i = 0; i < trainer->photo_count; i++) n += ssdgs__shading_of(trainer->photos + i, centre, s + n);
+    for (int i = 0; i < trainer->photo_count; i++)
+        n += ssdgs__shading_of(trainer->photos + i, trainer->model->settings.transfer, centre, s + n);
     if (n >= FEW) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
     ssdgs__reading reading;
     for (int way = 0; way < 4 && n >= ENOUGH; way++)
@@ -10995,6 +11048,7 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
 /* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that
    the opaque ones beside it lead to, but that times alpha, as stored or as linear light. */
 static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
+    const int transfer = trainer->model->settings.transfer;
     double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
     for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
@@ -11012,9 +11066,10 @@ static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
                     if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880)
                         continue; /* 0.99 */
                     for (int c = 0; c < 3; c++) {
-                        const double v = (double)ssdgs__photo_value(photo, pixel, c),
-                                     beside = (double)ssdgs__photo_value(photo, next, c);
-                        double n = beside + step * (beside - (double)ssdgs__photo_value(photo, further, c));
+                        const double v = (double)ssdgs__photo_value(photo, transfer, pixel, c),
+                                     beside = (double)ssdgs__photo_value(photo, transfer, next, c);
+                        double n = beside +
+                                   step * (beside - (double)ssdgs__photo_value(photo, transfer, further, c));
                         n = n < 0 ? 0 : n > 1 ? 1 : n;
                         straight += fabs(v - n);
                         times_alpha += fabs(v - a * n);
@@ -11045,7 +11100,8 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
         for (int y = 0; y < h; y++)
             for (int x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
                 ssdgs_real value[3], apart = 0;
-                ssdgs__photo_pixel(photo, background, (size_t)y * (size_t)w + (size_t)x, value);
+                ssdgs__photo_pixel(photo, trainer->model->settings.transfer, background,
+                                   (size_t)y * (size_t)w + (size_t)x, value);
                 for (int c = 0; c < 3; c++) {
                     const ssdgs_real d =
                         value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
@@ -11532,7 +11588,7 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     result = ssdgs__render_model(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
     if (!result) {
         ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
-        ssdgs__photo_planes(photo, background, 0, pixels, planes);
+        ssdgs__photo_planes(context->k, photo, model->settings.transfer, background, 0, pixels, planes);
         for (size_t i = 0; i < pixels; i++)
             for (int c = 0; c < 3; c++) target[3 * i + (size_t)c] = planes[pixels * (size_t)c + i];
         if (image) memcpy(image, rendered, pixels * 3 * sizeof *image);

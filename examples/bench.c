@@ -544,9 +544,9 @@ static void measure_quality(bench *b, const job *jobs, int count, quality *out) 
             if (!o)
                 exact[v] =
                     (ssdgs_real *)memcpy(make(3 * n, sizeof *target), b->color, 3 * n * sizeof *target);
-            ssdgs__photo_planes(photo, black, 0, n, target);
+            olat_compose(photo, jobs[o].s->model->settings.transfer, black, target);
             for (size_t i = 0; i < 3 * n; i++) {
-                double error = (double)(b->color[i] - target[i % 3 * n + i / 3]);
+                double error = (double)(b->color[i] - target[i]);
                 photo_squares += error * error;
                 error = fabs((double)(b->color[i] - exact[v][i]));
                 squares += error * error;
@@ -1260,7 +1260,9 @@ static void write_beside(const bench *b, const char *program, const char *ending
 
 /* Its nearest pixels in SIDE x SIDE: enough to take times from. */
 static void scale_photo(const ssdgs_photo *from, ssdgs_photo *to) {
-    const size_t pixel = from->format == SSDGS_PIXELS_RGBA8 ? 4 : 8;
+    const size_t pixel = from->format == SSDGS_PIXELS_RGBA8     ? 4
+                         : from->format == SSDGS_PIXELS_RGBA32F ? 16
+                                                                : 8;
     const int w = from->camera.width, h = from->camera.height;
     unsigned char *pixels = (unsigned char *)make(SIDE * SIDE, pixel);
     for (int y = 0; y < SIDE; y++)
@@ -1313,7 +1315,21 @@ static void look_at_models(const char *dataset, char paths[2][1024], const char 
 /* The test split, and how much of it is used. */
 static void load_photos(bench *b, const double origin[3]) {
     char error[512] = "";
-    if (olat_load_at(b->dataset, "transforms_test.json", 0, origin, &b->data, error)) die(b->dataset, error);
+    double pixels = 0, seconds[2];
+    olat_reader reader = {NULL, NULL, NULL};
+    check(NULL, ssdgs_context_create(NULL, &reader.context));
+    for (int i = 0; i < 2; i++) { /* on one thread, on all: which is kept */
+        olat_free(&b->data);
+        seconds[i] = olat_seconds();
+        if (olat_load_at(b->dataset, "transforms_test.json", 0, origin, i ? &reader : NULL, &b->data, error))
+            die(b->dataset, error);
+        seconds[i] = olat_seconds() - seconds[i];
+    }
+    ssdgs_context_destroy(reader.context);
+    for (int i = 0; i < b->data.count; i++)
+        pixels += 1e-6 * b->data.frames[i].camera.width * b->data.frames[i].camera.height;
+    add_facts(b, "read_megapixels_per_second_1_thread read_megapixels_per_second", pixels / seconds[0],
+              pixels / seconds[1]);
     olat_print_notes(&b->data, "bench");
     ssdgs_photo *all = olat_photos(&b->data);
     if (!all || b->data.count < 2) die(b->dataset, "needs two test photographs");

@@ -343,23 +343,16 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
         view__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));
         return result;
     }
-    ssdgs_compose(image.color, image.alpha, pixels, ssdgs_model_settings(s->models[0])->transfer, black,
-                  image.color);
-    for (size_t i = 0; i < pixels; i++) {
-        unsigned char *left = s->bytes + 4 * (2 * i - i % (size_t)width), *right = left + 4 * (size_t)width;
-        for (size_t c = 0; c < 4; c++) {
-            const size_t at = 4 * i + c;
-            left[c] = photo->format == SSDGS_PIXELS_RGBA8
-                          ? ((const unsigned char *)photo->pixels)[at]
-                          : (unsigned char)(((const uint16_t *)photo->pixels)[at] >> 8);
-            right[c] = 255;
+    const int transfer = ssdgs_model_settings(s->models[0])->transfer;
+    ssdgs_compose(image.color, image.alpha, pixels, transfer, black, image.color);
+    olat_compose(photo, transfer, black, s->planes + 3 * pixels); /* over alpha */
+    for (int side = 0; side < 2; side++)
+        for (size_t i = 0; i < pixels; i++) {
+            const float *rgb = s->planes + (side ? 0 : 3 * pixels) + 3 * i;
+            unsigned char *rgba = s->bytes + 4 * (2 * i - i % (size_t)width + (side ? (size_t)width : 0));
+            for (int c = 0; c < 3; c++) rgba[c] = (unsigned char)(fminf(1, fmaxf(0, rgb[c])) * 255 + 0.5f);
+            rgba[3] = 255;
         }
-        for (int c = 0; c < 3; c++) {
-            left[c] = (unsigned char)((left[c] * left[3] + 127) / 255);
-            right[c] = (unsigned char)(fminf(1, fmaxf(0, image.color[3 * i + (size_t)c])) * 255 + 0.5f);
-        }
-        left[3] = 255;
-    }
     *size = 8 * pixels;
     view__append(note, room, "{\"w\":%d,\"h\":%d}", 2 * width, height);
     return SSDGS_OK;

@@ -425,7 +425,8 @@ static ssdgs_result render(job *j, int index, int components) {
     ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background,
                   j->image);
     if (!frame->has_image) return SSDGS_OK;
-    olat_compose(frame, j->background, j->photo);
+    const ssdgs_photo photo = olat_photo(frame);
+    olat_compose(&photo, ssdgs_model_settings(j->model)->transfer, j->background, j->photo);
     j->flip[index] = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);
     if (j->flip[index] < 0) return SSDGS_ERR_MEMORY;
     return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height,
@@ -545,7 +546,9 @@ static int load_frames(job *j) {
     free(path);
     char name[64];
     snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
-    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &j->data, error))
+    const olat_reader reader = {j->context, NULL, NULL};
+    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &reader, &j->data,
+                     error))
         return !fail(error);
     olat_print_notes(&j->data, "relight");
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);

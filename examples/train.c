@@ -59,8 +59,8 @@ static const char *const help[] = {
     "  --background COLOUR      black (default) or white: behind transparent pixels, around opaque",
     "                           objects",
     "  --preset NAME            default, or published: the paper's model, order of terms, density control",
-    "  --transfer NAME          srgb: shade in linear light (default); none: fit stored values",
-    "                           (published)",
+    "  --transfer NAME          srgb: shade in linear light, compare as seen (default); none (published)",
+    "                           or, for OpenEXR, linear: fit the numbers in the files",
     "  --schedule NAME          order of the terms: merged (default), progressive (published), joint,",
     "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
@@ -89,7 +89,7 @@ static const char *const help_end[] = {
     "ones whose borders have the colour of --background are taken to show it, and Gaussians of that",
     "colour fade (--set prune_outside=0 keeps them); all that other opaque photographs show is taken",
     "for opaque. Exposures may differ where the lights' intensities tell it. What is clipped at full",
-    "white may have been brighter.",
+    "white may have been brighter; OpenEXR is light as it is.",
     "",
     "Notes tell what cannot be right or cannot work: a camera whose axes, lens or pose is wrong, lights",
     "that the shading contradicts, cameras or lights that all stand in one place or move together,",
@@ -385,8 +385,9 @@ static int parse(job *j, int argc, char **argv) {
     }
     if (!choose(given, BACKGROUND, "black|white", &white))
         return usage("no such background:", given[BACKGROUND]);
-    if (!choose(given, TRANSFER, "srgb|none", &j->settings.transfer))
+    if (!choose(given, TRANSFER, "srgb|none|linear", &j->settings.transfer))
         return usage("no such transfer:", given[TRANSFER]);
+    if (j->settings.transfer > SSDGS_TRANSFER_NONE) j->settings.transfer = SSDGS_TRANSFER_NONE;
     if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))
         return usage("no such schedule:", given[SCHEDULE]);
     const char *terms = given[TERMS];
@@ -439,11 +440,6 @@ static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int ste
         ssdgs_photo photo = photos[i * step];
         ssdgs_result result =
             fit_steps ? ssdgs_refine_photo(j->model, &photo, j->options.background, fit_steps) : SSDGS_OK;
-        olat_frame frame;
-        memset(&frame, 0, sizeof frame);
-        frame.camera = photo.camera;
-        frame.format = photo.format;
-        memcpy(&frame.pixels, &photo.pixels, sizeof frame.pixels); /* which are only read */
         const size_t values = 3 * (size_t)photo.camera.width * (size_t)photo.camera.height;
         ssdgs_real *images = (ssdgs_real *)malloc(2 * values * sizeof *images); /* rendered, photographed */
         if (!result && !images) result = SSDGS_ERR_MEMORY;
@@ -451,7 +447,8 @@ static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int ste
         if (!result) result = ssdgs_evaluate(j->model, &photo, j->options.background, images, &m);
         double seen = 0;
         if (!result) {
-            olat_compose(&frame, j->options.background, images + values);
+            olat_compose(&photo, ssdgs_model_settings(j->model)->transfer, j->options.background,
+                         images + values);
             seen = olat_flip(images, images + values, photo.camera.width, photo.camera.height);
             if (seen < 0) result = SSDGS_ERR_MEMORY;
         }
@@ -555,6 +552,12 @@ static int watch(job *j, char error[512]) {
     return 0;
 }
 
+/* A line where reading takes more than a second. user: when it began. */
+static void tell_reading(void *user, int done, int count) {
+    if (olat_seconds() - *(const double *)user > 1)
+        fprintf(stderr, "\rphotographs read: %d of %d%s", done, count, done == count ? "\n" : "");
+}
+
 static int train(job *j) {
     const char *output = j->given[OUTPUT],
                *train_json = j->given[TRAIN_JSON] ? j->given[TRAIN_JSON] : "transforms_train.json";
@@ -588,11 +591,11 @@ static int train(job *j) {
             return fail(ssdgs_error_message(j->context));
         for (int i = 0; i < 3; i++) origin[i] = (double)ssdgs_model_settings(j->model)->origin[i];
     }
-    if (j->model ? olat_load_at(j->dataset, train_json, 0, origin, &j->train_set, error)
-                 : olat_load(j->dataset, train_json, 0, &j->train_set, error))
+    const olat_reader reader = {j->context, on_terminal() ? tell_reading : NULL, &start};
+    if (olat_load_at(j->dataset, train_json, 0, j->model ? origin : NULL, &reader, &j->train_set, error))
         return fail(error);
-    if (has_test &&
-        olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &j->test_set, error))
+    if (has_test && olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &reader,
+                                 &j->test_set, error))
         return fail(error);
     olat_print_notes(&j->train_set, "train");
     if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");

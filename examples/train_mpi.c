@@ -80,7 +80,7 @@ int main(int argc, char **argv) {
     char error[512] = "";
     const double origin[3] = {0, 0, 0};
     memset(&data, 0, sizeof data);
-    if (olat_load_at(argv[1], "transforms_train.json", 0, origin, &data, error)) {
+    if (olat_load_at(argv[1], "transforms_train.json", 0, origin, NULL, &data, error)) {
         fprintf(stderr, "train_mpi: process %d: %s\n", t.rank, error);
         MPI_Abort(MPI_COMM_WORLD, 1);
     }

@@ -170,7 +170,8 @@ static double facing(const olat_frame *frame, const ssdgs_real centre[3]) {
 static double brightness(show *s, const olat_frame *frame) {
     const ssdgs_real black[3] = {0, 0, 0};
     double sum = 0;
-    olat_compose(frame, black, s->image);
+    const ssdgs_photo photo = olat_photo(frame);
+    olat_compose(&photo, ssdgs_model_settings(s->model)->transfer, black, s->image);
     for (size_t i = 0; i < 3 * (size_t)frame->camera.width * (size_t)frame->camera.height; i++)
         sum += (double)s->image[i];
     return sum;
@@ -190,7 +191,8 @@ static int backlit(show *s, const char *const *models, int count) {
     s->width /= 2;
     s->height /= 2;
     if (make_sheet(s, 1 + count, 1)) return 1;
-    olat_compose(chosen, s->background, s->image);
+    const ssdgs_photo photo = olat_photo(chosen);
+    olat_compose(&photo, ssdgs_model_settings(s->model)->transfer, s->background, s->image);
     ssdgs_to_bytes(s->image, 3 * (size_t)width * (size_t)height, SSDGS_TRANSFER_NONE, s->bytes);
     paste(s, 0, 0, s->bytes, width, width / 4, height / 4);
     for (int i = 0; i < count; i++) {

@@ -74,6 +74,7 @@ static int call_everything(void) {
     all.depth = 1;
     refused += ssdgs_render(model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_sort(model) == SSDGS_ERR_ARGUMENT;
+    refused += ssdgs_context_run(context, 1, NULL, NULL) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_reduce(model, 1) == SSDGS_ERR_ARGUMENT;
     refused += ssdgs_model_create(context, NULL, 1, &other) == SSDGS_ERR_ARGUMENT && !other;
     refused += ssdgs_model_adopt(model, model) == SSDGS_ERR_ARGUMENT;
@@ -87,7 +88,7 @@ static int call_everything(void) {
     refused += ssdgs_trainer_create(model, &photo, 1, NULL, &next) == SSDGS_ERR_ARGUMENT && !next;
     int iteration;
     refused += ssdgs_checkpoint_iteration(context, FILE_NAME, &iteration) == SSDGS_ERR_ARGUMENT;
-    all.tries += 13;
+    all.tries += 14;
     if (trainer) {
         refused += ssdgs_trainer_step(trainer, NULL) == SSDGS_ERR_ARGUMENT;
         refused += ssdgs_trainer_run(trainer, NULL, NULL) == SSDGS_ERR_ARGUMENT;
@@ -203,6 +204,26 @@ static void test_tracer(void) {
                  "%scomposite backward. shade backward. project backward. ", rendered);
     CHECK(!ssdgs_trainer_run(all.trainer, NULL, NULL) && !strcmp(heard, trained));
     tear_down();
+}
+
+/* A program's own tasks. */
+static void count_task(void *data, int index) { ((int *)data)[index]++; }
+
+static void test_run(void) {
+    static int done[1000];
+    for (int threads = 1; threads < 4; threads += 2) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.threads = threads;
+        set_up(&desc, 0);
+        memset(done, 0, sizeof done);
+        CHECK(!ssdgs_context_run(all.context, 1000, count_task, done));
+        for (int i = 0; i < 1000; i++) CHECK(done[i] == 1);
+        CHECK(!ssdgs_context_run(all.context, 0, NULL, NULL));
+        CHECK(ssdgs_context_run(all.context, 1, NULL, done) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_context_run(NULL, 1, count_task, done) == SSDGS_ERR_ARGUMENT && done[0] == 1);
+        tear_down();
+    }
 }
 
 /* ---- the progress callback ---- */
@@ -632,6 +653,7 @@ static void test_pixels(void) {
 int main(void) {
     test_from_within();
     test_tracer();
+    test_run();
     test_progress();
     test_order();
     test_fork();

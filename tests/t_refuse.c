@@ -193,7 +193,7 @@ static void test_messages(void) {
     ssdgs_light light = photo.light;
     ssdgs_trainer *trainer = NULL;
     const ssdgs_image image = picture();
-    const int numbers[2] = {2, 7}; /* of no format, no kind */
+    const int numbers[2] = {4, 7}; /* of no format, no kind */
     for (int i = 0; i < 3; i++) shots[i] = photo;
     shots[2].camera.view[3] = (ssdgs_real)NAN;
     SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer),
@@ -209,8 +209,22 @@ static void test_messages(void) {
          "photograph: it has no pixels");
     shots[1] = photo;
     memcpy(&shots[1].format, &numbers[0], sizeof numbers[0]); /* C++ has no such conversion */
-    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: format = 2");
-    SAYS(ssdgs_refine_photo(model, shots + 1, train_options.background, 1), "photograph: format = 2");
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: format = 4");
+    SAYS(ssdgs_refine_photo(model, shots + 1, train_options.background, 1), "photograph: format = 4");
+    const size_t count = 4 * (size_t)photo.camera.width * (size_t)photo.camera.height;
+    float *floats = (float *)calloc(count, sizeof *floats);
+    if (!floats) exit(1);
+    shots[1].pixels = floats;
+    shots[1].format = SSDGS_PIXELS_RGBA32F;
+    floats[9] = (float)INFINITY;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: pixel 2 is not finite");
+    floats[9] = 1e9f;
+    floats[15] = 1.25f;
+    SAYS(ssdgs_trainer_create(model, shots, 3, NULL, &trainer), "photograph 1: pixel 3 has alpha 1.25");
+    floats[15] = -0.5f;
+    SAYS(ssdgs_evaluate(model, shots + 1, train_options.background, NULL, &metrics),
+         "pixel 3 has alpha -0.5");
+    free(floats);
     SAYS(ssdgs_trainer_create(model, NULL, 3, NULL, &trainer), "3 photographs, but the array is NULL");
     SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
     memcpy(&light.kind, &numbers[1], sizeof numbers[1]);

@@ -1859,10 +1859,15 @@ static void test_borders(void) {
 }
 
 /* A model has no loss against its own photograph, however far its light lies beyond what that can hold; a
-   value of 254 is no limit. */
+   value of 254 is no limit, and halves and floats have none: half of the light is another photograph. */
 static void test_clipped(void) {
     static ssdgs_real image[SIDE * SIDE * 3];
     static unsigned char bytes[SIDE * SIDE * 4];
+    static float floats[SIDE * SIDE * 4];
+    static uint16_t halves[SIDE * SIDE * 4];
+    static const void *const shown[5] = {bytes, bytes, floats, halves, floats};
+    static const ssdgs_pixels formats[5] = {SSDGS_PIXELS_RGBA8, SSDGS_PIXELS_RGBA8, SSDGS_PIXELS_RGBA32F,
+                                            SSDGS_PIXELS_RGBA16F, SSDGS_PIXELS_RGBA32F};
     static const int frozen[2] = {1, 1};
     const ssdgs_real black[3] = {0, 0, 0};
     for (int transfer = 0; transfer < 2; transfer++) {
@@ -1890,7 +1895,10 @@ static void test_clipped(void) {
         ssdgs_real alpha[SIDE * SIDE];
         out.alpha = alpha;
         CHECK(!ssdgs_render_ex(model, &photo.camera, &photo.light, 1, &exact, &out, NULL));
-        for (int dim = 0; dim < 2; dim++) {
+        ssdgs_to_pixels(&out, SIDE, SIDE, transfer, SSDGS_RGBA16F, halves, 8 * SIDE);
+        ssdgs_to_pixels(&out, SIDE, SIDE, transfer, SSDGS_RGBA32F, floats, 16 * SIDE);
+        for (int way = 0; way < 5; way++) {
+            const int dim = way == 1;
             int i, full;
             for (i = full = 0; i < SIDE * SIDE; i++) {
                 for (int c = 0; c < 3; c++) {
@@ -1903,7 +1911,10 @@ static void test_clipped(void) {
                 }
                 bytes[4 * i + 3] = (unsigned char)(255 * (double)alpha[i] + 0.5);
             }
-            photo.pixels = bytes;
+            for (i = 0; i < SIDE * SIDE * 4 && way == 4; i++)
+                if (i % 4 < 3) floats[i] /= 2;
+            photo.pixels = shown[way];
+            photo.format = formats[way];
             ssdgs__loss_values values;
             ssdgs_frame frame;
             const ssdgs__photo_job shot = {&photo,
@@ -1917,8 +1928,8 @@ static void test_clipped(void) {
                                            1};
             CHECK(!ssdgs__photo_backward(&frame, model, &shot, &values));
             CHECK(full > SIDE);
-            if (!CHECK(dim ? values.loss > 0.05 : values.loss < 0.01))
-                printf("    transfer %d, %d: loss %g\n", transfer, dim, values.loss);
+            if (!CHECK(way == 1 || way == 4 ? values.loss > 0.05 : values.loss < (way ? 1e-3 : 0.01)))
+                printf("    transfer %d, %d: loss %g\n", transfer, way, values.loss);
         }
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);

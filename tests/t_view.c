@@ -316,7 +316,7 @@ static void make_photos(void) {
     const float eye[3] = {0, -2, 0.5f}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     for (int i = 0; i < 4 * PIXELS; i++) {
         bytes[i] = (unsigned char)(i * 37 % 256);
-        words[i] = (uint16_t)(bytes[i] << 8 | 200);
+        words[i] = (uint16_t)(257 * bytes[i]);
     }
     for (int i = 0; i < 2; i++) {
         photos[i].camera = ssdgs_camera_look_at(eye, target, up, 0.6f, WIDE, HIGH);

@@ -462,6 +462,34 @@ static void read_png(const unsigned char *bytes, size_t size) {
     free(pixels);
 }
 
+/* What is read is light: finite, not negative, with an alpha from 0 to 1. */
+static void fuzz_exr(const unsigned char *data, size_t size) {
+    unsigned char *copy = copy_of(data, size);
+    int width, height;
+    ssdgs_pixels format;
+    void *pixels = NULL;
+    unsigned long infinite = 0;
+    char error[512] = "";
+    olat__exr e;
+    memset(&e, 0, sizeof e);
+    e.bytes = copy;
+    e.size = size;
+    olat__exr_header(&e);
+    const int large =
+        !e.problem && (e.display[2] - e.display[0] > 2047 || e.display[3] - e.display[1] > 2047);
+    if (large) {
+    } /* slow to clear */
+    else if (olat__exr_decode("exr", copy, size, &width, &height, &format, &pixels, &infinite, error))
+        HOLDS(!pixels && error[0]);
+    else
+        for (size_t i = 0; i < 4 * (size_t)width * (size_t)height; i++) {
+            const ssdgs_real number = olat__number(pixels, format, i);
+            HOLDS(number >= 0 && number <= (i % 4 == 3 ? 1 : 65504));
+        }
+    free(pixels);
+    free(copy);
+}
+
 static void fuzz_png(const unsigned char *data, size_t size) {
     unsigned char *copy = copy_of(data, size);
     size_t at = 8;
@@ -914,17 +942,11 @@ typedef struct target {
     const char *name;
     void (*run)(const unsigned char *data, size_t size);
 } target;
-static const target targets[] = {{"png", fuzz_png},
-                                 {"unfilter", fuzz_unfilter},
-                                 {"inflate", fuzz_inflate},
-                                 {"json", fuzz_json},
-                                 {"json_string", fuzz_json_string},
-                                 {"dataset", fuzz_dataset},
-                                 {"ply", fuzz_ply},
-                                 {"checkpoint", fuzz_checkpoint},
-                                 {"render", fuzz_render},
-                                 {"train", fuzz_train},
-                                 {"hooks", fuzz_hooks}};
+static const target targets[] = {
+    {"png", fuzz_png},         {"exr", fuzz_exr},     {"unfilter", fuzz_unfilter},
+    {"inflate", fuzz_inflate}, {"json", fuzz_json},   {"json_string", fuzz_json_string},
+    {"dataset", fuzz_dataset}, {"ply", fuzz_ply},     {"checkpoint", fuzz_checkpoint},
+    {"render", fuzz_render},   {"train", fuzz_train}, {"hooks", fuzz_hooks}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
