@@ -25,11 +25,12 @@ enum {
     REDUCE,
     TRAJECTORY, /* it and those after it take no value */
     COMPONENTS,
+    FIT,
     OPTION_COUNT
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "--split", "--out",      "--background", "--sheet",      "--threads",
-    "--isa",   "--networks", "--reduce",     "--trajectory", "--components"};
+    "--split",    "--out",    "--background", "--sheet",      "--threads", "--isa",
+    "--networks", "--reduce", "--trajectory", "--components", "--fit"};
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
@@ -40,6 +41,8 @@ static const char *const help[] = {
     "  --out DIR                where the images go",
     "  --split NAME             test (default), train or valid: the frames of transforms_NAME.json",
     "  --background COLOUR      black (default) or white",
+    "  --fit                    also scores each view with its camera and light fitted to its photograph,",
+    "                           apart: \"fitted\" in DIR/metrics.json",
     "  --components             also writes each term, shadow, normal, depth and alpha",
     "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
     "                           shadow, normal",
@@ -71,9 +74,15 @@ static void hear(void *user, ssdgs_result code, const char *message) {
 
 /* What is written for a view; the first columns of the sheet come first. */
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
-enum { SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
+enum { FIT_STEPS = 200, SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
 static const char *const suffixes[OUTPUT_COUNT] = {
     "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"};
+
+/* How near a view comes to its photograph, and olat_flip(). */
+typedef struct score {
+    ssdgs_metrics is;
+    double flip;
+} score;
 
 /* Everything the program holds; main releases it. */
 typedef struct job {
@@ -85,9 +94,8 @@ typedef struct job {
     ssdgs_model *model;
     olat_dataset data;
     olat_guard guard;
-    ssdgs_metrics *metrics; /* of each frame that has an image */
-    double *flip;           /* and olat_flip() */
-    ssdgs_image planes;     /* of the view at hand; color is scratch once image is made */
+    score *scores[2];   /* of each frame that has an image; with its camera and light fitted */
+    ssdgs_image planes; /* of the view at hand; color is scratch once image is made */
     ssdgs_real *memory, *image,
         *photo; /* what planes point into; (h,w,3) stored values of the rendering and the photograph */
     int black;  /* pictures so far */
@@ -215,31 +223,44 @@ static int check_outputs(job *j) {
     return ok && (!j->given[SHEET] || check_output(j, j->given[SHEET]));
 }
 
-static void write_numbers(olat__writer *w, const ssdgs_metrics *m, double flip) {
+static void write_numbers(olat__writer *w, const score *s) {
     char text[128]; /* no setlocale is called, so that numbers have a point */
-    snprintf(text, sizeof text, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", m->psnr, m->ssim, flip);
+    snprintf(text, sizeof text, "\"psnr\": %.4f, \"ssim\": %.6f, \"flip\": %.6f}", s->is.psnr, s->is.ssim,
+             s->flip);
     olat__write(w, text);
 }
 
-static int write_metrics(const job *j, const ssdgs_metrics *mean, double mean_flip) {
-    char *path = output_path(j, NULL, "metrics.json"), error[512] = "";
+/* Means over the views that have photographs, and theirs. */
+static void write_scores(olat__writer *w, const job *j, const score *scores, const score *mean) {
     const char *separator = "";
+    olat__write(w, "\"mean\": {");
+    write_numbers(w, mean);
+    olat__write(w, ",\n \"views\": [");
+    for (int i = 0; i < j->data.count; i++) {
+        if (!j->data.frames[i].has_image) continue;
+        olat__write(w, separator);
+        olat__write(w, "\n  {\"file\": ");
+        olat__write_string(w, base_name(&j->data.frames[i]));
+        olat__write(w, ", ");
+        write_numbers(w, scores + i);
+        separator = ",";
+    }
+    olat__write(w, "\n ]");
+}
+
+static int write_metrics(const job *j, const score *means) {
+    char *path = output_path(j, NULL, "metrics.json"), error[512] = "";
     if (!path) return 0;
     olat__writer w;
     olat__writer_start(&w);
-    olat__write(&w, "{\n \"mean\": {");
-    write_numbers(&w, mean, mean_flip);
-    olat__write(&w, ",\n \"views\": [");
-    for (int i = 0; i < j->data.count; i++) {
-        if (!j->data.frames[i].has_image) continue;
-        olat__write(&w, separator);
-        olat__write(&w, "\n  {\"file\": ");
-        olat__write_string(&w, base_name(&j->data.frames[i]));
-        olat__write(&w, ", ");
-        write_numbers(&w, &j->metrics[i], j->flip[i]);
-        separator = ",";
+    olat__write(&w, "{\n ");
+    write_scores(&w, j, j->scores[0], means);
+    if (j->given[FIT]) {
+        olat__write(&w, ",\n \"fitted\": {");
+        write_scores(&w, j, j->scores[1], means + 1);
+        olat__write(&w, "}");
     }
-    olat__write(&w, "\n ]\n}\n");
+    olat__write(&w, "\n}\n");
     const int failed = olat__writer_end(&w, path, error);
     if (failed) fail(error);
     free(path);
@@ -357,8 +378,7 @@ static int make_planes(job *j) {
         const size_t pixels = (size_t)camera->width * (size_t)camera->height;
         if (pixels > most) most = pixels;
     }
-    j->metrics = (ssdgs_metrics *)calloc((size_t)j->data.count + 1, sizeof *j->metrics);
-    j->flip = (double *)calloc((size_t)j->data.count + 1, sizeof *j->flip);
+    for (int i = 0; i < 2; i++) j->scores[i] = (score *)calloc((size_t)j->data.count + 1, sizeof **j->scores);
     ssdgs_real *next;
     j->memory = next = (ssdgs_real *)malloc(most * 24 * sizeof *next + 1);
     j->bytes = (unsigned char *)malloc(most * 3 + 1);
@@ -370,7 +390,7 @@ static int make_planes(job *j) {
         j->sheet = (unsigned char *)calloc((size_t)j->cell_width * SHEET_COLUMNS,
                                            (size_t)(j->cell_height * j->sheet_rows) * 3);
     }
-    if (!j->metrics || !j->flip || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet))
+    if (!j->scores[0] || !j->scores[1] || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet))
         return !fail("out of memory");
     j->image = next;
     j->photo = next += 3 * most;
@@ -402,6 +422,13 @@ static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats
     if (!j->black++) fprintf(stderr, "relight: note: %s is black: %s\n", base_name(frame), why);
 }
 
+/* Scores a rendering of stored values beside job's photograph. */
+static ssdgs_result compare(job *j, const olat_frame *frame, const ssdgs_real *image, score *s) {
+    s->flip = olat_flip(image, j->photo, frame->camera.width, frame->camera.height);
+    if (s->flip < 0) return SSDGS_ERR_MEMORY;
+    return ssdgs_compare(j->context, image, j->photo, frame->camera.width, frame->camera.height, &s->is);
+}
+
 /* The image, and its metrics when there is a photograph, into job; with the components when they are asked
    for. */
 static ssdgs_result render(job *j, int index, int components) {
@@ -427,10 +454,16 @@ static ssdgs_result render(job *j, int index, int components) {
     if (!frame->has_image) return SSDGS_OK;
     const ssdgs_photo photo = olat_photo(frame);
     olat_compose(&photo, ssdgs_model_settings(j->model)->transfer, j->background, j->photo);
-    j->flip[index] = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);
-    if (j->flip[index] < 0) return SSDGS_ERR_MEMORY;
-    return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height,
-                         &j->metrics[index]);
+    return compare(j, frame, j->image, j->scores[0] + index);
+}
+
+/* Scores a view whose camera and light may move to fit its photograph, which render() has left in job. */
+static ssdgs_result fit(job *j, int index) {
+    ssdgs_photo photo = olat_photo(j->data.frames + index);
+    score *s = j->scores[1] + index;
+    ssdgs_result result = ssdgs_refine_photo(j->model, &photo, j->background, FIT_STEPS);
+    if (!result) result = ssdgs_evaluate(j->model, &photo, j->background, j->planes.color, &s->is);
+    return result ? result : compare(j, j->data.frames + index, j->planes.color, s);
 }
 
 /* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as
@@ -555,8 +588,8 @@ static int load_frames(job *j) {
 }
 
 static int relight(job *j) {
-    ssdgs_metrics mean = {0, 0};
-    double mean_flip = 0;
+    score means[2];
+    memset(means, 0, sizeof means);
     ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
     int row = 0, scored = 0;
     char error[512] = "";
@@ -599,21 +632,25 @@ static int relight(job *j) {
         row += on_sheet;
         if (!frame->has_image) continue;
         scored++;
-        mean.psnr += j->metrics[i].psnr;
-        mean.ssim += j->metrics[i].ssim;
-        mean_flip += j->flip[i];
+        if (j->given[FIT] && fit(j, i)) return fail(ssdgs_error_message(j->context));
+        for (int k = 0; k < 2; k++) {
+            means[k].is.psnr += j->scores[k][i].is.psnr;
+            means[k].is.ssim += j->scores[k][i].is.ssim;
+            means[k].flip += j->scores[k][i].flip;
+        }
     }
     if (j->sheet && olat_write_png(j->given[SHEET], SHEET_COLUMNS * j->cell_width,
                                    j->sheet_rows * j->cell_height, 3, j->sheet, error))
         return fail(error);
-    if (scored) {
-        mean.psnr /= scored;
-        mean.ssim /= scored;
-        mean_flip /= scored;
-        if (!write_metrics(j, &mean, mean_flip)) return 1;
-        printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT], mean.psnr, mean.ssim,
-               mean_flip, scored);
+    for (int k = 0; k < (j->given[FIT] ? 2 : 1) && scored; k++) {
+        means[k].is.psnr /= scored;
+        means[k].is.ssim /= scored;
+        means[k].flip /= scored;
+        printf("%s%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", j->given[SPLIT],
+               k ? " (each camera and light fitted to its photograph)" : "", means[k].is.psnr,
+               means[k].is.ssim, means[k].flip, scored);
     }
+    if (scored && !write_metrics(j, means)) return 1;
     if (j->black > 1)
         fprintf(stderr, "relight: note: %d pictures of %d are black\n", j->black, j->data.count);
     printf("%d images in %s\n", j->data.count, j->out);
@@ -634,8 +671,8 @@ int main(int argc, char **argv) {
     ssdgs_context_destroy(j.context);
     olat_free(&j.data);
     olat_guard_free(&j.guard);
-    free(j.metrics);
-    free(j.flip);
+    free(j.scores[0]);
+    free(j.scores[1]);
     free(j.memory);
     free(j.bytes);
     free(j.sheet);

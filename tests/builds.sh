@@ -27,7 +27,7 @@ compiles "a name that Windows' headers take" tests/library.c "$@" -fsyntax-only 
 printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS_IMPLEMENTATION\n#include "ssdgs.h"
 extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
 compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
-for example in train relight minimal engine export view bench; do # each is a program of its own
+for example in train relight minimal engine export view check ball bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -fsyntax-only
 done
 compiles "without SSDGS_SCALAR" tests/library.c "$@" -USSDGS_SCALAR -USSDGS_STAGES

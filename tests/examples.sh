@@ -179,6 +179,14 @@ check "no such option" says 2 "^usage: engine" engine --wrong
 check "a folder that is not there" says 1 "never" "$build/engine" --frames 1 --size 96 54 --out "$out/never/x"
 check "nothing was written" test ! -e "$out/level_000.png"
 
+# what fitting gains is told apart
+check "relight --fit" says 0 "^test (each camera and light fitted to its photograph): PSNR" relight --out "$out/fitted" --fit
+fitted() { sed -n 's/.*"fitted": {"mean": {"psnr": \([-0-9.]*\).*/\1/p' "$out/fitted/metrics.json"; }
+check "fitted gains: $(fitted) over $(psnr "$out/fitted")" awk -v a="$(fitted)" -v b="$(psnr "$out/fitted")" 'BEGIN { exit !(a > b && a < b + 6) }'
+check "each view" test "$(grep -c '"file"' "$out/fitted/metrics.json")" -eq 8
+check "without it there is none" says 0 "4 images" relight --out "$out/fixed"
+check "only fixed ones" test -z "$(grep fitted "$out/fixed/metrics.json")"
+
 # splats for viewers: as near to the model without its highlights as colours of a byte allow, and nothing of the user's replaced
 export_of() { "$build/export" "$@"; }
 near_to() { sed -n "s|.*$1: .* model, \\([0-9.]*\\) dB without.*|\\1|p" "$out/log"; }
@@ -199,6 +207,21 @@ check "no relightable model" says 1 "is no relightable model" export_of "$out/ex
 check "a folder that is not there" says 1 "never" export_of "$model" "$out/never/x"
 check "no names" says 2 "^usage: export" export_of
 check "nothing was written" test ! -e "$out/none.glb"
+
+# a capture, looked at before it is trained on
+mkdir "$out/checked"
+check "check" says 0 "^[0-9]* things to look at$" "$build/check" "$set" --out "$out/checked"
+check "how many photographs" grep -q "^-> [0-9]* photographs of 128 x 128: a hundred and more" "$out/log"
+check "its outlines" grep -q "^   all show the object's outline$" "$out/log"
+check "how long it takes" grep -q "20000 iterations take [0-9]* minutes and more here" "$out/log"
+check "its pictures" test -s "$out/checked/photographs.png" -a -s "$out/checked/places.svg"
+check "a place for each camera" test "$(grep -c '<circle' "$out/checked/places.svg")" -gt 20
+cp "$out/checked/photographs.png" "$out/kept.png"
+check "a box beside it" says 0 "lie outside of the bounds\|outside" "$build/check" "$set" --bounds 3,3,3,4,4,4
+check "a set that is not there" says 1 "nothing" "$build/check" "$out/nothing"
+check "a folder that is not there" says 1 "never" "$build/check" "$set" --out "$out/never"
+check "no box" says 2 "^usage: check" "$build/check" "$set" --bounds 1,2,3
+check "no set" says 2 "^usage: check" "$build/check"
 
 rm -rf "$out"
 echo "$passed passed, $failed failed"

@@ -1,8 +1,9 @@
 /* examples/olat.h: PNG of every kind, hostile PNG, the writer, JSON, numbers, datasets good and bad, failing
-   memory. cc -o build/t_olat tests/t_olat.c -lm && build/t_olat       (writes under build/) */
+   memory. cc -o build/t_olat tests/t_olat.c -lm -lpthread && build/t_olat       (writes under build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* mkfifo */
 #endif
+#define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
 
