@@ -630,7 +630,7 @@ typedef enum ssdgs_schedule { /* the paper's orders H to K */
     SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
 } ssdgs_schedule;
 /* clang-format on */
-enum { SSDGS_REFINE_CAMERA = 1, SSDGS_REFINE_LIGHT = 2 };
+enum { SSDGS_REFINE_CAMERA = 1, SSDGS_REFINE_LIGHT = 2, SSDGS_REFINE_INTENSITY = 4 };
 
 /* A learning rate: from start to end by equal factors, to or from 0 by equal steps. */
 typedef struct ssdgs_rate {
@@ -674,7 +674,7 @@ typedef struct ssdgs_train_options {
     int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
     int batch;  /* photographs a step, whose gradients are averaged; rates grow with its square root; 1 */
-    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses and light positions too; 0 */
+    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses, light positions and intensities too; 0 */
     ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
     ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
     ssdgs_real normal_weight;    /* deferred: weight of blended normals' distance to the depth's; 0.05 */
@@ -990,6 +990,8 @@ typedef struct ssdgs_frame {
     ssdgs_real
         *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
     ssdgs_real light_gradient[3]; /* position of light 0 */
+    double
+        intensity[2]; /* by how much ln of its intensity should grow to fit a photograph; how sure that is */
     ssdgs_real view_gradient[12]; /* camera.view */
     struct ssdgs__frame_memory *memory;
     struct ssdgs__scratch *scratch;
@@ -9099,9 +9101,12 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
     "ASG sigma",      "scattering network", "shadow network"};
 
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light
-   shift. */
+   shift, ln of its intensity's factor. What moves them: gradients of the first nine, a Gauss-Newton step of
+   the last and how sure it is. */
+#define SSDGS__MOVES 11
 typedef struct ssdgs__correction {
-    double value[9], mean[9], square[9];
+    double value[10], mean[9], square[9];
+    double sure;  /* how well the photograph tells the intensity */
     int steps[2]; /* Adam's clocks of the camera, of the light */
 } ssdgs__correction;
 
@@ -9341,7 +9346,7 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
         }
 }
 
-static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdgs_camera *camera,
+static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssdgs_camera *camera,
                            ssdgs_light *light) {
     *camera = photo->camera;
     *light = photo->light;
@@ -9355,11 +9360,13 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[9], ssdg
         }
         if (light->kind == SSDGS_LIGHT_POINT)
             light->position[i] = (ssdgs_real)((double)photo->light.position[i] + value[6 + i]);
+        if (value[9] < 0 || value[9] > 0)
+            light->intensity[i] = (ssdgs_real)((double)photo->light.intensity[i] * exp(value[9]));
     }
 }
 
 /* dL/d(view) of the corrected camera -> dL/d(t', w). */
-static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[9],
+static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[10],
                                     const ssdgs_real dview[12], double d[6]) {
     double e[9], jacobian[9];
     ssdgs__rotate_by(value + 3, e, jacobian);
@@ -9385,6 +9392,14 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
         d[3 + i] = 0;
         for (int j = 0; j < 3; j++) d[3 + i] += jacobian[3 * j + i] * delta[j];
     }
+}
+
+/* What moves a photograph's corrections. */
+static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], const ssdgs_frame *frame,
+                            double moves[SSDGS__MOVES]) {
+    ssdgs__correct_backward(photo, value, frame->view_gradient, moves);
+    for (int i = 0; i < 3; i++) moves[6 + i] = (double)frame->light_gradient[i];
+    for (int i = 0; i < 2; i++) moves[9 + i] = frame->intensity[i];
 }
 
 #define SSDGS__PIXELS 1024               /* of an exposure task */
@@ -9530,6 +9545,14 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     job.slope = job.image + pixels * 3;
     job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
+    double along = 0, across = 0; /* all light is the lamp's: d(image)/d(ln intensity) is slope x pixels */
+    for (size_t i = 0; i < 3 * pixels && shot->exact; i++) {
+        const double d = (double)job.slope[i] * (double)frame->pixels[i];
+        across += d * d;
+        along += d * ((double)job.target[i] - (double)job.image[i]);
+    }
+    frame->intensity[0] = across > 0 ? along / across : 0;
+    frame->intensity[1] = across;
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
     result = ssdgs__loss(context, &frame->scratch->loss, &images, shot->dssim, frame->pixel_gradient, values);
     if (result) return result;
@@ -9543,6 +9566,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
 /* ---- Adam over the model ---- */
 
 #define SSDGS__ADAM_CHUNK 8192
+#define SSDGS__INTENSITY_STEP 0.3
 
 typedef struct ssdgs__adam_range {
     ssdgs_real *parameter, *mean, *square;
@@ -9709,6 +9733,24 @@ static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], 
 
 static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
     for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+/* A part of the way to the intensity that fits best: the model has not learnt all yet. */
+static void ssdgs__intensity_step(ssdgs__correction *c, const double *moves) {
+    const double step = moves[9] < -1 ? -1 : moves[9] > 1 ? 1 : moves[9];
+    c->value[9] += SSDGS__INTENSITY_STEP * step;
+    c->sure = moves[10];
+}
+
+/* Takes out of the corrections the factor that all intensities have in common: colours would follow. */
+static void ssdgs__anchor_intensities(ssdgs_trainer *trainer) {
+    double sum = 0, weight = 0;
+    for (int i = 0; i < trainer->photo_count; i++) {
+        sum += trainer->corrections[i].sure * trainer->corrections[i].value[9];
+        weight += trainer->corrections[i].sure;
+    }
+    for (int i = 0; i < trainer->photo_count && weight > 0; i++)
+        trainer->corrections[i].value[9] -= sum / weight;
 }
 
 /* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common,
@@ -10404,7 +10446,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
     SSDGS__RANGE(batch, 1, SSDGS__MAX_BATCH);
-    SSDGS__RANGE(refine, 0, SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT);
+    SSDGS__RANGE(refine, 0, SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY);
     SSDGS__RANGE(dssim, 0, 1);
     SSDGS__RANGE(normal_weight, 0, most);
     SSDGS__RANGE(densify_gradient, 0, most);
@@ -11328,7 +11370,8 @@ typedef struct ssdgs__drawn {
 /* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in moves
    (9). */
 static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step *step, int iteration,
-                                      int photo, ssdgs_frame *frame, double moves[9], ssdgs__drawn *drawn) {
+                                      int photo, ssdgs_frame *frame, double moves[SSDGS__MOVES],
+                                      ssdgs__drawn *drawn) {
     const ssdgs_train_options *o = &trainer->options;
     const double *correction = trainer->corrections[photo].value;
     ssdgs_real background[3];
@@ -11353,8 +11396,7 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                    o->refine};
     const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &shot, &values);
     if (result) return result;
-    ssdgs__correct_backward(trainer->photos + photo, correction, frame->view_gradient, moves);
-    for (int j = 0; j < 3; j++) moves[6 + j] = (double)frame->light_gradient[j];
+    ssdgs__moves_of(trainer->photos + photo, correction, frame, moves);
     ssdgs__fade(trainer, step->t, (double)camera.width * camera.height,
                 frame->gradient + SSDGS_OPACITY * frame->gaussians.stride);
     if (!iteration && !frame->shaded_count)
@@ -11376,7 +11418,7 @@ typedef struct ssdgs__batch_layout {
 static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) {
     ssdgs__batch_layout at;
     at.moves = 4;
-    at.gradient = at.moves + 9 * (size_t)trainer->options.batch;
+    at.gradient = at.moves + SSDGS__MOVES * (size_t)trainer->options.batch;
     at.globals = at.gradient + SSDGS_CHANNELS * trainer->stride;
     at.statistics = at.globals + trainer->model->global_count;
     at.size = at.statistics + SSDGS__STATISTICS * trainer->stride;
@@ -11404,14 +11446,15 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
         const int b = first + i;
         ssdgs_real *out = sums + at.size * (size_t)depth++;
         memset(out, 0, at.size * sizeof *out);
-        failed =
-            ssdgs__draw_photo(trainer, step, trainer->iteration + b, photos[b], frame, moves + 9 * b, drawn);
+        failed = ssdgs__draw_photo(trainer, step, trainer->iteration + b, photos[b], frame,
+                                   moves + SSDGS__MOVES * b, drawn);
         if (failed) break;
         ssdgs__gather_statistics(trainer, frame, trainer->magnify[photos[b]], out + at.statistics);
         out[1] = (ssdgs_real)drawn->loss;
         out[2] = (ssdgs_real)drawn->psnr;
         out[3] = (ssdgs_real)drawn->shaded;
-        for (int j = 0; j < 9; j++) out[at.moves + (size_t)(9 * b + j)] = (ssdgs_real)moves[9 * b + j];
+        for (int j = SSDGS__MOVES * b; j < SSDGS__MOVES * (b + 1); j++)
+            out[at.moves + (size_t)j] = (ssdgs_real)moves[j];
         memcpy(out + at.gradient, frame->gradient, SSDGS_CHANNELS * trainer->stride * sizeof *out);
         memcpy(out + at.globals, frame->global_gradient, trainer->model->global_count * sizeof *out);
         for (int pairs = i + 1; depth > 1 && (pairs % 2 == 0 || i + 1 == own); pairs /= 2, depth--)
@@ -11432,7 +11475,7 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     drawn->loss = (double)(mean * sums[1]);
     drawn->psnr = (double)(mean * sums[2]);
     drawn->shaded = (double)(mean * sums[3]);
-    for (int j = 0; j < 9 * batch; j++) moves[j] = (double)sums[at.moves + (size_t)j];
+    for (int j = 0; j < SSDGS__MOVES * batch; j++) moves[j] = (double)sums[at.moves + (size_t)j];
     for (size_t k = 0; k < at.globals - at.gradient; k++) frame->gradient[k] = mean * sums[at.gradient + k];
     for (size_t k = 0; k < at.statistics - at.globals; k++)
         frame->global_gradient[k] = mean * sums[at.globals + k];
@@ -11441,8 +11484,8 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
 }
 
 /* Moves the camera and the light of a photograph. */
-static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, const double gradient[9],
-                               const int moves[2]) {
+static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
+                               const double gradient[SSDGS__MOVES], const int moves[3]) {
     const ssdgs_train_options *o = &trainer->options;
     const double shows = (double)o->iterations / trainer->photo_count,
                  wider = shows < 300 ? sqrt(300 / shows) : 1;
@@ -11458,6 +11501,9 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, cons
         ssdgs__correction_step(correction, gradient, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                trainer->unit, angle);
+    if (moves[2]) ssdgs__intensity_step(correction, gradient);
+    if (moves[2] && o->rates.color.start > 0)
+        ssdgs__anchor_intensities(trainer); /* else the colours stay, and tell */
 }
 
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
@@ -11470,7 +11516,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     step.terms =
         ssdgs__phase(o, trainer->model->settings.asg, step.t, step.learns) & trainer->model->settings.terms;
     int photos[SSDGS__MAX_BATCH];
-    double moves[9 * SSDGS__MAX_BATCH];
+    double moves[SSDGS__MOVES * SSDGS__MAX_BATCH];
     for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
     const ssdgs_real *statistics = NULL;
     ssdgs__drawn drawn;
@@ -11479,16 +11525,17 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
                  ? ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn)
                  : ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
     if (result) return result;
-    const int refines[2] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
-                            (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3};
-    for (int i = 0; i < 9 * o->batch && !result; i++) {
-        const ssdgs_photo *photo = trainer->photos + photos[i / 9];
-        const int of_light = i % 9 > 5;
-        if (refines[of_light] && !(of_light && photo->light.kind != SSDGS_LIGHT_POINT) &&
+    const int refines[3] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
+                            (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3,
+                            (o->refine & SSDGS_REFINE_INTENSITY) && step.t >= 5e3};
+    for (int i = 0; i < SSDGS__MOVES * o->batch && !result; i++) {
+        const ssdgs_photo *photo = trainer->photos + photos[i / SSDGS__MOVES];
+        const int of = i % SSDGS__MOVES < 6 ? 0 : i % SSDGS__MOVES < 9 ? 1 : 2;
+        if (refines[of] && !(of == 1 && photo->light.kind != SSDGS_LIGHT_POINT) &&
             !ssdgs__finite((ssdgs_real)moves[i]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s is not finite",
-                                 before, photos[i / 9], of_light ? "light" : "camera");
+                                 before, photos[i / SSDGS__MOVES], of ? "light" : "camera");
     }
     if (!result) {
         const ssdgs_camera *camera = &trainer->photos[photos[0]].camera;
@@ -11496,7 +11543,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     }
     trainer->skipped += result != SSDGS_OK;
     for (int i = 0; i < o->batch && !result; i++)
-        ssdgs__refine_step(trainer, step.t, photos[i], moves + 9 * i, refines);
+        ssdgs__refine_step(trainer, step.t, photos[i], moves + SSDGS__MOVES * i, refines);
     ssdgs__model_changed(trainer->model);
     trainer->iteration = after;
     if (!result && ssdgs__schedule_time(o, after) <= o->densify_until) {
@@ -11652,16 +11699,16 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
             (ssdgs_real)0.2, 0,       1};
         result = ssdgs__photo_backward(&frame, model, &shot, &values);
         if (result) return result;
-        double gradient[9];
-        ssdgs__correct_backward(photo, correction.value, frame.view_gradient, gradient);
-        for (int j = 0; j < 3; j++) gradient[6 + j] = (double)frame.light_gradient[j];
-        for (int j = 0; j < 9; j++)
+        double gradient[SSDGS__MOVES];
+        ssdgs__moves_of(photo, correction.value, &frame, gradient);
+        for (int j = 0; j < SSDGS__MOVES; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j]))
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
         if (light.kind == SSDGS_LIGHT_POINT)
             ssdgs__correction_step(&correction, gradient, 1, rate, unit, angle);
+        ssdgs__intensity_step(&correction, gradient);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
     photo->camera = camera;
@@ -11682,7 +11729,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* Reads and writes it in native byte order; another version, precision or run is refused. */
 
-#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK3" /* the last letter changes with the layout */
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK4" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
@@ -11850,6 +11897,7 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
             if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
                 !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0)
                 return 0;
+        if (!ssdgs__finite((ssdgs_real)c.value[9]) || !(c.sure >= 0)) return 0;
         for (int j = 0; j < 2; j++)
             if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
     }

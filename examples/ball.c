@@ -1,4 +1,5 @@
-/* cc -O2 examples/ball.c -o ball -lm -lpthread: where the light was, from its highlight on a ball of chrome. */
+/* cc -O2 examples/ball.c -o ball -lm -lpthread: where the light was, from its highlight on a ball of chrome.
+ */
 #define SSDGS_IMPLEMENTATION
 #define SSDGS_NO_TRAINER
 #include "../ssdgs.h"

@@ -1069,6 +1069,7 @@ static void olat__exr_header(olat__exr *e) {
 
 /* Finds R, G, B and A, or Y: of the image itself, else of the first layer that has R or Y. */
 static void olat__exr_choose(olat__exr *e) {
+    static const char letters[] = "RGBAY";
     size_t layer = SIZE_MAX; /* letters before the channel's own name */
     const char *prefix = "";
     int found = 0;
@@ -1083,8 +1084,7 @@ static void olat__exr_choose(olat__exr *e) {
         const char *name = e->channels[i].name, *letter;
         e->channels[i].to = -1;
         if (layer == SIZE_MAX || strlen(name) != layer + 1 || memcmp(name, prefix, layer) != 0) continue;
-        if ((letter = strchr("RGBAY", name[layer])) == NULL) continue;
-        e->channels[i].to = (int)(letter - &"RGBAY"[0]);
+        if ((letter = strchr(letters, name[layer])) != NULL) e->channels[i].to = (int)(letter - letters);
     }
     for (int i = 0; i < e->channel_count; i++)
         if (e->channels[i].to >= 0) found |= 1 << e->channels[i].to;

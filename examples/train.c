@@ -64,7 +64,8 @@ static const char *const help[] = {
     "  --schedule NAME          order of the terms: merged (default), progressive (published), joint,",
     "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
-    "  --refine                 also fits camera poses and light positions, into MODEL.ply.refined.json",
+    "  --refine                 also fits camera poses, lights' positions and intensities, into",
+    "                           MODEL.ply.refined.json",
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
@@ -411,7 +412,7 @@ static int parse(job *j, int argc, char **argv) {
     if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
-    if (given[REFINE]) j->options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    if (given[REFINE]) j->options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY;
     for (int i = 0; i < 3; i++) {
         j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
         j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];

@@ -14,7 +14,7 @@ says() { # says CODE TEXT COMMAND...: ends with that code and says that
 hash_of() { find "$@" -type f -exec cksum {} + | sort; }
 differs() { ! cmp -s "$1" "$2"; }
 unchanged() { [ "$(hash_of "$set")" = "$before" ]; }
-psnr() { sed -n 's/.*"mean": {"psnr": \([-0-9.]*\).*/\1/p' "$1/metrics.json"; }
+psnr() { sed -n 's/^ "mean": {"psnr": \([-0-9.]*\).*/\1/p' "$1/metrics.json"; }
 near() { awk -v a="$1" -v b="$2" -v by="$3" 'BEGIN { exit !(a > b - by && a < b + by) }'; } # near A B BY
 
 rm -rf "$out"

@@ -744,7 +744,7 @@ static void test_full(const char *name, int defaults) {
     CHECK_L2(frame.light_gradient, gold(&file, "grad_light", NULL), 3, gradient_bound(), "full: grad_light");
     ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
-    double zero[9];
+    double zero[10];
     memset(zero, 0, sizeof zero);
     photo.camera = camera;
     double pose[6];

@@ -164,7 +164,7 @@ static void run(const scene *s) {
     ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
     photo.camera = camera;
-    double value[9];
+    double value[10];
     memset(value, 0, sizeof value);
     double pose[6];
     ssdgs__correct_backward(&photo, value, frame.view_gradient, pose);
@@ -208,7 +208,7 @@ static void run(const scene *s) {
         tally t = {0, 0, 0, 0};
         ssdgs_light lamp;
         ssdgs_camera moved;
-        double at[9] = {0.012, -0.02, 0.03, 0.2, -0.1, 0.15, 0, 0, 0};
+        double at[10] = {0.012, -0.02, 0.03, 0.2, -0.1, 0.15, 0, 0, 0, 0};
         ssdgs__correct(&photo, at, &moved, &lamp);
         objective(s, model, &moved, lights, &fixed, &frame, 1);
         ssdgs__correct_backward(&photo, at, frame.view_gradient, pose);

@@ -657,7 +657,7 @@ static void exponential(const double w[3], double e[9], double integral[9]) {
 }
 
 /* sum of weight . corrected view, in double. */
-static double weighted_view(const ssdgs_photo *photo, const double value[9], const ssdgs_real weight[12]) {
+static double weighted_view(const ssdgs_photo *photo, const double value[10], const ssdgs_real weight[12]) {
     double e[9], integral[9], sum = 0;
     exponential(value + 3, e, integral);
     for (int i = 0; i < 3; i++)
@@ -680,7 +680,7 @@ static void row_63(void) {
     make_photos(16);
     for (int a = 0; a < 12; a++)
         for (int axis = 0; axis < 4; axis++) {
-            double value[9], scale = 0;
+            double value[10] = {0}, scale = 0;
             for (int i = 0; i < 9; i++)
                 value[i] = i < 3 || i > 5 ? 0.1 * i
                            : axis == 3    ? ssdgs__uniform(41, (uint64_t)i) - 0.5
@@ -704,7 +704,7 @@ static void row_63(void) {
                 double difference[2];
                 for (int half = 0; half < 2; half++) {
                     const double h = half ? 1e-3 : 2e-3;
-                    double moved[9];
+                    double moved[10];
                     memcpy(moved, value, sizeof moved);
                     moved[i] += h;
                     difference[half] = weighted_view(&photos[1], moved, weight);
@@ -772,7 +772,7 @@ static void row_64(void) {
     o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     o.rates.camera.start = o.rates.light.start = (ssdgs_real)0.01; /* quickly there, then as fine as ever */
     for (int i = 0; i < count; i++) {
-        double value[9], length[3] = {0, 0, 0};
+        double value[10] = {0}, length[3] = {0, 0, 0};
         for (int c = 0; c < 9; c++) {
             value[c] = ssdgs__uniform(51, (uint64_t)(9 * i + c)) - 0.5;
             length[c / 3] += value[c] * value[c];

@@ -846,6 +846,42 @@ static void test_refinement(void) {
         printf("    cameras off by %g of %g, lights by %g of %g\n", off[1][0], off[0][0], off[1][1],
                off[0][1]);
     ssdgs_trainer_destroy(trainer);
+
+    /* intensities told wrong: those of a model that stays are found; where colours learn, too, up to a factor
+       that all have in common */
+    options.refine = SSDGS_REFINE_INTENSITY;
+    for (int learns = 0; learns < 2; learns++) {
+        double worst = 0, mean = 0, told = 0;
+        options.rates.color.start = options.rates.color.end = learns ? (ssdgs_real)1e-4 : 0;
+        for (p = 0; p < PHOTOS; p++) {
+            disturbed[p] = photos[p];
+            disturbed[p].pixels = pictures[p];
+            for (int c = 0; c < 3; c++) disturbed[p].light.intensity[c] *= (ssdgs_real)(p % 3 ? 0.7 : 1.4);
+        }
+        trainer = NULL;
+        CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
+        CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+        for (int pass = 0; pass < 2; pass++)
+            for (p = 0; p < PHOTOS; p++) {
+                ssdgs_photo now;
+                CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
+                const double factor = log((double)(now.light.intensity[1] / photos[p].light.intensity[1]));
+                if (pass) worst = fmax(worst, fabs(factor - (learns ? mean : 0)));
+                else {
+                    mean += factor / PHOTOS;
+                    told += trainer->corrections[p].sure * trainer->corrections[p].value[9];
+                    CHECK(trainer->corrections[p].sure > 0 &&
+                          fabs((double)(now.camera.view[3] - photos[p].camera.view[3])) < 1e-6);
+                }
+            }
+        if (!CHECK(worst < (learns ? 0.1 : 0.02)))
+            printf("    learns %d: intensities off by %g\n", learns, worst);
+        CHECK(!learns || fabs(told) < 1e-6 * trainer->corrections[0].sure);
+        ssdgs_trainer_destroy(trainer);
+        if (learns) break;
+        CHECK(!ssdgs_refine_photo(model, disturbed, background, 60));
+        CHECK(fabs((double)(disturbed[0].light.intensity[2] / photos[0].light.intensity[2]) - 1) < 0.03);
+    }
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
@@ -1912,7 +1948,7 @@ static void test_clipped(void) {
                 bytes[4 * i + 3] = (unsigned char)(255 * (double)alpha[i] + 0.5);
             }
             for (i = 0; i < SIDE * SIDE * 4 && way == 4; i++)
-                if (i % 4 < 3) floats[i] /= 2;
+                if (i % 4 < 3 && floats[i] > 2.2f) floats[i] /= 2; /* still more than white */
             photo.pixels = shown[way];
             photo.format = formats[way];
             ssdgs__loss_values values;
@@ -1928,7 +1964,9 @@ static void test_clipped(void) {
                                            1};
             CHECK(!ssdgs__photo_backward(&frame, model, &shot, &values));
             CHECK(full > SIDE);
-            if (!CHECK(way == 1 || way == 4 ? values.loss > 0.05 : values.loss < (way ? 1e-3 : 0.01)))
+            if (!CHECK(way == 1   ? values.loss > 0.05
+                       : way == 4 ? values.loss > 2e-3
+                                  : values.loss < (way ? 1e-3 : 0.01)))
                 printf("    transfer %d, %d: loss %g\n", transfer, way, values.loss);
         }
         ssdgs_model_destroy(model);
