@@ -11,7 +11,7 @@ enum { CELL = 96, COLUMNS = 12, MOST_CELLS = 96, RAYS = 1000, PLOT = 360, LISTED
 typedef struct facts {
     double shown;        /* share of its pixels that shows something: not transparent, not black */
     double bright, dark; /* light that 5 % of that exceeds, that 2 % falls below */
-    double clipped, dim; /* shares of it at full white, below a fortieth of that */
+    double clipped;      /* share of it at full white */
     double noise;        /* standard deviation of stored values, 0 .. 1 */
     double sharp;        /* of its finest differences against coarser ones */
     int has_outline;
@@ -71,7 +71,7 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
     double *light = (double *)malloc(n * sizeof *light), *fine = (double *)malloc(n * sizeof *fine);
     unsigned char *shown = (unsigned char *)malloc(n);
     size_t count = 0, clear = 0, fines = 0;
-    double clipped = 0, dim = 0, second = 0, first = 0;
+    double clipped = 0, second = 0, first = 0;
     const int failed = !stored || !light || !fine || !shown;
     if (!failed) {
         olat_compose(photo, SSDGS_TRANSFER_SRGB, black, stored);
@@ -89,7 +89,6 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
             if (!shown[i]) continue;
             light[count++] = sum;
             clipped += most > 0.998 && most < 1.0005;
-            dim += sum < 0.025;
         }
         for (int y = 1; y < h - 1; y++)
             for (int x = 1; x < w - 1; x++) {
@@ -111,7 +110,6 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
             }
         f->shown = (double)count / (double)n;
         f->clipped = count ? clipped / (double)count : 0;
-        f->dim = count ? dim / (double)count : 0;
         f->dark = percentile(light, count, 0.02);
         f->bright = percentile(light, count, 0.95);
         f->noise =
@@ -226,7 +224,7 @@ static int report_photographs(check *k) {
         say(k, 1,
             "all lights are within %.0f degrees of their camera: few shadows tell light from the room, and "
             "colour from light",
-            57.29577951308232 * acos(least_cosine));
+            57.29577951308232 * acos(fmin(1, least_cosine)));
     free(which);
     return 0;
 }
@@ -472,7 +470,8 @@ static int run(check *k) {
     if (report_training(k)) return 1;
     if (k->out && (draw_sheet(k, paths[0]) || draw_places(k, paths[1]))) return 1;
     if (k->out) printf("%s, %s\n", paths[0], paths[1]);
-    printf(k->problems ? "%d things to look at\n" : "nothing to look at\n", k->problems);
+    if (k->problems) printf("%d thing%s to look at\n", k->problems, k->problems == 1 ? "" : "s");
+    else printf("nothing to look at\n");
     return 0;
 }
 

@@ -210,7 +210,7 @@ check "nothing was written" test ! -e "$out/none.glb"
 
 # a capture, looked at before it is trained on
 mkdir "$out/checked"
-check "check" says 0 "^[0-9]* things to look at$" "$build/check" "$set" --out "$out/checked"
+check "check" says 0 "^[0-9]* things\\? to look at$" "$build/check" "$set" --out "$out/checked"
 check "how many photographs" grep -q "^-> [0-9]* photographs of 128 x 128: a hundred and more" "$out/log"
 check "its outlines" grep -q "^   all show the object's outline$" "$out/log"
 check "how long it takes" grep -q "20000 iterations take [0-9]* minutes and more here" "$out/log"

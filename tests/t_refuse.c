@@ -63,7 +63,7 @@ static const field train_fields[] = {
     I(densify_every, 1, 2000000000),
     I(opacity_reset_every, 0, 2000000000),
     I(batch, 1, 256),
-    I(refine, 0, 3),
+    I(refine, 0, 7),
     R(dssim, 0, 1),
     R(normal_weight, 0, 1e30),
     R(densify_gradient, 0, 1e30),
