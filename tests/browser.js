@@ -247,6 +247,9 @@ const alone = async () => {
         await moves(name)
         await picture('alone_' + name)
     }
+    await send('Emulation.setHardwareConcurrencyOverride', { hardwareConcurrency: 1 })
+    await open('one_cpu', `http://127.0.0.1:${host.address().port}/`)
+    check('isolated, with one CPU: draws', await rest())
     for (const plane in drawn.file) check(`${plane}: the same bytes with threads`, drawn.file[plane].equals(drawn.isolated[plane]))
     // files are dropped on it
     const drop = (name, bytes) => ask(`(async () => {
