@@ -159,6 +159,8 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM:$(CC)%=mpicc%) $(LINKED)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
+$(BUILD)/t_ball: examples/ball.c
+$(BUILD)/t_check: examples/check.c
 $(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
@@ -186,5 +188,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo view web test-browser test-gltf test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

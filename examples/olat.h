@@ -1135,7 +1135,7 @@ static const unsigned char *olat__exr_unpack(olat__exr *e, const unsigned char *
     if (e->problem) return in;
     for (size_t i = 1; i < capacity; i++)
         e->turned[i] = (unsigned char)((e->turned[i - 1] + e->turned[i] + 128) & 255);
-    for (size_t i = 0; i < capacity; i++) e->raw[i] = e->turned[i / 2 + (i & 1) * ((capacity + 1) / 2)];
+    for (size_t i = 0; i < capacity; i++) e->raw[i] = e->turned[i / 2 + (i & 1) * (capacity / 2)];
     return e->raw;
 }
 
@@ -1969,6 +1969,11 @@ static void olat__read_paths(olat__json *j, const olat__node *node, const char *
     if (of_mask && of_mask->type != OLAT__NULL) *mask = olat__join(j, folder, of_mask, NULL, 0, flags);
 }
 
+/* Whether numbers are light, not stored values. */
+static int olat__is_light(ssdgs_pixels format) {
+    return format == SSDGS_PIXELS_RGBA16F || format == SSDGS_PIXELS_RGBA32F;
+}
+
 /* A number of a photograph of bytes or words. */
 static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
     return format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)pixels)[i] : ((const unsigned char *)pixels)[i];
@@ -2030,7 +2035,7 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
             if (v > value) value = v;
         }
         value *= olat__sample(mask, format, 4 * i + 3);
-        if (frame->format == SSDGS_PIXELS_RGBA16F || frame->format == SSDGS_PIXELS_RGBA32F) {
+        if (olat__is_light(frame->format)) {
             const float alpha =
                 (float)olat__number(frame->pixels, frame->format, 4 * i + 3) * (float)value / (float)one;
             if (frame->format == SSDGS_PIXELS_RGBA32F) ((float *)frame->pixels)[4 * i + 3] = alpha;
@@ -2730,8 +2735,7 @@ OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
 OLAT__API void olat_compose(const ssdgs_photo *photo, int transfer, const ssdgs_real background[3],
                             ssdgs_real *out) {
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
-    const int encodes = transfer == SSDGS_TRANSFER_SRGB &&
-                        (photo->format == SSDGS_PIXELS_RGBA16F || photo->format == SSDGS_PIXELS_RGBA32F);
+    const int encodes = transfer == SSDGS_TRANSFER_SRGB && olat__is_light(photo->format);
     for (size_t i = 0; i < pixels; i++) {
         ssdgs_real v[4] = {0, 0, 0, 0};
         for (size_t k = 0; photo->pixels && k < 4; k++)

@@ -74,12 +74,12 @@ int main(void) {
     const double circle[3] = {100, 80, 40};
     double at[2], direction[3];
     memset(rgba, 0, sizeof rgba);
+    memset(rgba + 4 * (5 * W + 5), 255, 4); /* beside the ball */
     CHECK(!strcmp(highlight(rgba, W, H, circle, at), "nothing bright within the circle"));
     rgba[4 * (80 * W + 70)] = rgba[4 * (80 * W + 70) + 1] = rgba[4 * (80 * W + 70) + 2] = 255;
     CHECK(!highlight(rgba, W, H, circle, at) && fabs(at[0] - 70.5) < 1e-9 && fabs(at[1] - 80.5) < 1e-9);
     memcpy(rgba + 4 * (80 * W + 130), rgba + 4 * (80 * W + 70), 4);
     CHECK(!strcmp(highlight(rgba, W, H, circle, at), "more than one bright spot within the circle"));
-    memset(rgba + 4 * (5 * W + 5), 255, 4); /* beside the ball */
     const double middle[2] = {100, 80}, outside[2] = {150, 80};
     CHECK(reflected(circle, middle, 0, middle, direction) && fabs(direction[0]) < 1e-12 &&
           fabs(direction[2] - 1) < 1e-12);

@@ -61,6 +61,8 @@ static void test_measures(void) {
     draw(0.2, 0.7, 6, 0, 1);
     const facts crisp = measured();
     CHECK(crisp.sharp > 5 * clean.sharp && clean.sharp > 0);
+    draw(0.2, 0.98, 30, 0, 1);
+    CHECK(measured().clipped == 0);
     draw(0.2, 1.4, 30, 0, 1);
     CHECK(measured().clipped > 0.1);
     draw(0, 0.1, 30, 0, 0);
