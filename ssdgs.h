@@ -154,7 +154,7 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
-  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside others
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones, too
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
@@ -276,8 +276,8 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
 /* Gives back the memory that frames and training have left for the next; those that follow take it anew. What
    models and scenes keep stays theirs. */
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context);
-/* Runs task(data, 0) .. task(data, count - 1) on the context's threads, in any order, for what a program has
-   to do beside: it returns when all are done. Tasks may not call into the context. */
+/* Lends the context's threads: runs task(data, 0) .. task(data, count - 1) on them, in any order, and returns
+   when all are done. Tasks may not call into the context. ERR_ARGUMENT: no task. */
 SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
                                          void (*task)(void *data, int index), void *data);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
@@ -990,8 +990,7 @@ typedef struct ssdgs_frame {
     ssdgs_real
         *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
     ssdgs_real light_gradient[3]; /* position of light 0 */
-    double
-        intensity[2]; /* by how much ln of its intensity should grow to fit a photograph; how sure that is */
+    double intensity[2]; /* how far ln of its intensity is from fitting the photograph; how sure that is */
     ssdgs_real view_gradient[12]; /* camera.view */
     struct ssdgs__frame_memory *memory;
     struct ssdgs__scratch *scratch;
@@ -1481,9 +1480,8 @@ static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *l
 /* ---- scalar lanes ---- */
 
 static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties to even */
-#if defined(__wasm__) && !defined(SSDGS_REAL64) /* one instruction, and LLVM 14 loses volatile values here \
-                                                 */
-    return __builtin_rintf(x);
+#if defined(__wasm__) && !defined(SSDGS_REAL64)
+    return __builtin_rintf(x); /* one instruction; LLVM 14 mixes up volatile floats in what it vectorises */
 #else
     const ssdgs_real magic =
         sizeof(ssdgs_real) == 4 ? (ssdgs_real)12582912.0 : (ssdgs_real)6755399441055744.0;
@@ -9735,14 +9733,15 @@ static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
     for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* A part of the way to the intensity that fits best: the model has not learnt all yet. */
+/* Goes only a part of the way to the intensity that fits best: what does not fit yet may be the model. */
 static void ssdgs__intensity_step(ssdgs__correction *c, const double *moves) {
     const double step = moves[9] < -1 ? -1 : moves[9] > 1 ? 1 : moves[9];
     c->value[9] += SSDGS__INTENSITY_STEP * step;
     c->sure = moves[10];
 }
 
-/* Takes out of the corrections the factor that all intensities have in common: colours would follow. */
+/* Keeps the intensities' mean, each weighted by how sure it is: twice the light on colours half as bright
+   looks the same. */
 static void ssdgs__anchor_intensities(ssdgs_trainer *trainer) {
     double sum = 0, weight = 0;
     for (int i = 0; i < trainer->photo_count; i++) {
@@ -11367,8 +11366,8 @@ typedef struct ssdgs__drawn {
     double loss, psnr, shaded;
 } ssdgs__drawn;
 
-/* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in moves
-   (9). */
+/* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in
+   moves. */
 static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step *step, int iteration,
                                       int photo, ssdgs_frame *frame, double moves[SSDGS__MOVES],
                                       ssdgs__drawn *drawn) {
@@ -11427,8 +11426,8 @@ static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) 
 
 /* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits do not
    depend on how many processes share it. Leaves the mean gradients in the frame, all photographs' in moves
-   (batch, 9) and their statistics' sums, (SSDGS__STATISTICS, stride), where *statistics says. A process that
-   fails takes part in the sum, so that the others hear of it. */
+   (batch, SSDGS__MOVES) and their statistics' sums, (SSDGS__STATISTICS, stride), where *statistics says. A
+   process that fails takes part in the sum, so that the others hear of it. */
 static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
                                       ssdgs_frame *frame, double *moves, const ssdgs_real **statistics,
                                       ssdgs__drawn *drawn) {
@@ -11502,8 +11501,8 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                trainer->unit, angle);
     if (moves[2]) ssdgs__intensity_step(correction, gradient);
-    if (moves[2] && o->rates.color.start > 0)
-        ssdgs__anchor_intensities(trainer); /* else the colours stay, and tell */
+    if (moves[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
+        ssdgs__anchor_intensities(trainer);
 }
 
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
@@ -12206,7 +12205,7 @@ SSDGS__SMALL_END
 #define VBITS(m) ((int)wasm_i32x4_bitmask(m))
 #define VSEL(m, a, b) wasm_v128_bitselect(a, b, m)
 #define VROUND(a) wasm_f32x4_nearest(a)
-/* 1.5 x 2^23 more than a whole number has that number in its low bits */
+/* the float 1.5 x 2^23 + n has n in its low bits */
 #define VLDEXP(x, n) wasm_i32x4_add(x, wasm_i32x4_shl(VADD(n, VSET(12582912)), 23))
 #define VEXPONENT(x) wasm_f32x4_convert_i32x4(wasm_i32x4_sub(wasm_u32x4_shr(x, 23), wasm_i32x4_splat(127)))
 #endif

@@ -171,8 +171,7 @@ static int report_photographs(check *k) {
     if (!which) return fail("out of memory");
     for (int i = 0; i < set->count; i++) {
         outlines += f[i].has_outline;
-        floats +=
-            set->frames[i].format == SSDGS_PIXELS_RGBA16F || set->frames[i].format == SSDGS_PIXELS_RGBA32F;
+        floats += olat__is_light(set->frames[i].format);
         least = fmin(least, f[i].shown), most = fmax(most, f[i].shown);
     }
     printf("Photographs\n");

@@ -254,20 +254,21 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
     if (!result)
         result = ssdgs_scene_render(*scene, s->objects, s->count, &camera, lights, w->lights, &options,
                                     &image, stats);
+    if (result) return result;
     if (w->plane <= VIEW__SCATTERING) {
         for (size_t i = 0; i < 3 * pixels; i++) value[i] *= (float)w->value[VIEW__EXPOSURE][0];
         memset(&image, 0, sizeof image);
         image.color = value;
         ssdgs_to_pixels(&image, width, height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, s->bytes, 4 * width);
-        return result;
+        return SSDGS_OK;
     }
     float depth = 0;
     for (int c = 0; c < 3; c++) depth += (eye[c] - s->middle[c]) * (eye[c] - s->middle[c]);
     depth = sqrtf(depth);
-    for (size_t i = 0; i < pixels && !result; i++)
+    for (size_t i = 0; i < pixels; i++)
         view__pixel(w->plane, depth, s->radius, value + (w->plane == VIEW__NORMAL ? 3 * i : i),
                     image.alpha[i], s->bytes + 4 * i);
-    return result;
+    return SSDGS_OK;
 }
 
 /* Appends to text of a size. */

@@ -422,13 +422,6 @@ static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats
     if (!j->black++) fprintf(stderr, "relight: note: %s is black: %s\n", base_name(frame), why);
 }
 
-/* Scores a rendering of stored values beside job's photograph. */
-static ssdgs_result compare(job *j, const olat_frame *frame, const ssdgs_real *image, score *s) {
-    s->flip = olat_flip(image, j->photo, frame->camera.width, frame->camera.height);
-    if (s->flip < 0) return SSDGS_ERR_MEMORY;
-    return ssdgs_compare(j->context, image, j->photo, frame->camera.width, frame->camera.height, &s->is);
-}
-
 /* The image, and its metrics when there is a photograph, into job; with the components when they are asked
    for. */
 static ssdgs_result render(job *j, int index, int components) {
@@ -454,7 +447,10 @@ static ssdgs_result render(job *j, int index, int components) {
     if (!frame->has_image) return SSDGS_OK;
     const ssdgs_photo photo = olat_photo(frame);
     olat_compose(&photo, ssdgs_model_settings(j->model)->transfer, j->background, j->photo);
-    return compare(j, frame, j->image, j->scores[0] + index);
+    score *s = j->scores[0] + index;
+    s->flip = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);
+    if (s->flip < 0) return SSDGS_ERR_MEMORY;
+    return ssdgs_compare(j->context, j->image, j->photo, frame->camera.width, frame->camera.height, &s->is);
 }
 
 /* Scores a view whose camera and light may move to fit its photograph, which render() has left in job. */
@@ -463,7 +459,9 @@ static ssdgs_result fit(job *j, int index) {
     score *s = j->scores[1] + index;
     ssdgs_result result = ssdgs_refine_photo(j->model, &photo, j->background, FIT_STEPS);
     if (!result) result = ssdgs_evaluate(j->model, &photo, j->background, j->planes.color, &s->is);
-    return result ? result : compare(j, j->data.frames + index, j->planes.color, s);
+    if (result) return result;
+    s->flip = olat_flip(j->planes.color, j->photo, photo.camera.width, photo.camera.height);
+    return s->flip < 0 ? SSDGS_ERR_MEMORY : SSDGS_OK;
 }
 
 /* One output as (h,w,3) bytes. Colours are encoded for display; normals, depth, shadow and alpha are shown as

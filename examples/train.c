@@ -388,7 +388,8 @@ static int parse(job *j, int argc, char **argv) {
         return usage("no such background:", given[BACKGROUND]);
     if (!choose(given, TRANSFER, "srgb|none|linear", &j->settings.transfer))
         return usage("no such transfer:", given[TRANSFER]);
-    if (j->settings.transfer > SSDGS_TRANSFER_NONE) j->settings.transfer = SSDGS_TRANSFER_NONE;
+    if (j->settings.transfer > SSDGS_TRANSFER_NONE) /* linear: another word for none */
+        j->settings.transfer = SSDGS_TRANSFER_NONE;
     if (!choose(given, SCHEDULE, "progressive|joint|swapped|merged", &j->options.schedule))
         return usage("no such schedule:", given[SCHEDULE]);
     const char *terms = given[TERMS];

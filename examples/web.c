@@ -1,5 +1,5 @@
 /* The code of a page that needs no server: `make web` compiles it with emscripten for WebAssembly and puts it
-   into view.html with a model. A worker of the page calls web_start(), then web_add() and web_picture();
+   into view.html with a model. A worker of the page calls web_start(), then web_load() and web_picture();
    where pages may share memory others call web_help(), which never returns, and take part in its work. */
 #define SSDGS_IMPLEMENTATION
 #define SSDGS_NO_TRAINER
