@@ -10,8 +10,10 @@
 
    KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at
    the top or in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep);
-   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. A frame's
-   own key wins over the top's, one that tells a focal length over all of those. Distorted lenses are refused.
+   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. Or a
+   frame is a camera's, with lists of its photographs: light_positions, light_intensities, file_paths, less
+   those that exclude_list.txt names. A frame's own key wins over the top's, one that tells a focal length
+   over all of those. Distorted lenses are refused.
    IMAGES    PNG of any kind, as bytes or words; OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS
    or ZIP, as halves or floats: the display window, alpha divided out, R G B A or Y of the image or of its
    first layer. A name without an ending is .png, or .exr where there is no such PNG.
@@ -1333,7 +1335,8 @@ static int olat__json_fail(olat__json *j, const olat__node *node, const char *fo
     for (const olat__node *n = node; n->parent >= 0; n = &j->nodes[n->parent]) chain[depth++] = n;
     while (depth-- > 0 && used < sizeof keys) {
         const olat__node *n = chain[depth];
-        if (n->key) snprintf(keys + used, sizeof keys - used, "%s%.60s", used ? "." : "", n->key);
+        if (j->nodes[n->parent].type == OLAT__OBJECT)
+            snprintf(keys + used, sizeof keys - used, "%s%.60s", used ? "." : "", n->key);
         else snprintf(keys + used, sizeof keys - used, "[%d]", n->index);
         used = strlen(keys);
     }
@@ -2186,6 +2189,98 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
     }
 }
 
+/* ---- frames of several photographs ---- */
+
+/* The text of folder/exclude_list.txt, empty where there is none; NULL after a failure. */
+static char *olat__exclude_list(olat__json *j, const char *folder) {
+    const size_t room = strlen(folder) + 32;
+    char *path = (char *)malloc(room);
+    unsigned char *list = NULL;
+    struct stat there;
+    size_t size = 0;
+    if (path) snprintf(path, room, "%s%sexclude_list.txt", folder, *folder ? "/" : "");
+    if (path && stat(path, &there) == 0) j->failed = olat__read_file(path, &list, &size, j->error);
+    else if (!path || (list = (unsigned char *)calloc(1, 1)) == NULL)
+        j->failed = olat__fail(j->error, "%s: out of memory", olat__tail(folder));
+    free(path);
+    return (char *)list;
+}
+
+/* Whether a line of the list is the last name of a path, which has no ending. */
+static int olat__excluded(const char *list, const olat__node *path) {
+    size_t start = path->text_length, length;
+    if (path->type != OLAT__STRING) return 0;
+    while (start > 0 && path->text[start - 1] != '/' && path->text[start - 1] != '\\') start--;
+    for (; *list; list += length, list += strspn(list, "\r\n")) {
+        length = strcspn(list, "\r\n");
+        const size_t name = length > 4 && !strncmp(list + length - 4, ".png", 4) ? length - 4 : length;
+        if (name == path->text_length - start && !memcmp(list, path->text + start, name)) return 1;
+    }
+    return 0;
+}
+
+/* Puts a copy of a value before an object's members; 0 where memory is short. */
+static int olat__copy_member(olat__json *j, int object, const char *key, int value) {
+    const int copy = olat__json_add(j, -1, 0);
+    if (copy < 0) return 0;
+    olat__node *node = j->nodes + copy;
+    *node = j->nodes[value];
+    node->key = key;
+    node->key_length = strlen(key);
+    node->next = j->nodes[object].child;
+    j->nodes[object].child = copy;
+    return 1;
+}
+
+/* Makes frames of one photograph of those of SSS-GS, which have lists. What exclude_list.txt names is left
+   out. Lights are in the world, as cameras are: that program turns their axes and turns them back. */
+static void olat__unfold(olat__json *j, const char *folder) {
+    enum { LIGHTS, FILES = 2, LISTS, KEYS = 5 };
+    static const char *const keys[KEYS] = {"light_positions", "light_intensities", "file_paths", "width",
+                                           "height"},
+                             *const own[KEYS] = {"pl_pos", "pl_intensity", "file_path", "w", "h"};
+    const olat__node *found = olat__find(j, j->nodes, "frames");
+    const int frames = found && found->type == OLAT__ARRAY ? (int)(found - j->nodes) : 0;
+    char *list = NULL;
+    int count = 0, last = 0, next, good = 1;
+    for (int frame = frames ? found->child : 0; frame && good && !j->failed; frame = next) {
+        int value[KEYS], photos = 1; /* nodes: of each photograph, of all */
+        next = j->nodes[frame].next;
+        for (int k = 0; k < KEYS; k++) {
+            found = olat__find(j, j->nodes + frame, keys[k]);
+            value[k] = found ? (int)(found - j->nodes) : 0;
+        }
+        const int lists = value[LIGHTS] && j->nodes[value[LIGHTS]].type == OLAT__ARRAY;
+        if (lists) photos = j->nodes[value[LIGHTS]].size;
+        for (int k = 0; k < LISTS && lists; k++) {
+            found = j->nodes + value[k];
+            if (value[k] && (found->type != OLAT__ARRAY || found->size != photos))
+                olat__json_fail(j, found, "a list as long as light_positions was expected: of %d", photos);
+            value[k] = value[k] ? found->child : 0;
+        }
+        if (lists && !list && !j->failed) list = olat__exclude_list(j, folder);
+        for (int i = 0; i < photos && good && !j->failed; i++) {
+            int one = frame;
+            if (!lists || !value[FILES] || !olat__excluded(list, j->nodes + value[FILES])) {
+                if (lists && (good = (one = olat__json_add(j, -1, 0)) >= 0) != 0)
+                    j->nodes[one] = j->nodes[frame];
+                for (int k = 0; k < KEYS && lists && good; k++)
+                    if (value[k]) good = olat__copy_member(j, one, own[k], value[k]);
+                if (!good) break;
+                count++;
+                j->nodes[one].next = 0;
+                if (last) j->nodes[last].next = one;
+                else j->nodes[frames].child = one;
+                last = one;
+            }
+            for (int k = 0; k < LISTS && lists; k++) value[k] = value[k] ? j->nodes[value[k]].next : 0;
+        }
+    }
+    if (frames) j->nodes[frames].size = count;
+    if (!good) olat__json_fail(j, j->nodes + frames, "out of memory");
+    free(list);
+}
+
 /* Frees what olat_load made. */
 OLAT__API void olat_free(olat_dataset *set) {
     for (int i = 0; i < set->count; i++) {
@@ -2214,6 +2309,7 @@ static void olat__json_open(olat__json *j, const char *folder, const char *split
     j->text = (char *)text;
     j->end = j->text + size;
     olat__json_parse(j);
+    if (!j->failed) olat__unfold(j, folder);
 }
 
 static void olat__json_close(olat__json *j) {

@@ -1840,6 +1840,143 @@ static void test_exr(void) {
     remove(FOLDER "/e.exr");
 }
 
+/* The data forms of NRHints, GS3 and SSS-GS: twins of one scene have the same cameras, lights and pixels. */
+static void test_twins(void) {
+    enum { SIDE = 7, VIEWS = 2, LIGHTS = 2, FRAMES = VIEWS * LIGHTS };
+    static const double lights[FRAMES][3] = {{1, 2, 3}, {-2, 0.5, 1.5}, {0.25, -3, 2}, {2, 2, -1}};
+    static const double rgb[FRAMES][3] = {{2, 3, 4}, {5, 5, 5}, {1, 0.5, 0.25}, {9, 8, 7}};
+    static const char *const poses[VIEWS] = {"[[1,0,0,0.5],[0,1,0,0],[0,0,1,4],[0,0,0,1]]",
+                                             "[[0,0,1,3],[1,0,0,-0.5],[0,1,0,2],[0,0,0,1]]"};
+    static const char *const refined[VIEWS] = {"\"R_opt\":[[1,0,0],[0,-1,0],[0,0,-1]],\"T_opt\":[-0.5,0,4]",
+                                               "\"R_opt\":[[0,0,-1],[1,0,0],[0,-1,0]],\"T_opt\":[0.5,2,3]"};
+    const double focal = 0.5 * SIDE / tan(0.4);
+    mkdir(FOLDER "/twin", 0777);
+    char text[3][4000], *at[3] = {text[0], text[1], text[2]}, name[200];
+#define SAY(k, ...) (at[k] += snprintf(at[k], (size_t)(text[k] + sizeof text[k] - at[k]), __VA_ARGS__))
+    SAY(0, "{\"camera_angle_x\":0.8,\"camera_near\":0.1,\"camera_far\":9,\"frames\":[");
+    SAY(1, "{\"frames\":[");
+    SAY(2, "{\"frames\":[");
+    for (int i = 0; i < FRAMES; i++) {
+        const int view = i / LIGHTS, first = i % LIGHTS == 0;
+        unsigned char png[3 * SIDE * SIDE];
+        for (int k = 0; k < 3 * SIDE * SIDE; k++) png[k] = (unsigned char)(255 * (k * (i + 3) % 17 > 8));
+        snprintf(name, sizeof name, FOLDER "/twin/r_%d.png", i);
+        CHECK(!olat_write_png(name, SIDE, SIDE, 3, png, error));
+        { /* light of 1 and 0 is stored as 255 and 0 */
+            static const exr plain = {0,
+                                      {0, 0},
+                                      {0, 0, SIDE - 1, SIDE - 1},
+                                      {0, 0, SIDE - 1, SIDE - 1},
+                                      {"B", "G", "R", NULL},
+                                      {1, 1, 1},
+                                      0};
+            encode_exr(&plain);
+            for (int y = 0; y < SIDE; y++)
+                for (int c = 0; c < 3; c++)
+                    for (int x = 0; x < SIDE; x++) {
+                        const size_t pixel = (size_t)(y * SIDE + x),
+                                     to = file_size - (size_t)((SIDE - y) * 6 * SIDE + (SIDE - 1 - y) * 8) +
+                                          2 * (size_t)(c * SIDE + x);
+                        file[to] = 0;
+                        file[to + 1] = png[3 * pixel + (size_t)(2 - c)] ? 0x3C : 0; /* half of 1 */
+                    }
+            snprintf(name, sizeof name, FOLDER "/twin/e_%d.exr", i);
+            write_bytes(name);
+        }
+        SAY(0,
+            "%s{\"file_path\":\"./twin/r_%d\",\"file_ext\":\".png\",\"transform_matrix\":%s,"
+            "\"pl_pos\":[%g,%g,%g],\"pl_intensity\":[%g,%g,%g]}",
+            i ? "," : "", i, poses[view], lights[i][0], lights[i][1], lights[i][2], rgb[i][0], rgb[i][1],
+            rgb[i][2]);
+        SAY(1,
+            "%s{\"img_path\":\"twin/e_%d.exr\",\"original_file_path\":\"x\",%s,"
+            "\"camera_intrinsics\":[%g,%g,%.9g,%.9g],\"pl_pos\":[%g,%g,%g],\"pl_intensity\":[%g,%g,%g]}",
+            i ? "," : "", i, refined[view], 0.5 * SIDE, 0.5 * SIDE, focal, focal, lights[i][0], lights[i][1],
+            lights[i][2], rgb[i][0], rgb[i][1], rgb[i][2]);
+        if (!first) continue;
+        SAY(2,
+            "%s{\"width\":7,\"height\":7,\"fl_x\":%.9g,\"fl_y\":%.9g,\"cx\":3.5,\"cy\":3.5,"
+            "\"transform_matrix\":%s",
+            i ? "," : "", focal, focal, poses[view]);
+        for (int list = 0; list < 3; list++) {
+            SAY(2, ",\"%s\":[",
+                list == 0   ? "light_positions"
+                : list == 1 ? "light_intensities"
+                            : "file_paths");
+            for (int k = i; k < i + LIGHTS; k++) {
+                const double *v = list ? rgb[k] : lights[k];
+                SAY(2, k > i ? "," : "");
+                if (list < 2) SAY(2, "[%g,%g,%g]", v[0], v[1], v[2]);
+                else SAY(2, "\"twin/r_%d\"%s", k, k == i ? ",\"twin/no\"" : "");
+            }
+            SAY(2, "]");
+        }
+        SAY(2, "}");
+    }
+    for (int k = 0; k < 3; k++) SAY(k, "]}");
+    /* a photograph more than lights */
+    CHECK(load_fails(text[2], 0,
+                     "line 1: frames[0].file_paths: a list as long as light_positions was expected: of 2"));
+    for (char *more; (more = strstr(text[2], ",\"twin/no\"")) != NULL;)
+        memmove(more, more + 10, strlen(more + 10) + 1);
+    olat_dataset twins[3];
+    for (int k = 0; k < 3; k++) {
+        if (!CHECK(loads(text[k], 0))) return;
+        twins[k] = set;
+        CHECK(set.count == FRAMES && set.origin[0] == 0 && !*set.notes);
+    }
+    for (int i = 0; i < FRAMES; i++)
+        for (int k = 0; k < 3; k++) {
+            const olat_frame *f = twins[k].frames + i, *first = twins[0].frames + i;
+            const double lens[4] = {focal, focal, 0.5 * SIDE, 0.5 * SIDE};
+            CHECK(f->camera.width == SIDE && f->camera.height == SIDE && near_all(&f->camera.fx, lens, 4));
+            CHECK(f->light.kind == SSDGS_LIGHT_POINT && near_all(f->light.position, lights[i], 3) &&
+                  near_all(f->light.intensity, rgb[i], 3));
+            for (int j = 0; j < 12; j++)
+                CHECK(fabs((double)(f->camera.view[j] - first->camera.view[j])) < 1e-6);
+            CHECK(f->has_image && f->format == (k == 1 ? SSDGS_PIXELS_RGBA16F : SSDGS_PIXELS_RGBA8));
+            int apart = 0, shown = 0;
+            for (size_t j = 0; j < 4 * SIDE * SIDE; j++) {
+                const double value = (double)olat__number(f->pixels, f->format, j);
+                apart += fabs(value - (double)olat__number(first->pixels, first->format, j)) > 1e-6;
+                shown += value > 0.5;
+            }
+            CHECK(!apart && shown > 70 && shown < 4 * SIDE * SIDE);
+        }
+    for (int k = 0; k < 3; k++) olat_free(twins + k);
+
+    write_text(FOLDER "/exclude_list.txt", "\r\nr_1.png\nnone\r\nr_2\n");
+    if (CHECK(loads(text[2], 0)))
+        CHECK(set.count == 2 && strstr(set.frames[0].file, "r_0.png") &&
+              strstr(set.frames[1].file, "r_3.png") && near_all(set.frames[1].light.position, lights[3], 3));
+    olat_free(&set);
+    write_text(FOLDER "/exclude_list.txt", "r_0\nr_1\nr_2\nr_3");
+    CHECK(load_fails(text[2], 0, "there must be 1 to 2^20 frames"));
+    for (long k = 1; k < 200; k++) { /* memory that ends leaves none behind */
+        write_text(FOLDER "/exclude_list.txt", "r_1");
+        calls = 0, fail_at = k;
+        const int failed = olat_load(FOLDER, "set.json", 0, &set, error);
+        const long made = calls;
+        fail_at = 0;
+        CHECK(!failed || strstr(error, "out of memory"));
+        olat_free(&set);
+        CHECK(live == 0);
+        if (made < k) break;
+    }
+    remove(FOLDER "/exclude_list.txt");
+    mkdir(FOLDER "/exclude_list.txt", 0777);
+    CHECK(load_fails(text[2], 0, "exclude_list.txt"));
+    rmdir(FOLDER "/exclude_list.txt");
+    CHECK(load_fails("{\"frames\":[{\"light_positions\":[[1,2,3],4]," POSE
+                     ",\"file_paths\":[\"a\",\"a\"],\"width\":6,\"height\":4,\"fl_x\":5}]}",
+                     0, "line 1: frames[0].light_positions[1]: 3 numbers in an array were expected"));
+    CHECK(load_fails("{\"frames\":[{\"light_positions\":[]," POSE ",\"file_paths\":[]}]}", 0,
+                     "there must be 1 to 2^20 frames"));
+    CHECK(load_fails("{\"frames\":[{\"light_positions\":7," POSE ",\"file_paths\":[]}]}", 0,
+                     "pl_pos or pl_dir"));
+#undef SAY
+}
+
 static void test_far_places(void) {
     static const double places[6][3] = {{5e5, 6.5e5, 5e4},      {5e6, -5e6, 5e6}, {0, 0, 2e4},
                                         {-123456.789, 0.25, 7}, {0, 0, 0},        {90, 0, 0}};
@@ -2284,6 +2421,7 @@ int main(void) {
     test_masks();
     test_kinds_of_image();
     TEST_ROW("96", "OpenEXR of every kind, every byte changed, every truncation", test_exr());
+    test_twins();
     test_far_places();
     test_saved_digits();
     test_guard();
