@@ -337,6 +337,8 @@ typedef struct ssdgs_settings {
     ssdgs_real centre[3];      /* world: origin of the networks' positions */
     ssdgs_real length_unit;    /* world units in one unit of the networks */
     ssdgs_real light_scale;    /* factor from the dataset's intensities to the model's */
+    ssdgs_real ambient[3];     /* RGB, 0 or more: even light that the photographs have besides their lights.
+                                  Training and evaluation add it; renders do where options.ambient[0] is it */
     ssdgs_real origin[3];      /* world: where the model's 0 lies; only files use it, see CONVENTIONS */
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
@@ -630,7 +632,12 @@ typedef enum ssdgs_schedule { /* the paper's orders H to K */
     SSDGS_SCHEDULE_PROGRESSIVE = 0, SSDGS_SCHEDULE_JOINT, SSDGS_SCHEDULE_SWAPPED, SSDGS_SCHEDULE_MERGED
 } ssdgs_schedule;
 /* clang-format on */
-enum { SSDGS_REFINE_CAMERA = 1, SSDGS_REFINE_LIGHT = 2, SSDGS_REFINE_INTENSITY = 4 };
+enum {
+    SSDGS_REFINE_CAMERA = 1,
+    SSDGS_REFINE_LIGHT = 2,
+    SSDGS_REFINE_INTENSITY = 4,
+    SSDGS_REFINE_AMBIENT = 8
+};
 
 /* A learning rate: from start to end by equal factors, to or from 0 by equal steps. */
 typedef struct ssdgs_rate {
@@ -674,7 +681,8 @@ typedef struct ssdgs_train_options {
     int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
     int batch;  /* photographs a step, whose gradients are averaged; rates grow with its square root; 1 */
-    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses, light positions and intensities too; 0 */
+    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses, light positions and intensities, and
+                   settings.ambient, too; 0 */
     ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
     ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
     ssdgs_real normal_weight;    /* deferred: weight of blended normals' distance to the depth's; 0.05 */
@@ -989,7 +997,8 @@ typedef struct ssdgs_frame {
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
     ssdgs_real
         *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
-    ssdgs_real light_gradient[3]; /* position of light 0 */
+    ssdgs_real light_gradient[3];   /* position of light 0 */
+    ssdgs_real ambient_gradient[3]; /* options.ambient[0] */
     double intensity[2]; /* how far ln of its intensity is from fitting the photograph; how sure that is */
     ssdgs_real view_gradient[12]; /* camera.view */
     struct ssdgs__frame_memory *memory;
@@ -2464,6 +2473,9 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
     SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
     SSDGS__RANGE(light_scale, 0, (ssdgs_real)SSDGS__MOST_LIGHT);
+    SSDGS__RANGE(ambient[0], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
+    SSDGS__RANGE(ambient[1], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
+    SSDGS__RANGE(ambient[2], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
     SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
@@ -5406,7 +5418,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_p
     l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
     l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
     l.lights = b * SSDGS_CHANNELS;
-    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count
+    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count + (o->exposure != NULL)
                                                                 : 1); /* only the backward asks again */
     l.outs = b * (size_t)(l.widest + 1);
     l.lobe = l.outs + b * SSDGS__OUTS;
@@ -5832,9 +5844,37 @@ static void ssdgs__ambient_at(const ssdgs_real ambient[9][3], const ssdgs_real n
     }
 }
 
-/* Adds to a block's scattering rows what ambient light brings. Light scatters as beneath an evenly lit plane:
-   from the normal, and with as much transport of any length. A highlight mirrors the irradiance around its
-   direction, which is smooth; gloss_factor: what the object makes of it, or NULL. */
+/* A block's rows under ambient light of irradiance 1. Light scatters as beneath an evenly lit plane: from the
+   normal, and with as much transport of any length. f_s: a highlight mirrors the irradiance around its
+   direction, which is smooth. gloss_factor: what the object makes of highlights, or NULL. mirrored: those
+   directions. */
+static void ssdgs__ambient_rows(const ssdgs__lighting *lighting, const ssdgs__kernels *k,
+                                const ssdgs_real *gauss, const ssdgs_real *gloss_factor, ssdgs_real *rows,
+                                ssdgs_real mirrored[SSDGS__BLOCK][3]) {
+    k->reflect(lighting, gauss, rows);
+    memcpy(rows + SSDGS__WI * SSDGS__BLOCK, rows + SSDGS__NORMAL * SSDGS__BLOCK,
+           3 * SSDGS__BLOCK * sizeof *rows);
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
+        const ssdgs_real *n = rows + SSDGS__NORMAL * SSDGS__BLOCK + s,
+                         *wo = rows + SSDGS__WO * SSDGS__BLOCK + s;
+        const ssdgs_real facing =
+            n[0] * wo[0] + n[SSDGS__BLOCK] * wo[SSDGS__BLOCK] + n[2 * SSDGS__BLOCK] * wo[2 * SSDGS__BLOCK];
+        for (int c = 0; c < 3; c++) mirrored[s][c] = 2 * facing * n[c * SSDGS__BLOCK] - wo[c * SSDGS__BLOCK];
+        const ssdgs_real cosine = facing > 0 ? facing < 1 ? facing : 1 : 0, missing = 1 - cosine;
+        const ssdgs_real steep = cosine < SSDGS__GRAZING ? cosine / SSDGS__GRAZING : 1;
+        const ssdgs_real f0 = lighting->deferred
+                                  ? ssdgs__sigmoid_scalar(gauss[(SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s] +
+                                                          (ssdgs_real)SSDGS__F0_LOGIT)
+                                  : (ssdgs_real)SSDGS__F0;
+        const ssdgs_real fresnel = f0 + (1 - f0) * missing * missing * missing * missing * missing;
+        ssdgs_real gloss = lighting->specular ? fresnel * ssdgs__lobe_energy(lighting, gauss, s, 1) : 0;
+        gloss *= (lighting->deferred ? steep * steep : cosine) * (gloss_factor ? gloss_factor[s] : 1);
+        rows[SSDGS__GLOSS * SSDGS__BLOCK + s] = gloss * (ssdgs_real)0.31830988618379067;
+        rows[SSDGS__COSINE * SSDGS__BLOCK + s] = 1;
+    }
+}
+
+/* Adds to a block's scattering rows what ambient light brings. */
 static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o,
                                  const ssdgs__block_layout *l, ssdgs__row_lists *lists,
                                  const size_t at[SSDGS__BLOCK], const ssdgs_real *gloss_factor,
@@ -5842,14 +5882,14 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs__lighting *lighting = ssdgs__lightings(frame, o) + frame->light_count;
     const ssdgs_real *gauss = memory + l->gauss, *optics = NULL;
-    ssdgs_real *part = memory + l->lights, *rows = part + l->rows, *outs = scratch + l->outs;
-    ssdgs_real own[SSDGS__OUTS * SSDGS__BLOCK];
+    ssdgs_real *part =
+        memory + l->lights + l->light_size * (size_t)(frame->training ? frame->light_count : 0);
+    ssdgs_real *rows = part + l->rows, *outs = scratch + l->outs;
+    ssdgs_real own[SSDGS__OUTS * SSDGS__BLOCK], mirrored[SSDGS__BLOCK][3];
     memset(own, 0, sizeof own);
-    k->reflect(lighting, gauss, rows);
-    memcpy(rows + SSDGS__WI * SSDGS__BLOCK, rows + SSDGS__NORMAL * SSDGS__BLOCK,
-           3 * SSDGS__BLOCK * sizeof *rows);
+    ssdgs__ambient_rows(lighting, k, gauss, gloss_factor, rows, mirrored);
     for (size_t s = 0; s < SSDGS__BLOCK; s++) {
-        rows[SSDGS__COSINE * SSDGS__BLOCK + s] = rows[SSDGS__GLOSS * SSDGS__BLOCK + s] = 1;
+        rows[SSDGS__IRRADIANCE * SSDGS__BLOCK + s] = o->exposure[at[s] - (size_t)o->first];
         part[l->visibility + s] = 1;
         part[l->cue + s] = 0;
     }
@@ -5868,34 +5908,18 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
     if (ssdgs__has_medium(&o->settings, o->terms))
         ssdgs__medium_rows(lighting, o->medium, gauss, rows, part + l->transport, own);
     for (int s = 0; s < SSDGS__BLOCK; s++) {
-        ssdgs_real n[3], wo[3], mirrored[3], light[3], shine[3], facing = 0;
-        for (int c = 0; c < 3; c++) {
-            n[c] = rows[(SSDGS__NORMAL + c) * SSDGS__BLOCK + s];
-            wo[c] = rows[(SSDGS__WO + c) * SSDGS__BLOCK + s];
-            facing += n[c] * wo[c];
-        }
-        for (int c = 0; c < 3; c++) mirrored[c] = 2 * facing * n[c] - wo[c];
+        ssdgs_real n[3], light[3], shine[3];
+        for (int c = 0; c < 3; c++) n[c] = rows[(SSDGS__NORMAL + c) * SSDGS__BLOCK + s];
         if (o->turned) {
             ssdgs__turn(o, 0, n, n);
-            ssdgs__turn(o, 0, mirrored, mirrored);
+            ssdgs__turn(o, 0, mirrored[s], mirrored[s]);
         }
         ssdgs__ambient_at(frame->options.ambient, n, light);
-        ssdgs__ambient_at(frame->options.ambient, mirrored, shine);
-        const ssdgs_real cosine = facing > 0 ? facing < 1 ? facing : 1 : 0, missing = 1 - cosine;
-        const ssdgs_real steep = cosine < SSDGS__GRAZING ? cosine / SSDGS__GRAZING : 1;
-        const ssdgs_real f0 = lighting->deferred
-                                  ? ssdgs__sigmoid_scalar(gauss[(SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s] +
-                                                          (ssdgs_real)SSDGS__F0_LOGIT)
-                                  : (ssdgs_real)SSDGS__F0;
-        const ssdgs_real fresnel = f0 + (1 - f0) * missing * missing * missing * missing * missing;
-        ssdgs_real gloss = lighting->specular ? fresnel * ssdgs__lobe_energy(lighting, gauss, s, 1) : 0;
-        gloss *= (lighting->deferred ? steep * steep : cosine) * (gloss_factor ? gloss_factor[s] : 1);
-        const ssdgs_real exposure = o->exposure[at[s] - (size_t)o->first];
+        ssdgs__ambient_at(frame->options.ambient, mirrored[s], shine);
         for (int c = 0; c < 3; c++) {
             const ssdgs_real *to = own + c * SSDGS__BLOCK + s;
             outs[(6 + c) * SSDGS__BLOCK + s] +=
-                exposure * (light[c] * (to[0] + to[6 * SSDGS__BLOCK]) +
-                            shine[c] * (ssdgs_real)0.31830988618379067 * gloss * to[3 * SSDGS__BLOCK]);
+                light[c] * (to[0] + to[6 * SSDGS__BLOCK]) + shine[c] * to[3 * SSDGS__BLOCK];
         }
     }
 }
@@ -6215,6 +6239,25 @@ static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__
         for (int c = 0; c < 3; c++) rows[c * SSDGS__BLOCK + s] = s < live ? from[4 * at[s] + (size_t)c] : 0;
 }
 
+/* The lights that a training frame's Gaussians learn from: ambient light is one more. */
+static int ssdgs__learning_lights(const ssdgs_frame *frame) {
+    return frame->light_count + (frame->objects->exposure != NULL);
+}
+
+/* Gives ambient light's lighting its intensity, after adding that one's gradient to the lane sums where a
+   lamp's position has its own. */
+static void ssdgs__ambient_backward(const ssdgs_frame *frame, ssdgs__lighting *lamp,
+                                    const ssdgs__colour_in *in, const ssdgs_real *dcolor,
+                                    ssdgs_real *lane_sums) {
+    ssdgs_real own[SSDGS__OUTS * SSDGS__BLOCK];
+    memset(own, 0, sizeof own);
+    frame->context->k->colour(lamp, in, own);
+    for (int i = 0; i < 3 * SSDGS__BLOCK; i++)
+        lane_sums[i / SSDGS__BLOCK * 16 + i % 16] +=
+            dcolor[i] * (own[i] + own[3 * SSDGS__BLOCK + i] + own[6 * SSDGS__BLOCK + i]);
+    for (int c = 0; c < 3; c++) lamp->intensity[c] *= frame->options.ambient[0][c];
+}
+
 static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
                                         int slot) {
     const ssdgs_frame *frame = job->frame;
@@ -6249,17 +6292,22 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
     const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
     const ssdgs__network_scratch backward = {dnet, dnet2, scratch + l->transposed};
-    for (int light = 0; light < frame->light_count; light++) {
-        const ssdgs__lighting *lighting = ssdgs__lightings(frame, frame->objects) + light;
-        const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0);
-        const ssdgs_real *shadow = l->shadow_layers ? part + l->scattering_at - SSDGS__BLOCK : NULL;
+    const int lights = ssdgs__learning_lights(frame);
+    for (int light = 0; light < lights; light++) {
+        const int even = light == frame->light_count; /* ambient light, behind the others */
+        ssdgs__lighting lamp = ssdgs__lightings(frame, frame->objects)[light];
+        const ssdgs__lighting *lighting = &lamp;
+        const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light;
+        const ssdgs_real *shadow = l->shadow_layers && !even ? part + l->scattering_at - SSDGS__BLOCK : NULL;
         const ssdgs_real *scattering =
             part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
-        ssdgs_real *lane_sums =
-            job->lane_slots + (size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS * 16;
+        ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * lights + light) * SSDGS__LANE_SUMS * 16;
+        const int deferred = lighting->deferred && !even;
+        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
+        if (even) ssdgs__ambient_backward(frame, &lamp, &in, dcolor, lane_sums);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
-        if (lighting->deferred) {
+        if (deferred) {
             const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
@@ -6267,17 +6315,16 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             for (int s = 0; s < SSDGS__BLOCK; s++)
                 dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
-        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
         const ssdgs__colour_gradient out = {dcolor,
-                                            lighting->deferred ? ddiffuse : dcolor,
-                                            lighting->deferred ? dspecular : dcolor,
+                                            deferred ? ddiffuse : dcolor,
+                                            deferred ? dspecular : dcolor,
                                             dgauss,
                                             drows,
                                             dshadow,
                                             dnet,
                                             dvisibility};
         k->colour_backward(lighting, &in, &out);
-        for (int s = 0; lighting->deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
+        for (int s = 0; deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(k, settings, l, 0, gauss, part, inputs);
             ssdgs_real *dinputs = ssdgs__network_backward(k, &scattering_net, inputs, part + l->scattering_at,
@@ -6285,13 +6332,20 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
                                                           frame->frozen[0] ? NULL : slot_gradient);
             ssdgs__encode_inputs_backward(k, settings, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
-        if (l->shadow_layers) {
+        if (shadow) {
             memcpy(dnet, dshadow, SSDGS__BLOCK * sizeof *dnet);
             ssdgs__encode_inputs(k, settings, l, 1, gauss, part, inputs);
             ssdgs_real *dinputs = ssdgs__network_backward(
                 k, &shadow_net, inputs, part + l->shadow_at, &backward, lists, l->shadow[0],
                 frame->frozen[1] ? NULL : slot_gradient + job->slot_shadow);
             ssdgs__encode_inputs_backward(k, settings, l, 1, inputs, dinputs, dgauss, drows, dvisibility);
+        }
+        if (even) { /* it comes along the normal, wherever that points; the rest is held fixed */
+            for (int i = 0; i < 3 * SSDGS__BLOCK; i++) {
+                drows[SSDGS__NORMAL * SSDGS__BLOCK + i] += drows[SSDGS__WI * SSDGS__BLOCK + i];
+                drows[SSDGS__WI * SSDGS__BLOCK + i] = 0;
+            }
+            memset(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *drows);
         }
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
@@ -6303,7 +6357,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
 
 static void ssdgs__shade_backward_task(void *data, int slot) {
     const ssdgs__shade_job *job = (const ssdgs__shade_job *)data;
-    const size_t lanes = (size_t)SSDGS__LANE_SUMS * 16 * (size_t)job->frame->light_count;
+    const size_t lanes = (size_t)SSDGS__LANE_SUMS * 16 * (size_t)ssdgs__learning_lights(job->frame);
     ssdgs__row_lists lists;
     ssdgs__row_lists_fill(&lists);
     memset(job->slots + job->slot_stride * (size_t)slot, 0, job->slot_stride * sizeof(ssdgs_real));
@@ -6335,11 +6389,12 @@ static void ssdgs__eye_backward(ssdgs_frame *frame, const ssdgs_real deye[3]) {
 }
 
 /* Overwrites gradient and the networks' part of global_gradient, without layers the ASG's too; adds to
-   light_gradient and view_gradient. */
+   light_gradient, ambient_gradient and view_gradient. */
 static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
+    const int lights = ssdgs__learning_lights(frame);
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS,
-                 lanes = (size_t)SSDGS__LANE_SUMS * (size_t)frame->light_count;
+                 lanes = (size_t)SSDGS__LANE_SUMS * (size_t)lights;
     ssdgs__shade_job job;
     const ssdgs_result result = ssdgs__shade_setup(frame, &job);
     if (result) return result;
@@ -6355,15 +6410,15 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     ssdgs_real sums[SSDGS__LANE_SUMS];
     memset(sums, 0, sizeof sums);
     for (int slot = 0; slot < SSDGS__SLOTS; slot++)
-        for (int light = 0; light < frame->light_count; light++)
+        for (int light = 0; light < lights; light++)
             for (size_t i = 0; i < SSDGS__LANE_SUMS; i++) {
                 const ssdgs_real *row =
-                    job.lane_slots +
-                    ((size_t)(slot * frame->light_count + light) * SSDGS__LANE_SUMS + i) * 16;
+                    job.lane_slots + ((size_t)(slot * lights + light) * SSDGS__LANE_SUMS + i) * 16;
                 ssdgs_real sum = 0;
                 for (int lane = 0; lane < 16; lane++) sum += row[lane];
                 sums[i] += sum;
                 if (i < 3 && light == 0) frame->light_gradient[i] += sum;
+                if (i < 3 && light == frame->light_count) frame->ambient_gradient[i] += sum;
             }
     if (!frame->layer_count) ssdgs__asg_backward(frame, sums + 6);
     ssdgs__eye_backward(frame, sums + 3);
@@ -7252,9 +7307,10 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
 
 /* ---- light from all around ---- */
 
-/* Adds to a model's exposures those of one direction, and its weights to `sums`. */
+/* Adds to exposures those of one direction, and its weights to `sums`. */
 static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory **memory,
-                                       const ssdgs_real direction[3], ssdgs_real *sums) {
+                                       const ssdgs_real direction[3], ssdgs_real *exposure,
+                                       ssdgs_real *sums) {
     static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
     const ssdgs_object object = ssdgs_object_default(model);
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
@@ -7280,20 +7336,36 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
         ssdgs__rotation_scalar(raw, q, r);
         const ssdgs_real facing = r[2] * direction[0] + r[5] * direction[1] + r[8] * direction[2];
         if (!(facing > 0)) continue;
-        model->exposure[i] += facing * frame.visibility[i];
+        exposure[i] += facing * frame.visibility[i];
         sums[i] += facing;
     }
     return result;
 }
 
-/* Finds what an object's model leaves its Gaussians of an even sky, unless that is known: by the lights'
-   walk, from the corners of an icosahedron. */
-static ssdgs_result ssdgs__expose(ssdgs_placed *o) {
+/* exposure (2 x room): what of an even sky a model leaves its Gaussians, by the lights' walk from the corners
+   of an icosahedron. The second half is scratch. */
+static ssdgs_result ssdgs__expose_model(ssdgs_model *model, size_t room, ssdgs_real *exposure) {
     static const ssdgs_real a = (ssdgs_real)0.5257311121191336, b = (ssdgs_real)0.85065080835204;
-    ssdgs_model *model = o->model;
-    ssdgs_context *context = model->context;
     ssdgs__frame_memory *memory = NULL;
     ssdgs_result result = SSDGS_OK;
+    ssdgs_real *sums = exposure + room;
+    memset(exposure, 0, 2 * room * sizeof *sums);
+    for (int i = 0; i < 12 && !result; i++) {
+        ssdgs_real direction[3];
+        direction[i / 4] = 0;
+        direction[(i / 4 + 1) % 3] = i & 1 ? -a : a;
+        direction[(i / 4 + 2) % 3] = i & 2 ? -b : b;
+        result = ssdgs__expose_from(model, &memory, direction, exposure, sums);
+    }
+    ssdgs__frame_memory_destroy(model->context, memory);
+    for (int i = 0; i < model->count && !result; i++) exposure[i] = sums[i] > 0 ? exposure[i] / sums[i] : 1;
+    return result;
+}
+
+/* Finds the exposures of an object's Gaussians, unless they are known. */
+static ssdgs_result ssdgs__expose(ssdgs_placed *o) {
+    ssdgs_model *model = o->model;
+    ssdgs_context *context = model->context;
     if (o->settings.baked) return SSDGS_OK;
     if (model->exposure_room < model->capacity) {
         ssdgs__release(context, model->exposure);
@@ -7306,21 +7378,9 @@ static ssdgs_result ssdgs__expose(ssdgs_placed *o) {
     }
     o->exposure = model->exposure;
     if (model->exposure_revision == model->revision) return SSDGS_OK;
-    ssdgs_real *sums = model->exposure + model->exposure_room;
-    memset(model->exposure, 0, 2 * model->exposure_room * sizeof *sums);
-    for (int i = 0; i < 12 && !result; i++) {
-        ssdgs_real direction[3];
-        direction[i / 4] = 0;
-        direction[(i / 4 + 1) % 3] = i & 1 ? -a : a;
-        direction[(i / 4 + 2) % 3] = i & 2 ? -b : b;
-        result = ssdgs__expose_from(model, &memory, direction, sums);
-    }
-    ssdgs__frame_memory_destroy(context, memory);
-    if (result) return result;
-    for (int i = 0; i < model->count; i++)
-        model->exposure[i] = sums[i] > 0 ? model->exposure[i] / sums[i] : 1;
-    model->exposure_revision = model->revision;
-    return SSDGS_OK;
+    const ssdgs_result result = ssdgs__expose_model(model, model->exposure_room, model->exposure);
+    if (!result) model->exposure_revision = model->revision;
+    return result;
 }
 
 /* A part of an environment map: columns and rows, its light, and that times its directions. */
@@ -8068,6 +8128,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__R("centre_", 3, centre),
     SSDGS__R("length_unit", 0, length_unit),
     SSDGS__R("light_scale", 0, light_scale),
+    SSDGS__R("ambient_", 3, ambient),
     SSDGS__R("origin_", 3, origin),
     SSDGS__R("medium_scattering_", 3, medium.scattering),
     SSDGS__R("medium_absorption_", 3, medium.absorption),
@@ -8505,34 +8566,28 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
 
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
-    enum { ADDED = 13 };
+    enum { ADDED = 7 };
     static const struct {
         size_t at;
-        int index;
+        int count;
         double before;
     } added[ADDED] = {/* settings of later files, and what held before them */
-                      {offsetof(ssdgs_settings, transport), 0, 0},
-                      {offsetof(ssdgs_settings, octaves.view), 0, 4},
-                      {offsetof(ssdgs_settings, octaves.light), 0, 4},
-                      {offsetof(ssdgs_settings, pixel_variance), 0, 0.3},
-                      {offsetof(ssdgs_settings, origin), 0, 0},
-                      {offsetof(ssdgs_settings, origin), 1, 0},
-                      {offsetof(ssdgs_settings, origin), 2, 0},
-                      {offsetof(ssdgs_settings, medium.scattering), 0, 0},
-                      {offsetof(ssdgs_settings, medium.scattering), 1, 0},
-                      {offsetof(ssdgs_settings, medium.scattering), 2, 0},
-                      {offsetof(ssdgs_settings, medium.absorption), 0, 0},
-                      {offsetof(ssdgs_settings, medium.absorption), 1, 0},
-                      {offsetof(ssdgs_settings, medium.absorption), 2, 0}};
+                      {offsetof(ssdgs_settings, transport), 1, 0},
+                      {offsetof(ssdgs_settings, octaves), 2, 4},
+                      {offsetof(ssdgs_settings, pixel_variance), 1, 0.3},
+                      {offsetof(ssdgs_settings, ambient), 3, 0},
+                      {offsetof(ssdgs_settings, origin), 3, 0},
+                      {offsetof(ssdgs_settings, medium.scattering), 3, 0},
+                      {offsetof(ssdgs_settings, medium.absorption), 3, 0}};
     int next = 0;
     uint32_t words[SSDGS__PLY_WORDS];
     memset(words, 0, sizeof words);
     for (int i = 0; i <= ADDED; i++) {
-        const int word = i < ADDED ? (int)(added[i].at / sizeof(int)) + added[i].index : SSDGS__PLY_WORDS;
+        const int word = i < ADDED ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
         const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
-        if (i < ADDED) words[word] = ssdgs__ply_bits(added[i].before);
-        next = word + 1;
+        for (next = word; i < ADDED && next < word + added[i].count; next++)
+            words[next] = ssdgs__ply_bits(added[i].before);
     }
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
@@ -9101,7 +9156,7 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light
    shift, ln of its intensity's factor. What moves them: gradients of the first nine, a Gauss-Newton step of
    the last and how sure it is. */
-#define SSDGS__MOVES 11
+#define SSDGS__MOVES 14
 typedef struct ssdgs__correction {
     double value[10], mean[9], square[9];
     double sure;  /* how well the photograph tells the intensity */
@@ -9129,10 +9184,17 @@ struct ssdgs_trainer {
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
+    ssdgs_real *exposure; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
+    int exposed;          /* those are of these Gaussians */
+    struct {
+        double mean[3], square[3]; /* Adam's moments of settings.ambient, and its clock */
+        int32_t steps, padding;
+    } ambient;
     double extent;        /* 1.1 x the cameras' radius */
     int budget;           /* density control makes no more Gaussians */
     int outlines;         /* photographs show where the object ends */
     int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
+    int one_light;        /* they do not tell how the object looks in other light */
     double unit;          /* the bounds' longest side */
     double start_size;    /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -9398,6 +9460,7 @@ static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], co
     ssdgs__correct_backward(photo, value, frame->view_gradient, moves);
     for (int i = 0; i < 3; i++) moves[6 + i] = (double)frame->light_gradient[i];
     for (int i = 0; i < 2; i++) moves[9 + i] = frame->intensity[i];
+    for (int i = 0; i < 3; i++) moves[11 + i] = (double)frame->ambient_gradient[i];
 }
 
 #define SSDGS__PIXELS 1024               /* of an exposure task */
@@ -9519,6 +9582,8 @@ typedef struct ssdgs__photo_job {
     int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_real dssim, normal_weight;
     int exact; /* 1: for poses and lights; 0: with default options, which Gaussians learn from as well */
+    const ssdgs_real *exposure; /* of the Gaussians to settings.ambient, if there is or may be any; NULL: as
+                                   the model is */
 } ssdgs__photo_job;
 
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
@@ -9531,7 +9596,12 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     options.terms = shot->terms;
     options.max_error = 0; /* all that a pixel blends gets a gradient */
+    if (!shot->exposure) memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
     ssdgs_result result = ssdgs__frame_of_model(frame, model, camera, shot->light, 1, &options, 0, 1);
+    if (!result && shot->exposure) {
+        memcpy(frame->options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
+        frame->objects->exposure = shot->exposure;
+    }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     ssdgs__exposure_job job;
@@ -9795,6 +9865,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
+#define SSDGS__DOUBT 0.02      /* what a highlight or scattered light costs where it is a guess, of L1 */
 #define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
 #define SSDGS__HALVED \
     0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
@@ -9802,6 +9873,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 static void ssdgs__rearranged(ssdgs_trainer *trainer) {
     trainer->arrangement = ++trainer->model->arrangement;
+    trainer->exposed = 0;
 }
 
 /* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move:
@@ -9819,7 +9891,7 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
     ssdgs_real *statistics =
-        (ssdgs_real *)ssdgs__allocate(context, SSDGS__STATISTICS * capacity * sizeof(ssdgs_real));
+        (ssdgs_real *)ssdgs__allocate(context, (SSDGS__STATISTICS + 2) * capacity * sizeof(ssdgs_real));
     ssdgs_real *grown[3];
     for (size_t i = 0; i < 3; i++)
         grown[i] = statistics ? (ssdgs_real *)ssdgs__allocate(context, bytes) : NULL;
@@ -9839,6 +9911,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     trainer->screen_count = statistics + capacity;
     trainer->contribution = statistics + 2 * capacity;
     trainer->half_shadow = statistics + 3 * capacity;
+    trainer->exposure = statistics + SSDGS__STATISTICS * capacity;
+    trainer->exposed = 0;
     if (capacity != model->capacity) model->arrangement++;
     trainer->arrangement = model->arrangement;
     trainer->stride = model->capacity = capacity;
@@ -10445,7 +10519,8 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(densify_every, 1, 2000000000);
     SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
     SSDGS__RANGE(batch, 1, SSDGS__MAX_BATCH);
-    SSDGS__RANGE(refine, 0, SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY);
+    SSDGS__RANGE(refine, 0,
+                 SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT);
     SSDGS__RANGE(dssim, 0, 1);
     SSDGS__RANGE(normal_weight, 0, most);
     SSDGS__RANGE(densify_gradient, 0, most);
@@ -11027,7 +11102,7 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
 
 /* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes.
    radius: of the cameras. */
-static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radius) {
+static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
     ssdgs_context *context = trainer->context;
     const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
@@ -11069,6 +11144,7 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
             "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
             within, n);
     if (n < 2 || (points && points < n)) return SSDGS_OK;
+    trainer->one_light = 1;
     if (sqrt(spread) < 0.03 * lit_from)
         ssdgs__note(
             context,
@@ -11082,7 +11158,10 @@ static ssdgs_result ssdgs__note_lights(const ssdgs_trainer *trainer, double radi
                     "not tell how the object looks in other light",
                     floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);
-    else return ssdgs__note_shading(trainer, centre);
+    else {
+        trainer->one_light = 0;
+        return ssdgs__note_shading(trainer, centre);
+    }
     return SSDGS_OK;
 }
 
@@ -11352,6 +11431,21 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, s
     }
 }
 
+/* Adds the gradient of SSDGS__DOUBT x the image of highlights' and scattering's colours, where photographs
+   are lit from one place, as the camera sees it: they cannot tell these from a matt surface in other light.
+ */
+static void ssdgs__doubt(const ssdgs_trainer *trainer, const ssdgs_frame *frame, double pixels) {
+    for (int i = 0; i < frame->shaded_count && trainer->one_light; i++) {
+        const size_t g = frame->shaded[i];
+        const ssdgs_real weight = frame->splat_gradient[SSDGS__SPLAT * g + 6];
+        for (int c = 0; c < 6; c++) {
+            const size_t at = (size_t)(SSDGS_SPECULAR + c) * trainer->stride + g;
+            frame->gradient[at] += (ssdgs_real)(SSDGS__DOUBT / (3 * pixels)) * weight *
+                                   ssdgs__sigmoid_scalar(trainer->model->gaussians[at]);
+        }
+    }
+}
+
 /* Whether the Gaussians are where the trainer left them. */
 static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
     return trainer->arrangement == trainer->model->arrangement
@@ -11365,6 +11459,13 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
 typedef struct ssdgs__drawn {
     double loss, psnr, shaded;
 } ssdgs__drawn;
+
+/* Whether photographs have ambient light, or may have. */
+static int ssdgs__sees_ambient(const ssdgs_trainer *trainer) {
+    const ssdgs_real *ambient = trainer->model->settings.ambient;
+    return trainer->options.refine & SSDGS_REFINE_AMBIENT || ambient[0] > 0 || ambient[1] > 0 ||
+           ambient[2] > 0;
+}
 
 /* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in
    moves. */
@@ -11392,12 +11493,14 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                    {!learns[SSDGS__SCATTERING_NET], !learns[SSDGS__SHADOW_NET]},
                                    o->dssim,
                                    o->normal_weight,
-                                   o->refine};
+                                   o->refine & ~SSDGS_REFINE_AMBIENT,
+                                   ssdgs__sees_ambient(trainer) ? trainer->exposure : NULL};
     const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &shot, &values);
     if (result) return result;
     ssdgs__moves_of(trainer->photos + photo, correction, frame, moves);
     ssdgs__fade(trainer, step->t, (double)camera.width * camera.height,
                 frame->gradient + SSDGS_OPACITY * frame->gaussians.stride);
+    ssdgs__doubt(trainer, frame, (double)camera.width * camera.height);
     if (!iteration && !frame->shaded_count)
         ssdgs__note(
             trainer->context,
@@ -11505,6 +11608,28 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
         ssdgs__anchor_intensities(trainer);
 }
 
+#define SSDGS__EXPOSE_EVERY 100  /* iterations, to how much of ambient light comes where */
+#define SSDGS__AMBIENT_RATE 0.01 /* of the lamps' light */
+
+/* Adam on settings.ambient, by the moves of a batch. */
+static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *moves) {
+    ssdgs_settings *s = &trainer->model->settings;
+    const int batch = trainer->options.batch, steps = ++trainer->ambient.steps;
+    const double rate =
+        SSDGS__AMBIENT_RATE * (1 - 0.99 * t / ssdgs__schedule_end(&trainer->options)) * sqrt((double)batch);
+    for (int c = 0; c < 3; c++) {
+        double g = 0, *mean = trainer->ambient.mean + c, *square = trainer->ambient.square + c;
+        for (int i = 0; i < batch; i++) g += moves[SSDGS__MOVES * i + 11 + c] / batch;
+        *mean = 0.9 * *mean + 0.1 * g;
+        *square = 0.999 * *square + 0.001 * g * g;
+        const double value = (double)s->ambient[c] -
+                             rate / (double)s->light_scale * *mean *
+                                 (double)ssdgs__bias_correction(0.9, steps) /
+                                 (sqrt(*square * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
+        s->ambient[c] = (ssdgs_real)(value > 0 ? value < SSDGS__MOST_LIGHT ? value : SSDGS__MOST_LIGHT : 0);
+    }
+}
+
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     const ssdgs_train_options *o = &trainer->options;
     const int before = trainer->iteration, after = before + o->batch;
@@ -11514,6 +11639,12 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     step.t = ssdgs__schedule_time(o, before);
     step.terms =
         ssdgs__phase(o, trainer->model->settings.asg, step.t, step.learns) & trainer->model->settings.terms;
+    if (ssdgs__sees_ambient(trainer) &&
+        (!trainer->exposed || before / SSDGS__EXPOSE_EVERY > (before - o->batch) / SSDGS__EXPOSE_EVERY)) {
+        result = ssdgs__expose_model(trainer->model, trainer->stride, trainer->exposure);
+        if (result) return result;
+        trainer->exposed = 1;
+    }
     int photos[SSDGS__MAX_BATCH];
     double moves[SSDGS__MOVES * SSDGS__MAX_BATCH];
     for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
@@ -11524,17 +11655,21 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
                  ? ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn)
                  : ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
     if (result) return result;
-    const int refines[3] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
+    const int refines[4] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
                             (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3,
-                            (o->refine & SSDGS_REFINE_INTENSITY) && step.t >= 5e3};
+                            (o->refine & SSDGS_REFINE_INTENSITY) && step.t >= 5e3,
+                            (o->refine & SSDGS_REFINE_AMBIENT) != 0};
     for (int i = 0; i < SSDGS__MOVES * o->batch && !result; i++) {
         const ssdgs_photo *photo = trainer->photos + photos[i / SSDGS__MOVES];
-        const int of = i % SSDGS__MOVES < 6 ? 0 : i % SSDGS__MOVES < 9 ? 1 : 2;
+        const int j = i % SSDGS__MOVES, of = j < 6 ? 0 : j < 9 ? 1 : j < 11 ? 2 : 3;
         if (refines[of] && !(of == 1 && photo->light.kind != SSDGS_LIGHT_POINT) &&
             !ssdgs__finite((ssdgs_real)moves[i]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s is not finite",
-                                 before, photos[i / SSDGS__MOVES], of ? "light" : "camera");
+                                 before, photos[i / SSDGS__MOVES],
+                                 of == 3 ? "ambient light"
+                                 : of    ? "light"
+                                         : "camera");
     }
     if (!result) {
         const ssdgs_camera *camera = &trainer->photos[photos[0]].camera;
@@ -11543,6 +11678,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     trainer->skipped += result != SSDGS_OK;
     for (int i = 0; i < o->batch && !result; i++)
         ssdgs__refine_step(trainer, step.t, photos[i], moves + SSDGS__MOVES * i, refines);
+    if (!result && refines[3]) ssdgs__ambient_step(trainer, step.t, moves);
     ssdgs__model_changed(trainer->model);
     trainer->iteration = after;
     if (!result && ssdgs__schedule_time(o, after) <= o->densify_until) {
@@ -11614,6 +11750,7 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
                                     ssdgs_metrics *metrics) {
     ssdgs_context *context = model->context;
     ssdgs_render_options options = ssdgs_render_options_exact();
+    memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
     if (!metrics) return ssdgs__null(context, "ssdgs_evaluate", "metrics");
     memset(metrics, 0, sizeof *metrics);
     if (!photo || !background) return ssdgs__null(context, "ssdgs_evaluate", photo ? "background" : "photo");
@@ -11695,7 +11832,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         ssdgs_frame frame;
         const ssdgs__photo_job shot = {
             photo,           &camera, &light, background, model->settings.terms, {frozen[0], frozen[1]},
-            (ssdgs_real)0.2, 0,       1};
+            (ssdgs_real)0.2, 0,       1,      NULL};
         result = ssdgs__photo_backward(&frame, model, &shot, &values);
         if (result) return result;
         double gradient[SSDGS__MOVES];
@@ -11728,7 +11865,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* Reads and writes it in native byte order; another version, precision or run is refused. */
 
-#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK4" /* the last letter changes with the layout */
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK5" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
@@ -11743,7 +11880,8 @@ typedef struct ssdgs__checkpoint_head {
     uint64_t inputs; /* hash of options, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
-    double start_size;
+    double start_size, ambient[6]; /* Adam's moments of settings.ambient */
+    int32_t ambient_steps, exposed;
     ssdgs_settings settings;
 } ssdgs__checkpoint_head;
 
@@ -11759,11 +11897,12 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     planes[0] = model->gaussians;
     planes[1] = trainer->mean;
     planes[2] = trainer->square;
-    ssdgs_real *statistics[SSDGS__STATISTICS];
+    ssdgs_real *statistics[SSDGS__STATISTICS + 1];
     statistics[0] = trainer->screen_gradient;
     statistics[1] = trainer->screen_count;
     statistics[2] = trainer->contribution;
     statistics[3] = trainer->half_shadow;
+    statistics[4] = trainer->exposure;
     ssdgs_real *shared[3];
     shared[0] = model->globals;
     shared[1] = trainer->global_mean;
@@ -11773,18 +11912,18 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
             result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
         if (!result) result = visit(user, shared[i], globals);
     }
-    for (int i = 0; i < SSDGS__STATISTICS && !result; i++) result = visit(user, statistics[i], n);
+    for (int i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) result = visit(user, statistics[i], n);
     if (!result)
         result =
             visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
     return result;
 }
 
-/* Whether two differ in nothing but what training sets: centre, length_unit, light_scale, origin. Compares
-   two pieces, without the padding between them. */
+/* Whether two differ in nothing but what training sets: centre, length_unit, light_scale, ambient, origin.
+   Compares two pieces, without the padding between them. */
 static int ssdgs__settings_alike(const ssdgs_settings *a, const ssdgs_settings *b) {
     const size_t first =
-                     offsetof(ssdgs_settings, shadow) + sizeof a->shadow - offsetof(ssdgs_settings, terms),
+                     offsetof(ssdgs_settings, octaves) + sizeof a->octaves - offsetof(ssdgs_settings, terms),
                  second = offsetof(ssdgs_settings, eta) + sizeof a->eta - offsetof(ssdgs_settings, light_map);
     return !memcmp(&a->terms, &b->terms, first) && !memcmp(&a->light_map, &b->light_map, second);
 }
@@ -11821,6 +11960,9 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->skipped = trainer->skipped;
     for (int i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
     head->start_size = trainer->start_size;
+    memcpy(head->ambient, &trainer->ambient, sizeof head->ambient);
+    head->ambient_steps = trainer->ambient.steps;
+    head->exposed = trainer->exposed;
     head->settings = trainer->model->settings;
 }
 
@@ -11882,7 +12024,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const ch
 static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const unsigned char *at) {
     const size_t planes = (size_t)head->count * SSDGS_CHANNELS, shared = (size_t)head->global_count;
     const size_t sizes[7] = {
-        planes, shared, planes, shared, planes, shared, (size_t)head->count * SSDGS__STATISTICS};
+        planes, shared, planes, shared, planes, shared, (size_t)head->count * (SSDGS__STATISTICS + 1)};
     for (int part = 0; part < 7; part++)
         for (size_t k = 0; k < sizes[part]; k++, at += sizeof(ssdgs_real)) {
             ssdgs_real x;
@@ -11921,16 +12063,21 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         reason = "it belongs to other options, settings or photographs";
     if (!reason &&
         (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
-         (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS)) ||
+         (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1)) ||
          head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 ||
          head.skipped > head.iteration || !(head.start_size >= 0 && head.start_size < 1e30)))
         reason = "its counts are out of range";
     for (int i = 0; i < SSDGS__GROUPS && !reason; i++)
         if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
+    for (int i = 0; i < 6 && !reason; i++)
+        if (!ssdgs__finite((ssdgs_real)head.ambient[i]) || (i > 2 && head.ambient[i] < 0))
+            reason = "its values are out of range";
+    if (!reason && (head.ambient_steps < 0 || head.ambient_steps > head.iteration || (head.exposed | 1) != 1))
+        reason = "its counts are out of range";
     if (!reason) {
         const size_t expected =
             sizeof head + 8 + (size_t)head.photo_count * sizeof(ssdgs__correction) +
-            sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS) +
+            sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1) +
                                   3 * (size_t)head.global_count);
         uint64_t hash;
         memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
@@ -11955,12 +12102,15 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         trainer->iteration = head.iteration;
         trainer->skipped = head.skipped;
         trainer->start_size = head.start_size;
+        memcpy(&trainer->ambient, head.ambient, sizeof head.ambient);
+        trainer->ambient.steps = head.ambient_steps;
         for (int i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         ssdgs__checkpoint_io io;
         io.bytes = bytes + sizeof head;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
         ssdgs__model_changed(trainer->model);
         ssdgs__rearranged(trainer);
+        trainer->exposed = head.exposed;
     }
     ssdgs__release(context, bytes);
     return result;

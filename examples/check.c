@@ -216,8 +216,8 @@ static int report_photographs(check *k) {
     if (weight > 0) {
         share /= weight;
         say(k, share > 0.08, "the darkest parts have %.0f %% of the bright ones' light%s", 100 * share,
-            share > 0.08 ? ": a bright room, or an object that light passes. Darken the room, or subtract a "
-                           "photograph without the lamp"
+            share > 0.08 ? ": a bright room, or an object that light passes. Darken the room, or train "
+                           "with --refine, which learns even light from the room"
                          : ": the room is dark");
     } else
         say(k, 1,

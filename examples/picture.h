@@ -331,7 +331,8 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
     const int width = photo->camera.width, height = photo->camera.height;
     const size_t pixels = (size_t)width * (size_t)height;
     const float black[3] = {0, 0, 0};
-    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    memcpy(options.ambient[0], ssdgs_model_settings(s->models[0])->ambient, sizeof options.ambient[0]);
     ssdgs_image image;
     ssdgs_result result = view__room(s, 2 * pixels) ? SSDGS_OK : SSDGS_ERR_MEMORY;
     memset(&image, 0, sizeof image);

@@ -23,14 +23,15 @@ enum {
     ISA,
     NETWORKS,
     REDUCE,
+    AMBIENT,
     TRAJECTORY, /* it and those after it take no value */
     COMPONENTS,
     FIT,
     OPTION_COUNT
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "--split",    "--out",    "--background", "--sheet",      "--threads", "--isa",
-    "--networks", "--reduce", "--trajectory", "--components", "--fit"};
+    "--split",    "--out",    "--background", "--sheet",      "--threads",    "--isa",
+    "--networks", "--reduce", "--ambient",    "--trajectory", "--components", "--fit"};
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
@@ -47,6 +48,8 @@ static const char *const help[] = {
     "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
     "                           shadow, normal",
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
+    "  --ambient FACTOR         of the light from the room that the model's photographs had; 1, 0 leaves",
+    "                           it out",
     "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
     "                           DIR/reduced.ply",
     "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped",
@@ -90,6 +93,7 @@ typedef struct job {
     ssdgs_context_desc desc;
     ssdgs_real background[3];
     int reduce; /* Gaussians to be left; 0 = all */
+    double ambient;
     ssdgs_context *context;
     ssdgs_model *model;
     olat_dataset data;
@@ -142,6 +146,10 @@ static int parse(job *j, int argc, char **argv) {
             return usage("--reduce needs a number from 1 on, not", value);
         j->reduce = (int)count;
     }
+    value = j->given[AMBIENT];
+    j->ambient = value ? strtod(value, &end) : 1;
+    if (value && (*end || end == value || !(j->ambient >= 0 && j->ambient <= 1e6)))
+        return usage("--ambient needs a number from 0 to 1000000, not", value);
     value = j->given[ISA];
     while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
@@ -427,8 +435,11 @@ static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats
 static ssdgs_result render(job *j, int index, int components) {
     const olat_frame *frame = &j->data.frames[index];
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    const ssdgs_render_options options =
+    const ssdgs_settings *settings = ssdgs_model_settings(j->model);
+    ssdgs_render_options options =
         frame->has_image ? ssdgs_render_options_exact() : ssdgs_render_options_default();
+    for (int c = 0; c < 3; c++)
+        options.ambient[0][c] = (ssdgs_real)(j->ambient * (double)settings->ambient[c]);
     ssdgs_image planes = j->planes;
     if (!components) {
         memset(&planes, 0, sizeof planes);
@@ -442,11 +453,10 @@ static ssdgs_result render(job *j, int index, int components) {
     size_t i;
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
     if (i == 3 * pixels) tell_black(j, frame, &stats);
-    ssdgs_compose(planes.color, planes.alpha, pixels, ssdgs_model_settings(j->model)->transfer, j->background,
-                  j->image);
+    ssdgs_compose(planes.color, planes.alpha, pixels, settings->transfer, j->background, j->image);
     if (!frame->has_image) return SSDGS_OK;
     const ssdgs_photo photo = olat_photo(frame);
-    olat_compose(&photo, ssdgs_model_settings(j->model)->transfer, j->background, j->photo);
+    olat_compose(&photo, settings->transfer, j->background, j->photo);
     score *s = j->scores[0] + index;
     s->flip = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);
     if (s->flip < 0) return SSDGS_ERR_MEMORY;

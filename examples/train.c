@@ -65,7 +65,7 @@ static const char *const help[] = {
     "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
     "  --refine                 also fits camera poses, lights' positions and intensities, into",
-    "                           MODEL.ply.refined.json",
+    "                           MODEL.ply.refined.json, and even light from the room, into the model",
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
@@ -413,7 +413,9 @@ static int parse(job *j, int argc, char **argv) {
     if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
-    if (given[REFINE]) j->options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY;
+    if (given[REFINE])
+        j->options.refine =
+            SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT;
     for (int i = 0; i < 3; i++) {
         j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
         j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
@@ -462,6 +464,13 @@ static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int ste
     }
     printf("%s: PSNR %.2f SSIM %.4f FLIP %.4f (%d views)\n", label, psnr, ssim, flip, count);
     return SSDGS_OK;
+}
+
+/* As irradiance, which the lamps' is 1 of on average. */
+static void tell_ambient(const ssdgs_settings *s) {
+    printf("light from the room: %.3f,%.3f,%.3f of the lamps'; relight --ambient 0 leaves it out\n",
+           (double)(s->ambient[0] * s->light_scale), (double)(s->ambient[1] * s->light_scale),
+           (double)(s->ambient[2] * s->light_scale));
 }
 
 static void print_peak_memory(void) {
@@ -657,6 +666,7 @@ static int train(job *j) {
     print_peak_memory();
     printf("\n");
     if (refines && save_refined(j, error)) return fail(error);
+    if (j->options.refine & SSDGS_REFINE_AMBIENT) tell_ambient(ssdgs_model_settings(j->model));
 
     ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
     ssdgs_model_destroy(j->model);

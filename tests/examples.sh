@@ -76,6 +76,7 @@ check "--reduce" says 0 "4 images" relight --out "$out/reduced" --reduce 50
 check "as reduced" says 0 "4 images" "$build/relight" "$out/reduced/reduced.ply" "$set" --out "$out/reduced2" --threads 1
 check "the same picture" cmp "$out/reduced/r_000.png" "$out/reduced2/r_000.png"
 check "another picture" differs "$out/reduced/r_000.png" "$out/relit/r_000.png"
+check "--ambient" says 2 "--ambient needs a number" relight --out "$out/reduced" --ambient -1
 check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
 # several photographs a step: how far it is, and checkpoints
@@ -159,6 +160,10 @@ check "far away" says 0 "coordinates are taken relative to 5e+06, -4e+06, 6e+06\
     "$build/train" "$out/moved" -o "$out/moved.ply" --iterations 40 --points 400 --threads 1 --refine \
     --set bounds_min=4999999.5,-4000000.5,5999999.5 --set bounds_max=5000000.5,-3999999.5,6000000.5
 check "near" says 0 "^test: PSNR" train --refine -o "$out/near.ply"
+check "and the room's light" says 0 "^light from the room: [0-9.]*,[0-9.]*,[0-9.]* of the lamps'" train --refine -o "$out/room.ply"
+check "relit in much of it" says 0 "4 images" "$build/relight" "$out/room.ply" "$set" --out "$out/room" --threads 1 --ambient 10
+check "relit without it" says 0 "4 images" "$build/relight" "$out/room.ply" "$set" --out "$out/no_room" --threads 1 --ambient 0
+check "that differs" differs "$out/room/r_000.png" "$out/no_room/r_000.png"
 check "relit far away" says 0 "4 images" "$build/relight" "$out/moved.ply" "$out/moved" --out "$out/moved_relit" --threads 1
 check "relit near" says 0 "4 images" "$build/relight" "$out/near.ply" "$set" --out "$out/near_relit" --threads 1
 check "as good as at 0: $(psnr "$out/moved_relit") and $(psnr "$out/near_relit") dB" near "$(psnr "$out/moved_relit")" "$(psnr "$out/near_relit")" 0.3

@@ -45,7 +45,7 @@ static ssdgs_result train(ssdgs_model *model, uint64_t *hash) {
     options.schedule = SSDGS_SCHEDULE_JOINT;
     options.initial_points = 500;
     options.densify_every = options.densify_from = 20;
-    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_AMBIENT;
     ssdgs_result result = ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer);
     if (!result) result = ssdgs_trainer_run(trainer, NULL, NULL);
     ssdgs_trainer_destroy(trainer);
@@ -55,6 +55,7 @@ static ssdgs_result train(ssdgs_model *model, uint64_t *hash) {
     *hash = hash_bytes(*hash, v.scattering, v.scattering_count * sizeof(ssdgs_real));
     *hash = hash_bytes(*hash, v.shadow, v.shadow_count * sizeof(ssdgs_real));
     *hash = hash_bytes(*hash, v.asg_basis, 4 * SSDGS_ASG_COUNT * sizeof(ssdgs_real));
+    *hash = hash_bytes(*hash, ssdgs_model_settings(model)->ambient, 3 * sizeof(ssdgs_real));
     return result;
 }
 

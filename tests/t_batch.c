@@ -42,7 +42,7 @@ static ssdgs_train_options short_run(int batch) {
     o.opacity_reset_every = 30;
     o.densify_gradient = (ssdgs_real)1e-5;
     o.batch = batch;
-    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_AMBIENT;
     return o;
 }
 

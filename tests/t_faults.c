@@ -848,7 +848,7 @@ static void test_checkpoints(void) {
     const size_t moments = parameters + n * SSDGS_CHANNELS + (size_t)h.global_count * sizeof(ssdgs_real);
     const size_t squares = 2 * moments - parameters;
     const size_t statistics = 3 * moments - 2 * parameters;
-    const size_t corrections = statistics + n * SSDGS__STATISTICS;
+    const size_t corrections = statistics + n * (SSDGS__STATISTICS + 1);
     CHECK(whole.size == corrections + PHOTOS * sizeof(ssdgs__correction) + 8);
     for (size_t k = 0; k < whole.size && wrong < 9;
          k += full || k < sizeof h ? 1 : 1 + draw_below(whole.size / 150)) {
@@ -885,13 +885,21 @@ static void test_checkpoints(void) {
                     {"skipped", offsetof(head, skipped), WORD, 0x7fffffff},
                     {"steps", offsetof(head, steps), WORD, -1},
                     {"steps", offsetof(head, steps), WORD, (double)h.iteration + 1},
+                    {"ambient light's moment", offsetof(head, ambient), DOUBLE, infinite},
+                    {"ambient light's square", offsetof(head, ambient) + 5 * sizeof(double), DOUBLE, -1},
+                    {"ambient light's steps", offsetof(head, ambient_steps), WORD, -1},
+                    {"ambient light's steps", offsetof(head, ambient_steps), WORD, (double)h.iteration + 1},
+                    {"exposed", offsetof(head, exposed), WORD, 2},
                     {"settings", offsetof(head, settings), WORD, 0},
                     {"terms", offsetof(head, settings.terms), WORD, 16},
                     {"width", offsetof(head, settings.scattering.width), WORD, 1024},
+                    {"octaves", offsetof(head, settings.octaves.view), WORD, 3},
+                    {"octaves", offsetof(head, settings.octaves.light), WORD, 3},
                     {"eta", offsetof(head, settings.eta), REAL, 9},
                     {"eta", offsetof(head, settings.eta), REAL, nan_value},
                     {"unit", offsetof(head, settings.length_unit), REAL, 0},
                     {"light scale", offsetof(head, settings.light_scale), REAL, infinite},
+                    {"ambient", offsetof(head, settings.ambient), REAL, -1},
                     {"centre", offsetof(head, settings.centre), REAL, nan_value},
                     {"network", moments - 4 * sizeof(ssdgs_real), REAL, nan_value},
                     {"moment", moments + 5 * sizeof(ssdgs_real), REAL, nan_value},

@@ -17,6 +17,7 @@ typedef struct scene {
     ssdgs_render_options options;
     ssdgs_light lights[2];
     int light_count, wall;
+    int shine; /* ambient light on highlights: of these c_s alone learns from it */
 } scene;
 
 static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
@@ -169,7 +170,11 @@ static void run(const scene *s) {
     double pose[6];
     ssdgs__correct_backward(&photo, value, frame.view_gradient, pose);
     double light_gradient[3];
-    for (int c = 0; c < 3; c++) light_gradient[c] = frame.light_gradient[c];
+    double ambient_gradient[3];
+    for (int c = 0; c < 3; c++) {
+        light_gradient[c] = frame.light_gradient[c];
+        ambient_gradient[c] = frame.ambient_gradient[c];
+    }
     for (int i = 0; i < COUNT; i++) { /* gradient . q = 0 for both rotations */
         double dot = 0, dot2 = 0;
         for (int c = 0; c < 4; c++) {
@@ -183,6 +188,7 @@ static void run(const scene *s) {
     for (int group = 0; group < SSDGS__PLANE_GROUPS; group++) {
         tally t = {0, 0, 0, 0};
         if (s->settings.transport && group == SSDGS__G_POSITION) continue;
+        if (s->shine && group != SSDGS__G_SPECULAR) continue;
         for (int i = 0; i < COUNT; i += 2)
             for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++)
                 compare(s, model, &camera, lights, &fixed, model->gaussians + (size_t)c * stride + (size_t)i,
@@ -191,7 +197,7 @@ static void run(const scene *s) {
     }
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&s->settings, first);
-    for (int group = 0; group < SSDGS__GLOBAL_GROUPS; group++) {
+    for (int group = 0; group < SSDGS__GLOBAL_GROUPS && !s->shine; group++) {
         tally t = {0, 0, 0, 0};
         const size_t step = (first[group + 1] - first[group]) / 40 + 1;
         for (size_t at = first[group]; at < first[group + 1]; at += step)
@@ -204,7 +210,15 @@ static void run(const scene *s) {
             compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
         if (t.tried) finish(s, "light", &t);
     }
-    { /* the pose, at a correction that is not zero */
+    { /* ambient light, which its bound of 0 leaves */
+        tally t = {0, 0, 0, 0};
+        scene lit = *s;
+        for (int c = 0; c < 3 && frame.objects->exposure; c++)
+            compare(&lit, model, &camera, lights, &fixed, lit.options.ambient[0] + c, ambient_gradient[c],
+                    &t);
+        if (t.tried) finish(s, "ambient light", &t);
+    }
+    if (!s->shine) { /* the pose, at a correction that is not zero */
         tally t = {0, 0, 0, 0};
         ssdgs_light lamp;
         ssdgs_camera moved;
@@ -440,7 +454,7 @@ static void test_photo(int transfer, double intensity) {
     ssdgs_frame frame;
     const ssdgs__photo_job shot = {
         &photo, &photo.camera, &photo.light, background, SSDGS_DIFFUSE_TERM, {frozen[0], frozen[1]}, 0.2, 0,
-        1};
+        1,      NULL};
     if (ssdgs__photo_backward(&frame, model, &shot, &values)) exit(1);
     ssdgs_real gradient[COUNT * SSDGS_CHANNELS];
     for (size_t i = 0; i < SSDGS_CHANNELS * COUNT; i++)
@@ -596,6 +610,19 @@ int main(void) {
         static const int terms[4] = {SSDGS_DIFFUSE_TERM, SSDGS_SPECULAR_TERM,
                                      SSDGS_SHADOW_TERM | SSDGS_DIFFUSE_TERM, SSDGS_SCATTERING_TERM};
         s = base, s.name = names[i], s.options.terms = terms[i];
+        run(&s);
+    }
+    for (int i = 0; i < 6; i++) {
+        static const char *const names[6] = {
+            "ambient light",       "ambient light, depth cue",    "ambient light, geometric ASG",
+            "ambient light alone", "ambient light on highlights", "ambient light on geometric highlights"};
+        s = base, s.name = names[i], s.shine = i >= 4;
+        s.options.terms = s.shine ? SSDGS_SPECULAR_TERM : SSDGS_ALL_TERMS & ~SSDGS_SPECULAR_TERM;
+        s.settings.transport = s.settings.depth_cue = i == 0 || i == 3;
+        if (i == 1) s.settings.depth_cue = 1, s.light_count = 2;
+        if (i == 2 || i == 5) s.settings.asg = SSDGS_ASG_GEOMETRIC;
+        if (i == 3) s.light_count = 0;
+        for (int c = 0; c < 3; c++) s.options.ambient[0][c] = 0.4 + 0.9 * c;
         run(&s);
     }
     ssdgs_context_destroy(context);

@@ -64,6 +64,7 @@ static ssdgs_model *make_model(int count) {
     settings.eta = (ssdgs_real)(float)1.3;
     settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
+    for (int c = 0; c < 3; c++) settings.ambient[c] = (ssdgs_real)(float)(0.1 + c);
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     ssdgs_model_view view = ssdgs_model_arrays(model);
     for (int channel = 0; channel < SSDGS_CHANNELS; channel++)
@@ -362,6 +363,11 @@ static void test_variants(void) {
             } else if (!strcmp(name, "pixel_variance")) {
                 CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same_gaussians(model, back) &&
                       ssdgs_model_settings(back)->pixel_variance == (ssdgs_real)(float)0.3);
+                ssdgs_model_destroy(back);
+            } else if (!strncmp(name, "ambient_", 8)) { /* older photographs had none */
+                CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same_gaussians(model, back) &&
+                      !(ssdgs_model_settings(back)->ambient[name[8] - '0'] > 0) &&
+                      ssdgs_model_settings(back)->ambient[(name[8] - '0' + 1) % 3] > 0);
                 ssdgs_model_destroy(back);
             } else if (!strcmp(name, "transport")) { /* files without it have a network with fewer inputs */
                 CHECK(refused(other.data, other.size) && strstr(ssdgs_error_message(context), "scattering"));

@@ -41,6 +41,9 @@ static const field settings_fields[] = {
     R(eta, 1, 2.5),
     R(length_unit, 1e-15, 1e15),
     R(light_scale, 0, 1e30),
+    R(ambient[0], 0, 1e30),
+    R(ambient[1], 0, 1e30),
+    R(ambient[2], 0, 1e30),
     R(centre[0], -1e30, 1e30),
     R(centre[1], -1e30, 1e30),
     R(centre[2], -1e30, 1e30)
@@ -63,7 +66,7 @@ static const field train_fields[] = {
     I(densify_every, 1, 2000000000),
     I(opacity_reset_every, 0, 2000000000),
     I(batch, 1, 256),
-    I(refine, 0, 7),
+    I(refine, 0, 15),
     R(dssim, 0, 1),
     R(normal_weight, 0, 1e30),
     R(densify_gradient, 0, 1e30),

@@ -55,7 +55,7 @@ static ssdgs_train_options short_run(int iterations) {
     o.densify_every = 10;
     o.opacity_reset_every = 30;
     o.densify_gradient = (ssdgs_real)1e-5;
-    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
+    o.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_AMBIENT;
     return o;
 }
 
@@ -84,6 +84,7 @@ static run_result train_and_render(ssdgs_context *context, const ssdgs_settings 
     for (int i = 0; i < SSDGS_CHANNELS; i++)
         r.model = hash_values(r.model, model->gaussians + (size_t)i * model->capacity, (size_t)model->count);
     r.model = hash_values(r.model, model->globals, model->global_count);
+    r.model = hash_values(r.model, model->settings.ambient, 3);
     ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
@@ -165,7 +166,11 @@ static void test_same_bits(void) {
             }
             CHECK(r.model == first.model && r.image == first.image);
             for (int i = 0; i < SSDGS_STAGE_COUNT; i++)
-                CHECK(calls[i] == (variant == 4 ? (i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61 : 60) : 0));
+                if (!CHECK(calls[i] == (variant < 4                          ? 0
+                                        : i < SSDGS_STAGE_SHADE              ? 61 + 12 * 6
+                                        : i < SSDGS_STAGE_COMPOSITE_BACKWARD ? 61
+                                                                             : 60)))
+                    printf("    stage %d: %d\n", i, calls[i]);
             ssdgs_context_destroy(context);
         }
     }
@@ -199,6 +204,8 @@ static void test_resume(void) {
         for (int c = 0; c < SSDGS_CHANNELS; c++)
             hash = hash_values(hash, model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
         hash = ssdgs__fold(hash, trainer->corrections, PHOTOS * sizeof *trainer->corrections);
+        hash = hash_values(hash, model->settings.ambient, 3);
+        CHECK(model->settings.ambient[0] > 0);
         if (k < 0) whole = hash;
         CHECK(hash == whole);
         ssdgs_trainer_destroy(trainer);
@@ -784,6 +791,7 @@ static void test_refinement(void) {
     ssdgs_trainer *trainer = NULL;
     ssdgs_real background[3] = {0, 0, 0};
     double off[2][2] = {{0, 0}, {0, 0}}; /* before, after: cameras, lights */
+    options.refine = SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT;
     settings.terms = SSDGS_DIFFUSE_TERM;
     settings.light_scale = (ssdgs_real)0.05;
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
@@ -883,6 +891,165 @@ static void test_refinement(void) {
         CHECK(fabs((double)(disturbed[0].light.intensity[2] / photos[0].light.intensity[2]) - 1) < 0.03);
     }
     ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Ambient light that photographs have, and a model that stays, is found; they are then as the model is, and
+   renders are without it unless they ask. */
+static void test_ambient(void) {
+    enum { MANY = 300 };
+    static const ssdgs_real ambient[3] = {6, 2, 10}, black[3] = {0, 0, 0};
+    static ssdgs_real image[SIDE * SIDE * 3], bare[SIDE * SIDE * 3];
+    static float pictures[PHOTOS][SIDE * SIDE * 4];
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    settings.transfer = SSDGS_TRANSFER_NONE;
+    settings.light_scale = (ssdgs_real)0.05;
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
+    for (int i = 0; i < MANY; i++)
+        for (int c = 0; c < 3; c++) {
+            ssdgs_real *g = model->gaussians + (size_t)c * model->capacity + i;
+            const uint64_t at = (uint64_t)(3 * i + c);
+            g[SSDGS_POSITION * model->capacity] = (ssdgs_real)(ssdgs__uniform(6, at) - 0.5);
+            g[SSDGS_LOG_SCALE * model->capacity] = (ssdgs_real)-2.8;
+            g[SSDGS_DIFFUSE * model->capacity] = (ssdgs_real)(3 * ssdgs__uniform(7, at));
+            g[SSDGS_FRAME * model->capacity] = (ssdgs_real)(2 * ssdgs__uniform(8, at) - 1);
+        }
+    ssdgs_photo shots[PHOTOS];
+    for (int p = 0; p < PHOTOS; p++) {
+        ssdgs_metrics metrics;
+        memcpy(model->settings.ambient, ambient, sizeof ambient);
+        CHECK(!ssdgs_evaluate(model, photos + p, black, image, &metrics));
+        shots[p] = photos[p];
+        shots[p].pixels = pictures[p];
+        shots[p].format = SSDGS_PIXELS_RGBA32F;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            for (int c = 0; c < 3; c++) pictures[p][4 * i + c] = (float)image[3 * i + c];
+            pictures[p][4 * i + 3] = 1;
+        }
+        CHECK(!ssdgs_evaluate(model, shots + p, black, NULL, &metrics) && metrics.psnr > 90);
+        ssdgs_image out;
+        memset(&out, 0, sizeof out);
+        out.color = bare;
+        ssdgs_render_options options = ssdgs_render_options_exact();
+        CHECK(!ssdgs_render_ex(model, &photos[p].camera, &photos[p].light, 1, &options, &out, NULL));
+        double sums[2] = {0, 0};
+        for (int i = 0; i < SIDE * SIDE * 3; i++) {
+            sums[0] += (double)bare[i];
+            sums[1] += (double)image[i];
+        }
+        CHECK(sums[0] < 0.9 * sums[1] && sums[0] > 0);
+        memcpy(options.ambient[0], ambient, sizeof ambient);
+        CHECK(!ssdgs_render_ex(model, &photos[p].camera, &photos[p].light, 1, &options, &out, NULL));
+        for (int i = 0; i < SIDE * SIDE * 3; i++) CHECK(fabs((double)(bare[i] - image[i])) < 1e-6);
+        memset(model->settings.ambient, 0, sizeof ambient);
+        CHECK(!ssdgs_evaluate(model, shots + p, black, NULL, &metrics) && metrics.psnr < 40);
+    }
+    for (int batch = 1; batch < 4; batch += 2) {
+        ssdgs_train_options options = short_run(480);
+        ssdgs_trainer *trainer = NULL;
+        options.schedule = SSDGS_SCHEDULE_JOINT;
+        options.refine = SSDGS_REFINE_AMBIENT;
+        options.batch = batch;
+        options.densify_until = 0;
+        options.random_background = 0;
+        memset(&options.rates, 0, sizeof options.rates);
+        memset(model->settings.ambient, 0, sizeof ambient);
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
+        CHECK(!ssdgs_trainer_step(trainer, NULL));
+        for (int c = 0; c < 3; c++) /* Adam's first step is the rate, of light of E = 1 */
+            CHECK(fabs((double)(model->settings.ambient[c] * settings.light_scale) /
+                           (SSDGS__AMBIENT_RATE * sqrt((double)batch)) -
+                       1) < 1e-3);
+        CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+        for (int c = 0; c < 3; c++)
+            if (!CHECK(fabs((double)(model->settings.ambient[c] / ambient[c]) - 1) < 0.02))
+                printf("    batch %d: ambient %g of %g\n", batch, (double)model->settings.ambient[c],
+                       (double)ambient[c]);
+        ssdgs_trainer_destroy(trainer);
+    }
+    { /* what is known and not to be learnt stays as it is, and is made use of: nothing is left to learn */
+        ssdgs_train_options options = short_run(4);
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_train_stats stats;
+        options.schedule = SSDGS_SCHEDULE_JOINT;
+        options.refine = options.random_background = options.densify_until = 0;
+        options.dssim = options.normal_weight = 0;
+        memset(&options.rates, 0, sizeof options.rates);
+        memcpy(model->settings.ambient, ambient, sizeof ambient);
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
+        CHECK(!ssdgs_trainer_step(trainer, &stats) && stats.loss < 1e-4);
+        CHECK(!memcmp(model->settings.ambient, ambient, sizeof ambient));
+        ssdgs_photo moved = shots[1];
+        for (int c = 0; c < 3; c++) moved.light.intensity[c] *= (ssdgs_real)1.2;
+        ssdgs_metrics metrics[2];
+        CHECK(!ssdgs_evaluate(model, &moved, black, NULL, metrics));
+        CHECK(!ssdgs_refine_photo(model, &moved, black, 60)); /* with ambient light that is known */
+        CHECK(!ssdgs_evaluate(model, &moved, black, NULL, metrics + 1));
+        if (!CHECK(metrics[0].psnr < 45 && metrics[1].psnr > 60))
+            printf("    from %g to %g dB\n", metrics[0].psnr, metrics[1].psnr);
+        ssdgs_trainer_destroy(trainer);
+    }
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Photographs that are lit from one place, or all from the camera's, pull at highlights and scattered light,
+   as much as these show; others do not. */
+static void test_one_light(void) {
+    enum { MANY = 40 };
+    static ssdgs_real gradient[2][SSDGS_CHANNELS * MANY];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    for (int way = 0; way < 3; way++) {
+        ssdgs_model *model = NULL;
+        ssdgs_trainer *trainer = NULL;
+        ssdgs_photo shots[PHOTOS];
+        memcpy(shots, photos, sizeof shots);
+        for (int p = 0; p < PHOTOS && way < 2; p++) /* as they are, light and camera go round together */
+            shots[p].light = photos[way ? 0 : 5 * p % PHOTOS].light;
+        CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
+        for (int i = 0; i < MANY; i++)
+            for (int c = 0; c < SSDGS_CHANNELS; c++)
+                model->gaussians[(size_t)c * model->capacity + (size_t)i] =
+                    (ssdgs_real)((c < 3 ? 0.5 : 1) * (2 * ssdgs__uniform(5, (uint64_t)(64 * i + c)) - 1) -
+                                 (c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY ? 2.5 : 0));
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
+        CHECK(trainer->one_light == (way > 0));
+        ssdgs__step step;
+        memset(&step, 0, sizeof step);
+        step.terms = SSDGS_ALL_TERMS;
+        double weights = 0, shown = 0, worst = 0;
+        const int known = trainer->one_light;
+        for (int k = 0; k < 2; k++) {
+            double moves[SSDGS__MOVES];
+            ssdgs__drawn drawn;
+            ssdgs_frame frame;
+            trainer->one_light = k ? known : 0;
+            CHECK(!ssdgs__expose_model(model, trainer->stride, trainer->exposure));
+            CHECK(!ssdgs__draw_photo(trainer, &step, 0, 1, &frame, moves, &drawn));
+            for (int c = 0; c < SSDGS_CHANNELS; c++)
+                for (int i = 0; i < MANY; i++)
+                    gradient[k][c * MANY + i] =
+                        frame.gradient[(size_t)c * frame.gaussians.stride + (size_t)i];
+            for (int i = 0; i < SIDE * SIDE && k; i++) shown += 1 - (double)frame.transmittance[i];
+        }
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
+            for (int i = 0; i < MANY; i++) {
+                const double x = (double)model->gaussians[(size_t)c * model->capacity + (size_t)i],
+                             more = (double)(gradient[1][c * MANY + i] - gradient[0][c * MANY + i]);
+                const int doubted = known && c >= SSDGS_SPECULAR && c < SSDGS_SCATTERING + 3;
+                if (doubted) weights += more * (1 + exp(-x)) * SIDE * SIDE / (2 * SSDGS__DOUBT);
+                else worst = fmax(worst, fabs(more));
+            }
+        CHECK(shown > 100 && worst == 0);
+        if (!CHECK(fabs(weights - (known ? shown : 0)) < 1e-3 * shown))
+            printf("    %d: a pull of %g for %g\n", way, weights, shown);
+        ssdgs_trainer_destroy(trainer);
+        ssdgs_model_destroy(model);
+    }
     ssdgs_context_destroy(context);
 }
 
@@ -1961,7 +2128,8 @@ static void test_clipped(void) {
                                            {frozen[0], frozen[1]},
                                            (ssdgs_real)0.2,
                                            0,
-                                           1};
+                                           1,
+                                           NULL};
             CHECK(!ssdgs__photo_backward(&frame, model, &shot, &values));
             CHECK(full > SIDE);
             if (!CHECK(way == 1   ? values.loss > 0.05
@@ -2272,6 +2440,8 @@ int main(void) {
     test_half_shadow();
     test_learning();
     test_refinement();
+    test_ambient();
+    test_one_light();
     test_anchor();
     test_schedule();
     TEST_END();
