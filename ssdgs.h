@@ -648,8 +648,8 @@ typedef struct ssdgs_rates {
     ssdgs_rate opacity, scale, rotation, color;
     ssdgs_rate asg, frame;                   /* start up to iteration 40,000*, end at 90,000* */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
-    ssdgs_rate camera, light; /* of the bounds' longest side; end at 60,000*. For 300 shows of each
-                                 photograph; with fewer, times the root of 300 / shows */
+    ssdgs_rate camera, light; /* of the bounds' longest side, directions of a radian; end at 60,000*. For 300
+                                 shows of each photograph; with fewer, times the root of 300 / shows */
 } ssdgs_rates;
 
 /* Processes that share each batch. All hold the same photographs and options; each draws its part, and the
@@ -681,7 +681,7 @@ typedef struct ssdgs_train_options {
     int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
     int batch;  /* photographs a step, whose gradients are averaged; rates grow with its square root; 1 */
-    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses, light positions and intensities, and
+    int refine; /* SSDGS_REFINE_* mask: fit photographs' poses, their lights and intensities, and
                    settings.ambient, too; 0 */
     ssdgs_real background[3];    /* stored values: what opaque photographs show around the object; black */
     ssdgs_real dssim;            /* weight of 1 - SSIM in the loss; L1 has the rest; 0.2 */
@@ -761,7 +761,7 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics);
-/* Fits photo's camera and light position to its pixels by so many steps of Adam, the model fixed. */
+/* Fits photo's camera and light to its pixels by so many steps of Adam, the model fixed. */
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations);
 #endif /* SSDGS_NO_TRAINER */
@@ -997,7 +997,7 @@ typedef struct ssdgs_frame {
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
     ssdgs_real
         *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
-    ssdgs_real light_gradient[3];   /* position of light 0 */
+    ssdgs_real light_gradient[3];   /* position of light 0; of a direction along the sphere */
     ssdgs_real ambient_gradient[3]; /* options.ambient[0] */
     double intensity[2]; /* how far ln of its intensity is from fitting the photograph; how sure that is */
     ssdgs_real view_gradient[12]; /* camera.view */
@@ -9188,7 +9188,7 @@ struct ssdgs_trainer {
     int exposed;          /* those are of these Gaussians */
     struct {
         double mean[3], square[3]; /* Adam's moments of settings.ambient, and its clock */
-        int32_t steps, padding;
+        int steps;
     } ambient;
     double extent;        /* 1.1 x the cameras' radius */
     int budget;           /* density control makes no more Gaussians */
@@ -9406,10 +9406,19 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
         }
 }
 
+/* What a moved light is divided by: directions stay unit vectors. */
+static double ssdgs__moved_length(const ssdgs_light *light, const double value[10]) {
+    double square = 0;
+    for (int i = 0; i < 3; i++)
+        square += ((double)light->position[i] + value[6 + i]) * ((double)light->position[i] + value[6 + i]);
+    return light->kind == SSDGS_LIGHT_POINT || !(square > 0) ? 1 : sqrt(square);
+}
+
 static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssdgs_camera *camera,
                            ssdgs_light *light) {
     *camera = photo->camera;
     *light = photo->light;
+    const double length = ssdgs__moved_length(&photo->light, value);
     double e[9], jacobian[9];
     ssdgs__rotate_by(value + 3, e, jacobian);
     for (int i = 0; i < 3; i++) {
@@ -9418,8 +9427,7 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssd
             for (int l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
             camera->view[4 * i + j] = (ssdgs_real)sum;
         }
-        if (light->kind == SSDGS_LIGHT_POINT)
-            light->position[i] = (ssdgs_real)((double)photo->light.position[i] + value[6 + i]);
+        light->position[i] = (ssdgs_real)(((double)photo->light.position[i] + value[6 + i]) / length);
         if (value[9] < 0 || value[9] > 0)
             light->intensity[i] = (ssdgs_real)((double)photo->light.intensity[i] * exp(value[9]));
     }
@@ -9458,7 +9466,8 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
 static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], const ssdgs_frame *frame,
                             double moves[SSDGS__MOVES]) {
     ssdgs__correct_backward(photo, value, frame->view_gradient, moves);
-    for (int i = 0; i < 3; i++) moves[6 + i] = (double)frame->light_gradient[i];
+    for (int i = 0; i < 3; i++)
+        moves[6 + i] = (double)frame->light_gradient[i] / ssdgs__moved_length(&photo->light, value);
     for (int i = 0; i < 2; i++) moves[9 + i] = frame->intensity[i];
     for (int i = 0; i < 3; i++) moves[11 + i] = (double)frame->ambient_gradient[i];
 }
@@ -9774,6 +9783,11 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
 /* Radians across the picture's width, its centre on the axis. */
 static double ssdgs__view_angle(const ssdgs_camera *camera) {
     return 2 * atan(0.5 * camera->width / (double)camera->fx);
+}
+
+/* What a light's rate is of: a scene's length, or a radian. */
+static double ssdgs__light_unit(const ssdgs_light *light, double unit) {
+    return light->kind == SSDGS_LIGHT_POINT ? unit : 1;
 }
 
 /* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the
@@ -11599,10 +11613,10 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
                                trainer->unit, angle);
     if (moves[0] && o->rates.position.start > 0)
         ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
-    if (moves[1] && trainer->photos[photo].light.kind == SSDGS_LIGHT_POINT)
+    if (moves[1])
         ssdgs__correction_step(correction, gradient, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
-                               trainer->unit, angle);
+                               ssdgs__light_unit(&trainer->photos[photo].light, trainer->unit), angle);
     if (moves[2]) ssdgs__intensity_step(correction, gradient);
     if (moves[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
         ssdgs__anchor_intensities(trainer);
@@ -11660,10 +11674,8 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
                             (o->refine & SSDGS_REFINE_INTENSITY) && step.t >= 5e3,
                             (o->refine & SSDGS_REFINE_AMBIENT) != 0};
     for (int i = 0; i < SSDGS__MOVES * o->batch && !result; i++) {
-        const ssdgs_photo *photo = trainer->photos + photos[i / SSDGS__MOVES];
         const int j = i % SSDGS__MOVES, of = j < 6 ? 0 : j < 9 ? 1 : j < 11 ? 2 : 3;
-        if (refines[of] && !(of == 1 && photo->light.kind != SSDGS_LIGHT_POINT) &&
-            !ssdgs__finite((ssdgs_real)moves[i]))
+        if (refines[of] && !ssdgs__finite((ssdgs_real)moves[i]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s is not finite",
                                  before, photos[i / SSDGS__MOVES],
@@ -11842,8 +11854,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
-        if (light.kind == SSDGS_LIGHT_POINT)
-            ssdgs__correction_step(&correction, gradient, 1, rate, unit, angle);
+        ssdgs__correction_step(&correction, gradient, 1, rate, ssdgs__light_unit(&light, unit), angle);
         ssdgs__intensity_step(&correction, gradient);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
@@ -13837,15 +13848,15 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         }
         /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
         radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
-        radial =
-            VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), radial);
+        if (!k->directional)
+            radial = VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
+                          radial);
         missing2 = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
         for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
-            const V to_light =
-                k->directional ? VSET(0) : VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
+            const V to_light = VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
             const V to_eye = VMUL(VFNMA(g.wo[i], missing2, dwo[i]), g.inverse_eye);
-            VSTORE(out, VSUB(VLOAD(out), VADD(to_light, to_eye)));
+            VSTORE(out, VSUB(VLOAD(out), k->directional ? to_eye : VADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
             VSTORE(out, VADD(VLOAD(out), to_light));
             VSTORE(out + 3 * 16, VADD(VLOAD(out + 3 * 16), to_eye)); /* the eye's, after the light's three */
@@ -14128,9 +14139,10 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             V dat[3];
             for (int i = 0; i < 3;
                  i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
-                dat[i] = k->directional ? VSET(0) : VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
-                ddepth = VFMA(dat[i], g.ray[i], ddepth);
+                dat[i] = VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
                 sum[i][v] = VSUB(sum[i][v], dat[i]);
+                if (k->directional) dat[i] = VSET(0);
+                ddepth = VFMA(dat[i], g.ray[i], ddepth);
                 sum[3 + i][v] = VADD(sum[3 + i][v], dat[i]);
                 const V dray = VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along), dwo[i]), g.inverse_ray));
                 sum[6 + i][v] = VFMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */

@@ -64,7 +64,7 @@ static const char *const help[] = {
     "  --schedule NAME          order of the terms: merged (default), progressive (published), joint,",
     "                           swapped",
     "  --terms LIST             of diffuse,specular,shadow,scattering; all",
-    "  --refine                 also fits camera poses, lights' positions and intensities, into",
+    "  --refine                 also fits cameras' poses, lights' places and intensities, into",
     "                           MODEL.ply.refined.json, and even light from the room, into the model",
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
@@ -81,6 +81,7 @@ static const char *const help[] = {
     "  --isa NAME               scalar, sse2, avx2, avx512 or neon; the best that this machine has",
     "  --set bounds_min=X,Y,Z   the box that holds the object, in the dataset's units; -0.5,-0.5,-0.5",
     "  --set bounds_max=X,Y,Z   its other corner; 0.5,0.5,0.5",
+    "  --set ambient=R,G,B      even light from the room, where it is known; 0,0,0",
     "  --set NAME=VALUE         a number of ssdgs_settings or ssdgs_train_options; may be repeated",
     "  --set NAME=START,END     a learning rate's first and last value; the names, which ssdgs.h",
     "                           explains:"};
@@ -147,6 +148,7 @@ static const field fields[] = {SETTING(0, dipole),
                                PART(1, light_bias, light_map.bias),
                                SETTING(1, pixel_variance),
                                SETTING(1, eta),
+                               {"ambient", IN_SETTINGS, 1, 3, offsetof(ssdgs_settings, ambient)},
                                OPTION(0, 1, random_background),
                                OPTION(0, 1, densify_every),
                                OPTION(0, 1, batch),
@@ -203,7 +205,7 @@ static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *opti
         const field *f = fields + i;
         unsigned char *to = places[f->in] + f->at;
         if (strlen(f->name) != length || strncmp(text, f->name, length)) continue;
-        problem = "cannot set (rates take START,END, corners X,Y,Z)";
+        problem = "cannot set (rates take START,END, corners X,Y,Z, ambient R,G,B)";
         if (f->count != count) continue;
         for (int n = 0; n < count; n++) {
             char *end;

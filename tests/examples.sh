@@ -161,7 +161,8 @@ check "far away" says 0 "coordinates are taken relative to 5e+06, -4e+06, 6e+06\
     --set bounds_min=4999999.5,-4000000.5,5999999.5 --set bounds_max=5000000.5,-3999999.5,6000000.5
 check "near" says 0 "^test: PSNR" train --refine -o "$out/near.ply"
 check "and the room's light" says 0 "^light from the room: [0-9.]*,[0-9.]*,[0-9.]* of the lamps'" train --refine -o "$out/room.ply"
-check "relit in much of it" says 0 "4 images" "$build/relight" "$out/room.ply" "$set" --out "$out/room" --threads 1 --ambient 10
+check "which may be known" says 0 "^test: PSNR" train --set ambient=20,10,5 -o "$out/room.ply"
+check "relit in much of it" says 0 "4 images" "$build/relight" "$out/room.ply" "$set" --out "$out/room" --threads 1 --ambient 2.5
 check "relit without it" says 0 "4 images" "$build/relight" "$out/room.ply" "$set" --out "$out/no_room" --threads 1 --ambient 0
 check "that differs" differs "$out/room/r_000.png" "$out/no_room/r_000.png"
 check "relit far away" says 0 "4 images" "$build/relight" "$out/moved.ply" "$out/moved" --out "$out/moved_relit" --threads 1

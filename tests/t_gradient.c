@@ -208,6 +208,22 @@ static void run(const scene *s) {
         tally t = {0, 0, 0, 0};
         for (int c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++)
             compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
+        for (int c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_DIRECTIONAL; c++) { /* stays a unit vector */
+            double move[10] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, side[4];
+            photo.light = s->lights[0];
+            for (int i = 0; i < 4; i++) {
+                move[6 + c] = steps[i];
+                ssdgs_camera still;
+                ssdgs__correct(&photo, move, &still, lights);
+                CHECK(fabs(lights[0].position[0] * lights[0].position[0] +
+                           lights[0].position[1] * lights[0].position[1] +
+                           lights[0].position[2] * lights[0].position[2] - 1) < 1e-14);
+                ssdgs_frame moved;
+                side[i] = objective(s, model, &camera, lights, &fixed, &moved, 0);
+            }
+            lights[0] = s->lights[0];
+            tell(side, light_gradient[c], &t);
+        }
         if (t.tried) finish(s, "light", &t);
     }
     { /* ambient light, which its bound of 0 leaves */
@@ -604,6 +620,17 @@ int main(void) {
     s = base, s.name = "directional and point light", s.light_count = 2,
     s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
     run(&s);
+    for (int i = 0; i < 3; i++) { /* highlights per pixel, per Gaussian, and light that scatters */
+        static const char *const names[3] = {"directional light", "directional light, geometric ASG",
+                                             "directional light, scattering only"};
+        s = base, s.name = names[i], s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
+        s.settings.octaves.light = i; /* the network sees wi alone, or its sines too */
+        s.settings.asg = i == 1 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
+        if (i == 2) s.options.terms = SSDGS_SCATTERING_TERM;
+        const double direction[3] = {0.48, -0.8, 0.36};
+        memcpy(s.lights[0].position, direction, sizeof direction);
+        run(&s);
+    }
     for (int i = 0; i < 4; i++) {
         static const char *const names[4] = {"diffuse only", "specular only", "shadow and diffuse",
                                              "scattering only"};

@@ -890,6 +890,67 @@ static void test_refinement(void) {
         CHECK(!ssdgs_refine_photo(model, disturbed, background, 60));
         CHECK(fabs((double)(disturbed[0].light.intensity[2] / photos[0].light.intensity[2]) - 1) < 0.03);
     }
+
+    /* distant lights told 0.1 rad wrong, each another way */
+    options.refine = SSDGS_REFINE_LIGHT;
+    options.rates.color.start = options.rates.color.end = 0;
+    for (int c = 0; c < 3; c++) options.bounds_max[c] = -(options.bounds_min[c] = -1);
+    double told = 0, left = 0;
+    ssdgs_light suns[PHOTOS];
+    for (p = 0; p < PHOTOS; p++) {
+        ssdgs_metrics metrics;
+        disturbed[p] = photos[p];
+        ssdgs_light *light = &disturbed[p].light;
+        light->kind = SSDGS_LIGHT_DIRECTIONAL;
+        for (int way = 0; way < 2; way++) { /* as it is, as it is told */
+            double length = 0;
+            if (way) light->position[p % 3] += (ssdgs_real)(p & 1 ? 0.1 : -0.1);
+            for (int c = 0; c < 3; c++) length += (double)(light->position[c] * light->position[c]);
+            for (int c = 0; c < 3; c++) {
+                light->position[c] /= (ssdgs_real)sqrt(length);
+                light->intensity[c] = 20;
+            }
+            if (way) continue;
+            CHECK(!ssdgs_evaluate(model, &disturbed[p], background, image, &metrics));
+            suns[p] = *light;
+        }
+        ssdgs_to_bytes(image, SIDE * SIDE * 3, SSDGS_TRANSFER_NONE, pictures[p]);
+        for (int i = SIDE * SIDE; i-- > 0;) {
+            memmove(pictures[p] + 4 * i, pictures[p] + 3 * i, 3);
+            pictures[p][4 * i + 3] = 255;
+        }
+        disturbed[p].pixels = pictures[p];
+    }
+    trainer = NULL;
+    CHECK(!ssdgs_trainer_create(model, disturbed, PHOTOS, &options, &trainer));
+    for (int i = 0; i < 97; i++)
+        CHECK(!ssdgs_trainer_step(trainer, NULL)); /* the last moves a light, at 16,000 of 60,000 */
+    double first_step = 0;
+    for (p = 0; p < PHOTOS; p++) first_step += fabs(trainer->corrections[p].value[6]);
+    const double rate = 2e-2 * 16.0 / 30 * sqrt(300.0 * PHOTOS / 360); /* of a radian, whatever the bounds */
+    if (!CHECK(fabs(first_step / rate - 1) < 2e-2)) printf("    first step %g of %g\n", first_step, rate);
+    CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+    for (p = 0; p < PHOTOS; p++) {
+        ssdgs_photo now;
+        CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
+        double length = 0;
+        for (int c = 0; c < 3; c++) {
+            told += fabs((double)(disturbed[p].light.position[c] - suns[p].position[c]));
+            left += fabs((double)(now.light.position[c] - suns[p].position[c]));
+            length += (double)(now.light.position[c] * now.light.position[c]);
+        }
+        CHECK(fabs(length - 1) < 1e-5 && now.light.kind == SSDGS_LIGHT_DIRECTIONAL);
+    }
+    if (!CHECK(left < 0.3 * told)) printf("    directions off by %g of %g\n", left, told);
+    ssdgs_trainer_destroy(trainer);
+    const ssdgs_light before = disturbed[0].light;
+    CHECK(!ssdgs_refine_photo(model, disturbed, background, 100));
+    double was = 0, is = 0;
+    for (int c = 0; c < 3; c++) {
+        was += fabs((double)(before.position[c] - suns[0].position[c]));
+        is += fabs((double)(disturbed[0].light.position[c] - suns[0].position[c]));
+    }
+    if (!CHECK(is < 0.5 * was)) printf("    a direction off by %g of %g\n", is, was);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
