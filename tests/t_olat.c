@@ -1849,7 +1849,7 @@ static void test_twins(void) {
                                              "[[0,0,1,3],[1,0,0,-0.5],[0,1,0,2],[0,0,0,1]]"};
     static const char *const refined[VIEWS] = {"\"R_opt\":[[1,0,0],[0,-1,0],[0,0,-1]],\"T_opt\":[-0.5,0,4]",
                                                "\"R_opt\":[[0,0,-1],[1,0,0],[0,-1,0]],\"T_opt\":[0.5,2,3]"};
-    const double focal = 0.5 * SIDE / tan(0.4);
+    const double focal = 0.5 * (double)SIDE / tan(0.4);
     mkdir(FOLDER "/twin", 0777);
     char text[3][4000], *at[3] = {text[0], text[1], text[2]}, name[200];
 #define SAY(k, ...) (at[k] += snprintf(at[k], (size_t)(text[k] + sizeof text[k] - at[k]), __VA_ARGS__))
@@ -1891,8 +1891,8 @@ static void test_twins(void) {
         SAY(1,
             "%s{\"img_path\":\"twin/e_%d.exr\",\"original_file_path\":\"x\",%s,"
             "\"camera_intrinsics\":[%g,%g,%.9g,%.9g],\"pl_pos\":[%g,%g,%g],\"pl_intensity\":[%g,%g,%g]}",
-            i ? "," : "", i, refined[view], 0.5 * SIDE, 0.5 * SIDE, focal, focal, lights[i][0], lights[i][1],
-            lights[i][2], rgb[i][0], rgb[i][1], rgb[i][2]);
+            i ? "," : "", i, refined[view], 0.5 * (double)SIDE, 0.5 * (double)SIDE, focal, focal,
+            lights[i][0], lights[i][1], lights[i][2], rgb[i][0], rgb[i][1], rgb[i][2]);
         if (!first) continue;
         SAY(2,
             "%s{\"width\":7,\"height\":7,\"fl_x\":%.9g,\"fl_y\":%.9g,\"cx\":3.5,\"cy\":3.5,"
@@ -1928,7 +1928,7 @@ static void test_twins(void) {
     for (int i = 0; i < FRAMES; i++)
         for (int k = 0; k < 3; k++) {
             const olat_frame *f = twins[k].frames + i, *first = twins[0].frames + i;
-            const double lens[4] = {focal, focal, 0.5 * SIDE, 0.5 * SIDE};
+            const double lens[4] = {focal, focal, 0.5 * (double)SIDE, 0.5 * (double)SIDE};
             CHECK(f->camera.width == SIDE && f->camera.height == SIDE && near_all(&f->camera.fx, lens, 4));
             CHECK(f->light.kind == SSDGS_LIGHT_POINT && near_all(f->light.position, lights[i], 3) &&
                   near_all(f->light.intensity, rgb[i], 3));
