@@ -9154,8 +9154,8 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
     "ASG sigma",      "scattering network", "shadow network"};
 
 /* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light
-   shift, ln of its intensity's factor. What moves them: gradients of the first nine, a Gauss-Newton step of
-   the last and how sure it is. */
+   shift, ln of its intensity's factor. What a photograph moves: gradients of the first nine, a Gauss-Newton
+   step of the last and how sure it is, and the gradient of settings.ambient. */
 #define SSDGS__MOVES 14
 typedef struct ssdgs__correction {
     double value[10], mean[9], square[9];
@@ -9186,15 +9186,13 @@ struct ssdgs_trainer {
     ssdgs_real *half_shadow;
     ssdgs_real *exposure; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
     int exposed;          /* those are of these Gaussians */
-    struct {
-        double mean[3], square[3]; /* Adam's moments of settings.ambient, and its clock */
-        int steps;
-    } ambient;
+    double ambient[6];    /* Adam's moments of settings.ambient: means, then squares */
+    int ambient_steps;    /* and its clock */
     double extent;        /* 1.1 x the cameras' radius */
     int budget;           /* density control makes no more Gaussians */
     int outlines;         /* photographs show where the object ends */
     int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
-    int one_light;        /* they do not tell how the object looks in other light */
+    int one_light;        /* photographs do not tell how the object looks in other light */
     double unit;          /* the bounds' longest side */
     double start_size;    /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
@@ -9591,8 +9589,7 @@ typedef struct ssdgs__photo_job {
     int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_real dssim, normal_weight;
     int exact; /* 1: for poses and lights; 0: with default options, which Gaussians learn from as well */
-    const ssdgs_real *exposure; /* of the Gaussians to settings.ambient, if there is or may be any; NULL: as
-                                   the model is */
+    const ssdgs_real *exposure; /* what of settings.ambient comes to each Gaussian; NULL: to be found */
 } ssdgs__photo_job;
 
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
@@ -9622,7 +9619,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     job.slope = job.image + pixels * 3;
     job.lift = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
-    double along = 0, across = 0; /* all light is the lamp's: d(image)/d(ln intensity) is slope x pixels */
+    double along = 0,
+           across = 0; /* as if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels */
     for (size_t i = 0; i < 3 * pixels && shot->exact; i++) {
         const double d = (double)job.slope[i] * (double)frame->pixels[i];
         across += d * d;
@@ -9785,6 +9783,14 @@ static double ssdgs__view_angle(const ssdgs_camera *camera) {
     return 2 * atan(0.5 * camera->width / (double)camera->fx);
 }
 
+/* Adam's step of a number at rate 1, whose moments it moves. */
+static double ssdgs__adam_one(double gradient, double *mean, double *square, int steps) {
+    *mean = 0.9 * *mean + 0.1 * gradient;
+    *square = 0.999 * *square + 0.001 * gradient * gradient;
+    return *mean * (double)ssdgs__bias_correction(0.9, steps) /
+           (sqrt(*square * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
+}
+
 /* What a light's rate is of: a scene's length, or a radian. */
 static double ssdgs__light_unit(const ssdgs_light *light, double unit) {
     return light->kind == SSDGS_LIGHT_POINT ? unit : 1;
@@ -9796,12 +9802,8 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
                                    double unit, double angle) {
     const int steps = ++c->steps[part];
     for (int i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
-        const double g = gradient[i];
-        c->mean[i] = 0.9 * c->mean[i] + 0.1 * g;
-        c->square[i] = 0.999 * c->square[i] + 0.001 * g * g;
-        c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * c->mean[i] *
-                       (double)ssdgs__bias_correction(0.9, steps) /
-                       (sqrt(c->square[i] * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
+        const double step = ssdgs__adam_one(gradient[i], c->mean + i, c->square + i, steps);
+        c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * step;
     }
 }
 
@@ -9879,7 +9881,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
-#define SSDGS__DOUBT 0.02      /* what a highlight or scattered light costs where it is a guess, of L1 */
+#define SSDGS__DOUBT 0.02      /* weight of c_s and c_sss in the loss where photographs have one light */
 #define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
 #define SSDGS__HALVED \
     0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
@@ -11158,24 +11160,21 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
             "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
             within, n);
     if (n < 2 || (points && points < n)) return SSDGS_OK;
-    trainer->one_light = 1;
-    if (sqrt(spread) < 0.03 * lit_from)
+    const int still = sqrt(spread) < 0.03 * lit_from;
+    const double moves = points && radius > 1e-3 * trainer->unit && radius < away ? radius : away;
+    trainer->one_light = still || sqrt(apart) < 0.1 * moves; /* `away`: bounds may be wrong */
+    if (!trainer->one_light) return ssdgs__note_shading(trainer, centre);
+    if (still)
         ssdgs__note(
             context,
             "all photographs are lit from one place: they do not tell how the object looks in other light");
-    else if (sqrt(apart) < 0.1 * (points && radius > 1e-3 * trainer->unit && radius < away
-                                      ? radius
-                                      : away)) /* bounds may be wrong */
+    else
         ssdgs__note(context,
                     "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in "
                     "all photographs: they do "
                     "not tell how the object looks in other light",
                     floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);
-    else {
-        trainer->one_light = 0;
-        return ssdgs__note_shading(trainer, centre);
-    }
     return SSDGS_OK;
 }
 
@@ -11445,9 +11444,8 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, s
     }
 }
 
-/* Adds the gradient of SSDGS__DOUBT x the image of highlights' and scattering's colours, where photographs
-   are lit from one place, as the camera sees it: they cannot tell these from a matt surface in other light.
- */
+/* Where photographs have one light, highlights and scattered light are a guess in any other: a matt surface
+   is the safer one. Adds the gradient of SSDGS__DOUBT x the mean of c_s and c_sss over the picture. */
 static void ssdgs__doubt(const ssdgs_trainer *trainer, const ssdgs_frame *frame, double pixels) {
     for (int i = 0; i < frame->shaded_count && trainer->one_light; i++) {
         const size_t g = frame->shaded[i];
@@ -11622,24 +11620,20 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
         ssdgs__anchor_intensities(trainer);
 }
 
-#define SSDGS__EXPOSE_EVERY 100  /* iterations, to how much of ambient light comes where */
+#define SSDGS__EXPOSE_EVERY 100  /* iterations until what comes to each Gaussian is found anew */
 #define SSDGS__AMBIENT_RATE 0.01 /* of the lamps' light */
 
 /* Adam on settings.ambient, by the moves of a batch. */
 static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *moves) {
     ssdgs_settings *s = &trainer->model->settings;
-    const int batch = trainer->options.batch, steps = ++trainer->ambient.steps;
+    const int batch = trainer->options.batch, steps = ++trainer->ambient_steps;
     const double rate =
         SSDGS__AMBIENT_RATE * (1 - 0.99 * t / ssdgs__schedule_end(&trainer->options)) * sqrt((double)batch);
     for (int c = 0; c < 3; c++) {
-        double g = 0, *mean = trainer->ambient.mean + c, *square = trainer->ambient.square + c;
+        double g = 0;
         for (int i = 0; i < batch; i++) g += moves[SSDGS__MOVES * i + 11 + c] / batch;
-        *mean = 0.9 * *mean + 0.1 * g;
-        *square = 0.999 * *square + 0.001 * g * g;
-        const double value = (double)s->ambient[c] -
-                             rate / (double)s->light_scale * *mean *
-                                 (double)ssdgs__bias_correction(0.9, steps) /
-                                 (sqrt(*square * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
+        const double step = ssdgs__adam_one(g, trainer->ambient + c, trainer->ambient + 3 + c, steps),
+                     value = (double)s->ambient[c] - rate / (double)s->light_scale * step;
         s->ambient[c] = (ssdgs_real)(value > 0 ? value < SSDGS__MOST_LIGHT ? value : SSDGS__MOST_LIGHT : 0);
     }
 }
@@ -11891,7 +11885,7 @@ typedef struct ssdgs__checkpoint_head {
     uint64_t inputs; /* hash of options, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
-    double start_size, ambient[6]; /* Adam's moments of settings.ambient */
+    double start_size, ambient[6];
     int32_t ambient_steps, exposed;
     ssdgs_settings settings;
 } ssdgs__checkpoint_head;
@@ -11971,8 +11965,8 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->skipped = trainer->skipped;
     for (int i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
     head->start_size = trainer->start_size;
-    memcpy(head->ambient, &trainer->ambient, sizeof head->ambient);
-    head->ambient_steps = trainer->ambient.steps;
+    memcpy(head->ambient, trainer->ambient, sizeof head->ambient);
+    head->ambient_steps = trainer->ambient_steps;
     head->exposed = trainer->exposed;
     head->settings = trainer->model->settings;
 }
@@ -12113,8 +12107,8 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         trainer->iteration = head.iteration;
         trainer->skipped = head.skipped;
         trainer->start_size = head.start_size;
-        memcpy(&trainer->ambient, head.ambient, sizeof head.ambient);
-        trainer->ambient.steps = head.ambient_steps;
+        memcpy(trainer->ambient, head.ambient, sizeof head.ambient);
+        trainer->ambient_steps = head.ambient_steps;
         for (int i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         ssdgs__checkpoint_io io;
         io.bytes = bytes + sizeof head;

@@ -1842,7 +1842,7 @@ static void test_exr(void) {
 
 /* The data forms of NRHints, GS3 and SSS-GS: twins of one scene have the same cameras, lights and pixels. */
 static void test_twins(void) {
-    enum { SIDE = 7, VIEWS = 2, LIGHTS = 2, FRAMES = VIEWS * LIGHTS };
+    enum { SIDE = 7, HIGH = 5, VIEWS = 2, LIGHTS = 2, FRAMES = VIEWS * LIGHTS };
     static const double lights[FRAMES][3] = {{1, 2, 3}, {-2, 0.5, 1.5}, {0.25, -3, 2}, {2, 2, -1}};
     static const double rgb[FRAMES][3] = {{2, 3, 4}, {5, 5, 5}, {1, 0.5, 0.25}, {9, 8, 7}};
     static const char *const poses[VIEWS] = {"[[1,0,0,0.5],[0,1,0,0],[0,0,1,4],[0,0,0,1]]",
@@ -1858,24 +1858,24 @@ static void test_twins(void) {
     SAY(2, "{\"frames\":[");
     for (int i = 0; i < FRAMES; i++) {
         const int view = i / LIGHTS, first = i % LIGHTS == 0;
-        unsigned char png[3 * SIDE * SIDE];
-        for (int k = 0; k < 3 * SIDE * SIDE; k++) png[k] = (unsigned char)(255 * (k * (i + 3) % 17 > 8));
+        unsigned char png[3 * SIDE * HIGH];
+        for (int k = 0; k < 3 * SIDE * HIGH; k++) png[k] = (unsigned char)(255 * (k * (i + 3) % 17 > 8));
         snprintf(name, sizeof name, FOLDER "/twin/r_%d.png", i);
-        CHECK(!olat_write_png(name, SIDE, SIDE, 3, png, error));
+        CHECK(!olat_write_png(name, SIDE, HIGH, 3, png, error));
         { /* light of 1 and 0 is stored as 255 and 0 */
             static const exr plain = {0,
                                       {0, 0},
-                                      {0, 0, SIDE - 1, SIDE - 1},
-                                      {0, 0, SIDE - 1, SIDE - 1},
+                                      {0, 0, SIDE - 1, HIGH - 1},
+                                      {0, 0, SIDE - 1, HIGH - 1},
                                       {"B", "G", "R", NULL},
                                       {1, 1, 1},
                                       0};
             encode_exr(&plain);
-            for (int y = 0; y < SIDE; y++)
+            for (int y = 0; y < HIGH; y++)
                 for (int c = 0; c < 3; c++)
                     for (int x = 0; x < SIDE; x++) {
                         const size_t pixel = (size_t)(y * SIDE + x),
-                                     to = file_size - (size_t)((SIDE - y) * 6 * SIDE + (SIDE - 1 - y) * 8) +
+                                     to = file_size - (size_t)((HIGH - y) * 6 * SIDE + (HIGH - 1 - y) * 8) +
                                           2 * (size_t)(c * SIDE + x);
                         file[to] = 0;
                         file[to + 1] = png[3 * pixel + (size_t)(2 - c)] ? 0x3C : 0; /* half of 1 */
@@ -1891,11 +1891,11 @@ static void test_twins(void) {
         SAY(1,
             "%s{\"img_path\":\"twin/e_%d.exr\",\"original_file_path\":\"x\",%s,"
             "\"camera_intrinsics\":[%g,%g,%.9g,%.9g],\"pl_pos\":[%g,%g,%g],\"pl_intensity\":[%g,%g,%g]}",
-            i ? "," : "", i, refined[view], 0.5 * (double)SIDE, 0.5 * (double)SIDE, focal, focal,
+            i ? "," : "", i, refined[view], 0.5 * (double)SIDE, 0.5 * (double)HIGH, focal, focal,
             lights[i][0], lights[i][1], lights[i][2], rgb[i][0], rgb[i][1], rgb[i][2]);
         if (!first) continue;
         SAY(2,
-            "%s{\"width\":7,\"height\":7,\"fl_x\":%.9g,\"fl_y\":%.9g,\"cx\":3.5,\"cy\":3.5,"
+            "%s{\"width\":7,\"height\":5,\"fl_x\":%.9g,\"fl_y\":%.9g,\"cx\":3.5,\"cy\":2.5,"
             "\"transform_matrix\":%s",
             i ? "," : "", focal, focal, poses[view]);
         for (int list = 0; list < 3; list++) {
@@ -1928,20 +1928,20 @@ static void test_twins(void) {
     for (int i = 0; i < FRAMES; i++)
         for (int k = 0; k < 3; k++) {
             const olat_frame *f = twins[k].frames + i, *first = twins[0].frames + i;
-            const double lens[4] = {focal, focal, 0.5 * (double)SIDE, 0.5 * (double)SIDE};
-            CHECK(f->camera.width == SIDE && f->camera.height == SIDE && near_all(&f->camera.fx, lens, 4));
+            const double lens[4] = {focal, focal, 0.5 * (double)SIDE, 0.5 * (double)HIGH};
+            CHECK(f->camera.width == SIDE && f->camera.height == HIGH && near_all(&f->camera.fx, lens, 4));
             CHECK(f->light.kind == SSDGS_LIGHT_POINT && near_all(f->light.position, lights[i], 3) &&
                   near_all(f->light.intensity, rgb[i], 3));
             for (int j = 0; j < 12; j++)
                 CHECK(fabs((double)(f->camera.view[j] - first->camera.view[j])) < 1e-6);
             CHECK(f->has_image && f->format == (k == 1 ? SSDGS_PIXELS_RGBA16F : SSDGS_PIXELS_RGBA8));
             int apart = 0, shown = 0;
-            for (size_t j = 0; j < 4 * SIDE * SIDE; j++) {
+            for (size_t j = 0; j < 4 * SIDE * HIGH; j++) {
                 const double value = (double)olat__number(f->pixels, f->format, j);
                 apart += fabs(value - (double)olat__number(first->pixels, first->format, j)) > 1e-6;
                 shown += value > 0.5;
             }
-            CHECK(!apart && shown > 70 && shown < 4 * SIDE * SIDE);
+            CHECK(!apart && shown > 50 && shown < 4 * SIDE * HIGH);
         }
     for (int k = 0; k < 3; k++) olat_free(twins + k);
 

@@ -25,6 +25,7 @@ static void make_model(void) {
     ssdgs_settings settings = ssdgs_settings_default();
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     settings.shadow.layers = 0;
+    for (int c = 0; c < 3; c++) settings.ambient[c] = 0.2f * (float)(c + 1);
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.tracer.stage = view_stage;
@@ -338,7 +339,11 @@ static void test_photographs(void) {
     memset(&image, 0, sizeof image);
     image.color = color;
     image.alpha = alpha;
-    CHECK(!ssdgs_render(here.show.models[0], &photos[0].camera, &photos[0].light, 1, &image));
+    ssdgs_render_options options =
+        ssdgs_render_options_exact(); /* with the room's light, as photographs are */
+    for (int c = 0; c < 3; c++) options.ambient[0][c] = 0.2f * (float)(c + 1);
+    CHECK(!ssdgs_render_ex(here.show.models[0], &photos[0].camera, &photos[0].light, 1, &options, &image,
+                           NULL));
     ssdgs_compose(color, alpha, PIXELS, ssdgs_model_settings(here.show.models[0])->transfer, black, color);
     for (int number = 0; number < 2; number++) {
         size_t size = 0;
