@@ -1,6 +1,6 @@
 /* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end
 
-Trains 3D Gaussians on photographs that each show an object under one known light. Renders them from new views
+Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
 "SSD-GS: Scattering and Shadow Decomposition for Relightable 3D Gaussian Splatting" (ICLR 2026); its equations
 are cited by number. It runs on the CPU and needs C99 or C++11, libc, libm and the system's threads.
@@ -17,7 +17,7 @@ DO THIS
     int main(int argc, char **argv) {
         static ssdgs_real color[64 * 64 * 3], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 64, 64);
-        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0};
+        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0, 0};
         static ssdgs_image image;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
@@ -73,7 +73,8 @@ CONVENTIONS
   world   right-handed (scenes: either), any unit, the same for cameras, lights and Gaussians. Floats hold
           seven digits: of a scene 1,000 times its size away from 0 give all positions less a nearby point,
           and that as settings.origin.
-  light   a point's E is intensity / distance^2, a directional light's and ambient light's its intensity.
+  light   a point's E is intensity / distance^2, less what its cone, range and focus take; a directional
+          light's and ambient light's is its intensity.
           Intensities have the unit of the photographs': training sets light_scale such that E is 1 at the
           centre of the bounds on average.
   colour  renders are linear light, never encoded or clamped, and multiplied by alpha ("premultiplied");
@@ -434,12 +435,13 @@ typedef struct ssdgs_light {
     ssdgs_light_kind kind;
     ssdgs_real position[3];  /* world; directional: unit vector towards the light */
     ssdgs_real intensity[3]; /* RGB, 0 or more, in the training data's units; directional: irradiance */
-    ssdgs_real direction[3]; /* spot, not in photographs: unit vector along which it shines */
+    ssdgs_real direction[3]; /* spot, focus: unit vector along which it shines */
     ssdgs_real cone[2]; /* spot: angles to it in radians, full inside the first, 0 outside the second; between
                            them as in glTF. No light scatters across its rim */
-    ssdgs_real range;   /* point, spot, not in photographs: where it fades to 0, as in glTF; 0: nowhere */
-    int unshadowed; /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
-                       beneath a plane */
+    ssdgs_real range;   /* point, spot: where it fades to 0, as in glTF; 0: nowhere */
+    ssdgs_real focus; /* point, spot: fades as cos^focus of the angle to direction, as LEDs do; 0: does not */
+    int unshadowed;   /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
+                         beneath a plane */
 } ssdgs_light;
 
 /* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. */
@@ -622,6 +624,9 @@ typedef struct ssdgs_photo {
     ssdgs_light light;
     const void *pixels; /* (h,w,4) packed, straight alpha; must outlive the trainer */
     ssdgs_pixels format;
+    const ssdgs_light *more; /* (more_count) lights that shine as well; must outlive the trainer. With any,
+                                none of the photograph's lights is refined */
+    int more_count;
 } ssdgs_photo;
 
 #ifndef SSDGS_NO_TRAINER
@@ -3009,12 +3014,18 @@ typedef struct ssdgs__scratch {
     ssdgs__buffer shaded, color, component[5], pixels, transmittance, layers, layer_pixels, pixel_visibility,
         pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, activations, scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
-        splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals;
+        splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals, photo_lights;
 } ssdgs__scratch;
 
 static void ssdgs__buffers_release(ssdgs_context *context, void *buffers, size_t bytes) {
     for (size_t i = 0; i < bytes / sizeof(ssdgs__buffer); i++)
         ssdgs__release(context, ((ssdgs__buffer *)buffers + i)->memory);
+}
+
+static ssdgs_result ssdgs__scratch_create(ssdgs_context *context) {
+    if (!context->scratch)
+        context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *context->scratch);
+    return context->scratch ? SSDGS_OK : SSDGS_ERR_MEMORY;
 }
 
 static void ssdgs__scratch_destroy(ssdgs_context *context, ssdgs__scratch *scratch) {
@@ -3485,9 +3496,8 @@ static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bo
     const ssdgs_object object = ssdgs_object_default(model);
     ssdgs_placed placed;
     ssdgs_frame frame;
-    if (!context->scratch)
-        context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *context->scratch);
-    if (!context->scratch) return SSDGS_ERR_MEMORY;
+    const ssdgs_result result = ssdgs__scratch_create(context);
+    if (result) return result;
     ssdgs__place(&object, &placed);
     memset(&frame, 0, sizeof frame);
     frame.context = context;
@@ -3511,6 +3521,16 @@ SSDGS__SMALL_BEGIN
 static int ssdgs__casts(const ssdgs_light *light) {
     return !light->unshadowed &&
            (light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0);
+}
+
+/* Whether it has a direction, from its position. */
+static int ssdgs__aimed(const ssdgs_light *light) {
+    return light->kind == SSDGS_LIGHT_SPOT || (light->kind == SSDGS_LIGHT_POINT && light->focus > 0);
+}
+
+/* Whether it does not reach everything as 1 / distance^2. */
+static int ssdgs__limited(const ssdgs_light *light) {
+    return ssdgs__aimed(light) || (light->kind == SSDGS_LIGHT_POINT && light->range > 0);
 }
 
 /* Whether a light, or with -1 the camera, sees an object: rows (objects) of the camera and the lights. Of one
@@ -3547,9 +3567,7 @@ static ssdgs__bounds ssdgs__light_bounds(const ssdgs_frame *frame, int index) {
     const ssdgs_light *light = frame->lights + index;
     const unsigned char *reach = ssdgs__reach(frame, index);
     ssdgs__bounds b = frame->memory->scene;
-    if (!reach || light->kind == SSDGS_LIGHT_DIRECTIONAL ||
-        !(light->range > 0 || light->kind == SSDGS_LIGHT_SPOT))
-        return b;
+    if (!reach || !ssdgs__limited(light)) return b;
     memset(&b, 0, sizeof b);
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
@@ -3627,7 +3645,8 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
             v->by_distance = 1;
         } else {
             v->orthographic = !along && distance > 1000 * radius;
-            v->distance = v->orthographic && light->kind == SSDGS_LIGHT_POINT ? (ssdgs_real)distance : 1;
+            v->distance =
+                v->orthographic && light->kind != SSDGS_LIGHT_DIRECTIONAL ? (ssdgs_real)distance : 1;
             for (int i = 0; i < 3; i++) {
                 direction[i] = along ? (double)light->direction[i] : to_scene[i];
                 eye[i] =
@@ -3663,9 +3682,9 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
                                    (double)lights[i].intensity[j]);
             norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
-        if (lights[i].kind == SSDGS_LIGHT_SPOT)
-            norm2 = (double)(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
-        if (lights[i].kind != SSDGS_LIGHT_POINT && !(fabs(norm2 - 1) <= 1e-3))
+        const int aimed = ssdgs__aimed(lights + i);
+        if (aimed) norm2 = (double)(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+        if ((aimed || lights[i].kind == SSDGS_LIGHT_DIRECTIONAL) && !(fabs(norm2 - 1) <= 1e-3))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
                                i);
         if (lights[i].kind == SSDGS_LIGHT_SPOT &&
@@ -3677,6 +3696,9 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
         if (!(lights[i].range >= 0) || !ssdgs__finite(lights[i].range))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: range = %g is negative or not finite",
                                i, (double)lights[i].range);
+        if (!(lights[i].focus >= 0) || lights[i].focus > 1000)
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: focus = %g is not in 0 .. 1000", i,
+                               (double)lights[i].focus);
     }
     return SSDGS_OK;
 }
@@ -3804,8 +3826,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
         lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
                          ssdgs__casts(light) == ssdgs__casts(last);
         lights[i].kept = lights[i].kept && !memcmp(light->position, last->position, sizeof light->position) &&
-                         !memcmp(&light->range, &last->range, sizeof light->range);
-        if (light->kind == SSDGS_LIGHT_SPOT)
+                         !memcmp(&light->range, &last->range, 2 * sizeof light->range); /* focus, too */
+        if (ssdgs__aimed(light))
             lights[i].kept = lights[i].kept &&
                              !memcmp(light->direction, last->direction, sizeof light->direction) &&
                              !memcmp(light->cone, last->cone, sizeof light->cone);
@@ -3894,7 +3916,8 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
    is of irradiance 1, for ambient light. lobes: another light's, which has the same, or NULL. */
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
                                           const ssdgs__lighting *lobes) {
-    static const ssdgs_light even = {SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 1, 1}, {0, 0, 0}, {0, 0}, 0, 1};
+    static const ssdgs_light even = {
+        SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 1, 1}, {0, 0, 0}, {0, 0}, 0, 0, 1};
     const ssdgs_settings *s = &o->settings;
     const ssdgs_light *from = light < frame->light_count ? frame->lights + light : &even;
     const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
@@ -4244,13 +4267,13 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     ssdgs__frame_memory *m;
     ssdgs__scratch *w;
     if (!*memory) *memory = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
-    if (!context->scratch) context->scratch = (ssdgs__scratch *)ssdgs__allocate(context, sizeof *w);
-    if (!*memory || !context->scratch) return SSDGS_ERR_MEMORY;
+    ssdgs_result result = ssdgs__scratch_create(context);
+    if (!*memory || result) return SSDGS_ERR_MEMORY;
     m = *memory;
     w = context->scratch;
     memset(frame, 0, sizeof *frame);
     frame->options = request->options ? *request->options : ssdgs_render_options_default();
-    ssdgs_result result = ssdgs__render_options_check(context, &frame->options);
+    result = ssdgs__render_options_check(context, &frame->options);
     if (!result) result = ssdgs__camera_check(context, camera, request->mirrored);
     if (!result) result = ssdgs__lights_check(context, request->lights, light_count);
     if (result) return result;
@@ -5761,30 +5784,53 @@ static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
     }
 }
 
-/* What of a light's irradiance a spot's cone and its range leave the Gaussians of a block, as in glTF's
-   KHR_lights_punctual. 0: nothing to any. */
+/* What of a light's irradiance its range, its cone, as in glTF's KHR_lights_punctual, and its focus leave at
+   d, from it. slope: its gradient. */
+static double ssdgs__reach_at(const ssdgs_light *light, const double direction[3], double inverse_range,
+                              const double d[3], double slope[3]) {
+    const double distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2],
+                 distance = sqrt(distance2 > 1e-60 ? distance2 : 1e-60),
+                 range2 = inverse_range * inverse_range, way2 = distance2 * range2,
+                 left = way2 < 1 ? 1 - way2 * way2 : 0,
+                 cosine = (d[0] * direction[0] + d[1] * direction[1] + d[2] * direction[2]) / distance,
+                 focus = (double)light->focus;
+    double cone = 1, fade = 1, by_cosine[2] = {0, 0}; /* how they change with the cosine */
+    if (light->kind == SSDGS_LIGHT_SPOT) {
+        const double outer = cos((double)light->cone[1]), width = cos((double)light->cone[0]) - outer,
+                     t = (cosine - outer) / width;
+        cone = t > 1 ? 1 : t > 0 ? t * t : 0;
+        by_cosine[0] = t > 0 && t < 1 ? 2 * t / width : 0;
+    }
+    if (focus > 0) { /* below 1 it is endlessly steep at its edge */
+        fade = cosine > 0 ? pow(cosine, focus) : 0;
+        by_cosine[1] = focus * fade / (cosine > 1e-3 ? cosine : 1e-3);
+    }
+    const double steep = left * (by_cosine[0] * fade + cone * by_cosine[1]) / distance,
+                 nearer = left > 0 ? cone * fade * 4 * way2 * range2 : 0;
+    for (int c = 0; c < 3; c++) slope[c] = steep * (direction[c] - cosine * d[c] / distance) - nearer * d[c];
+    return cone * fade * left;
+}
+
+/* The same for the Gaussians of a block. slope: (3, BLOCK) its gradient to their positions, times 1 / their
+   distance^2; or NULL. Returns 0 where nothing comes to any. */
 static int ssdgs__reach_row(const ssdgs_frame *frame, const ssdgs_placed *o, int index,
-                            const ssdgs_real *gauss, ssdgs_real *reach) {
+                            const ssdgs_real *gauss, ssdgs_real *reach, ssdgs_real *slope) {
     const ssdgs_light *light = frame->lights + index;
-    const ssdgs_real *from = ssdgs__lightings(frame, o)[index].light;
-    const int spot = light->kind == SSDGS_LIGHT_SPOT;
-    const double inner = cos((double)light->cone[0]), outer = cos((double)light->cone[1]);
-    const double inverse_range =
-        light->kind != SSDGS_LIGHT_DIRECTIONAL && light->range > 0 ? (double)(o->scale / light->range) : 0;
+    const ssdgs__lighting *k = ssdgs__lightings(frame, o) + index;
+    const double inverse_range = light->range > 0 ? (double)(o->scale / light->range) : 0;
     int any = 0;
-    ssdgs_real direction[3] = {0, 0, 0};
-    if (spot) ssdgs__turn(o, 1, light->direction, direction);
+    ssdgs_real turned[3] = {0, 0, 0};
+    if (ssdgs__aimed(light)) ssdgs__turn(o, 1, light->direction, turned);
+    const double direction[3] = {(double)turned[0], (double)turned[1], (double)turned[2]};
     for (int s = 0; s < SSDGS__BLOCK; s++) {
-        double along = 0, distance2 = 0;
+        double d[3], by[3], distance2 = 0;
         for (int c = 0; c < 3; c++) {
-            const double d = (double)gauss[(SSDGS_POSITION + c) * SSDGS__BLOCK + s] - (double)from[c];
-            along += d * (double)direction[c];
-            distance2 += d * d;
+            d[c] = (double)gauss[(SSDGS_POSITION + c) * SSDGS__BLOCK + s] - (double)k->light[c];
+            distance2 += d[c] * d[c];
         }
-        const double t = (along / sqrt(distance2 > 0 ? distance2 : 1) - outer) / (inner - outer);
-        const double way2 = distance2 * inverse_range * inverse_range, left = 1 - way2 * way2;
-        reach[s] = (ssdgs_real)(!spot || t > 1 ? 1 : t > 0 ? t * t : 0);
-        reach[s] *= (ssdgs_real)(left > 0 ? left : 0);
+        if (distance2 < (double)k->least_distance2) distance2 = (double)k->least_distance2;
+        reach[s] = (ssdgs_real)ssdgs__reach_at(light, direction, inverse_range, d, by);
+        for (int c = 0; slope && c < 3; c++) slope[c * SSDGS__BLOCK + s] = (ssdgs_real)(by[c] / distance2);
         any |= reach[s] > 0;
     }
     return any;
@@ -6000,10 +6046,11 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
         const ssdgs_light *source = frame->lights + light;
         const int off = ssdgs__beyond(frame, light, o);
-        const int limited = source->kind == SSDGS_LIGHT_SPOT || source->range > 0;
+        const int limited = ssdgs__limited(source);
         ssdgs_real reach[SSDGS__BLOCK];
         const int reached =
-            o->light_count && !off && (!limited || ssdgs__reach_row(frame, o, light, gauss, reach));
+            o->light_count && !off &&
+            (!limited || ssdgs__reach_row(frame, o, light, gauss, reach, NULL) || frame->training);
         const int lit =
             reached || (o->light_count && !off && (frame->diffuse || frame->layer_pixels)); /* for S */
         for (int i = 0; frame->layer_count && !(lit && lighting->deferred) && i < SSDGS__PER_LIGHT; i++)
@@ -6258,6 +6305,20 @@ static void ssdgs__ambient_backward(const ssdgs_frame *frame, ssdgs__lighting *l
     for (int c = 0; c < 3; c++) lamp->intensity[c] *= frame->options.ambient[0][c];
 }
 
+/* E is its reach / distance^2: of drows' gradient to E what is the reach's goes to positions and the light,
+   and that to 1 / distance^2 stays. */
+static void ssdgs__reach_backward(const ssdgs_frame *frame, int light, const ssdgs_real *gauss,
+                                  ssdgs_real *drows, ssdgs_real *dgauss, ssdgs_real *lane_sums) {
+    ssdgs_real reach[SSDGS__BLOCK], slope[3 * SSDGS__BLOCK], *de = drows + SSDGS__IRRADIANCE * SSDGS__BLOCK;
+    ssdgs__reach_row(frame, frame->objects, light, gauss, reach, slope);
+    for (int i = 0; i < 3 * SSDGS__BLOCK; i++) {
+        const ssdgs_real d = de[i % SSDGS__BLOCK] * slope[i];
+        dgauss[SSDGS_POSITION * SSDGS__BLOCK + i] += d;
+        lane_sums[i / SSDGS__BLOCK * 16 + i % 16] -= d;
+    }
+    for (int s = 0; s < SSDGS__BLOCK; s++) de[s] *= reach[s];
+}
+
 static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
                                         int slot) {
     const ssdgs_frame *frame = job->frame;
@@ -6347,6 +6408,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             }
             memset(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK, 0, 3 * SSDGS__BLOCK * sizeof *drows);
         }
+        if (!even && ssdgs__limited(frame->lights + light))
+            ssdgs__reach_backward(frame, light, gauss, drows, dgauss, lane_sums);
         k->reflect_backward(lighting, gauss, drows, dgauss, lane_sums);
     }
     if (frame->layer_count) k->lobe_backward(gauss, dlobe, dgauss);
@@ -9409,7 +9472,7 @@ static double ssdgs__moved_length(const ssdgs_light *light, const double value[1
     double square = 0;
     for (int i = 0; i < 3; i++)
         square += ((double)light->position[i] + value[6 + i]) * ((double)light->position[i] + value[6 + i]);
-    return light->kind == SSDGS_LIGHT_POINT || !(square > 0) ? 1 : sqrt(square);
+    return light->kind != SSDGS_LIGHT_DIRECTIONAL || !(square > 0) ? 1 : sqrt(square);
 }
 
 static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssdgs_camera *camera,
@@ -9592,6 +9655,17 @@ typedef struct ssdgs__photo_job {
     const ssdgs_real *exposure; /* what of settings.ambient comes to each Gaussian; NULL: to be found */
 } ssdgs__photo_job;
 
+/* A photograph's lights: `light`, which may be refined, and those beside its own. */
+static ssdgs_result ssdgs__photo_lights(ssdgs_context *context, const ssdgs_photo *photo,
+                                        const ssdgs_light *light, ssdgs_light **lights) {
+    const ssdgs_result result = ssdgs__scratch_create(context);
+    if (result) return result;
+    SSDGS__RESERVE(context->scratch->photo_lights, *lights, ssdgs_light, photo->more_count + 1);
+    **lights = *light;
+    if (photo->more_count) memcpy(*lights + 1, photo->more, (size_t)photo->more_count * sizeof *light);
+    return SSDGS_OK;
+}
+
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
                                           const ssdgs__photo_job *shot, ssdgs__loss_values *values) {
     const ssdgs_camera *camera = shot->camera;
@@ -9603,7 +9677,11 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     options.terms = shot->terms;
     options.max_error = 0; /* all that a pixel blends gets a gradient */
     if (!shot->exposure) memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
-    ssdgs_result result = ssdgs__frame_of_model(frame, model, camera, shot->light, 1, &options, 0, 1);
+    ssdgs_light *lights;
+    ssdgs_result result = ssdgs__photo_lights(context, shot->photo, shot->light, &lights);
+    if (!result)
+        result =
+            ssdgs__frame_of_model(frame, model, camera, lights, 1 + shot->photo->more_count, &options, 0, 1);
     if (!result && shot->exposure) {
         memcpy(frame->options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
         frame->objects->exposure = shot->exposure;
@@ -9793,7 +9871,7 @@ static double ssdgs__adam_one(double gradient, double *mean, double *square, int
 
 /* What a light's rate is of: a scene's length, or a radian. */
 static double ssdgs__light_unit(const ssdgs_light *light, double unit) {
-    return light->kind == SSDGS_LIGHT_POINT ? unit : 1;
+    return light->kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : unit;
 }
 
 /* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the
@@ -9817,6 +9895,25 @@ static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], 
 
 static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
     for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+static const ssdgs_light *ssdgs__photo_light(const ssdgs_photo *photo, int i) {
+    return i ? photo->more + i - 1 : &photo->light;
+}
+
+/* A light's mean E at a place, no nearer than `nearest`. */
+static double ssdgs__light_at(const ssdgs_light *light, const double place[3], double nearest) {
+    double d[3], distance2 = 0, slope[3], intensity = 0;
+    const double direction[3] = {(double)light->direction[0], (double)light->direction[1],
+                                 (double)light->direction[2]};
+    for (int c = 0; c < 3; c++) {
+        d[c] = place[c] - (double)light->position[c];
+        distance2 += d[c] * d[c];
+        intensity += (double)light->intensity[c] / 3;
+    }
+    if (light->kind == SSDGS_LIGHT_DIRECTIONAL) return intensity;
+    return intensity / (distance2 > nearest * nearest ? distance2 : nearest * nearest) *
+           ssdgs__reach_at(light, direction, light->range > 0 ? 1 / (double)light->range : 0, d, slope);
 }
 
 /* Goes only a part of the way to the intensity that fits best: what does not fit yet may be the model. */
@@ -10424,6 +10521,7 @@ static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssd
             {0, 0, 0},
             {0, 0},
             0,
+            0,
             0};
         ssdgs_frame frame;
         ssdgs_result result = ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 0);
@@ -10749,10 +10847,11 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     context->subject_number = index;
     ssdgs_result result = ssdgs__camera_check(context, &photo->camera, 0);
     if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
-    if (!result &&
-        (photo->light.kind == SSDGS_LIGHT_SPOT || photo->light.range > 0 || photo->light.unshadowed))
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                             "a photograph's light is a point or a direction, without range, with shadow");
+    if (!result) result = ssdgs__lights_check(context, photo->more, photo->more_count);
+    int unshadowed = photo->light.unshadowed;
+    for (int i = 0; !result && i < photo->more_count; i++) unshadowed |= photo->more[i].unshadowed;
+    if (!result && unshadowed)
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a photograph's lights have shadows");
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && ((int)photo->format < 0 || photo->format > SSDGS_PIXELS_RGBA32F))
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
@@ -11123,12 +11222,12 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
     const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
     double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
-    int within = 0, points = 0;
+    int within = 0, points = 0, several = 0;
     for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < n; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
-            const int point = photo->light.kind == SSDGS_LIGHT_POINT;
+            const int point = photo->light.kind != SSDGS_LIGHT_DIRECTIONAL;
             double eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
             ssdgs__camera_centre(&photo->camera, eye);
             double p[3];
@@ -11153,13 +11252,14 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
             for (j = 0; j < 3 && p[j] > (double)o->bounds_min[j] && p[j] < (double)o->bounds_max[j]; j++) {}
             within += point && j == 3;
             points += point;
+            several |= photo->more_count > 0;
         }
     if (within)
         ssdgs__note(
             context,
             "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
             within, n);
-    if (n < 2 || (points && points < n)) return SSDGS_OK;
+    if (n < 2 || several || (points && points < n)) return SSDGS_OK;
     const int still = sqrt(spread) < 0.03 * lit_from;
     const double moves = points && radius > 1e-3 * trainer->unit && radius < away ? radius : away;
     trainer->one_light = still || sqrt(apart) < 0.1 * moves; /* `away`: bounds may be wrong */
@@ -11273,10 +11373,10 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    double mean[3] = {0, 0, 0}, radius = 0, irradiance = 0;
+    double mean[3] = {0, 0, 0}, middle[3], radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int outlined = 0, empty = 0, dark = 0, within = 0, lit = 0;
+    int outlined = 0, empty = 0, dark = 0, within = 0;
     double shown = 0;
     if (result) return result;
     if (model->settings.baked)
@@ -11337,6 +11437,8 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         ssdgs__camera_centre(&photos[i].camera, centre);
         for (int j = 0; j < 3; j++) mean[j] += centre[j] / photo_count;
     }
+    trainer->unit = ssdgs__bounds_side(o);
+    for (int j = 0; j < 3; j++) middle[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
     for (int i = 0; i < photo_count; i++) {
         double centre[3], d2 = 0;
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -11346,11 +11448,14 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j];
              j++) {}
         within += j == 3;
-        for (j = 0; j < 3 && !(photos[i].light.intensity[j] > 0); j++) {}
-        dark += j == 3;
+        double e =
+            0; /* no nearer than half the unit: one light inside of the object must not darken others */
+        for (int l = 0; l <= photos[i].more_count; l++)
+            e += ssdgs__light_at(ssdgs__photo_light(photos + i, l), middle, 0.5 * trainer->unit);
+        if (e > 0) irradiance += log(e);
+        else dark++;
     }
-    trainer->unit = ssdgs__bounds_side(o);
-    if (dark) ssdgs__note(context, "%d photographs of %d have a light of intensity 0", dark, photo_count);
+    if (dark) ssdgs__note(context, "%d photographs of %d have no light", dark, photo_count);
     if (radius < 1e-3 * trainer->unit)
         ssdgs__note(context, "all photographs are taken from one place: other views cannot be right");
     else result = ssdgs__note_bounds(trainer, within);
@@ -11362,25 +11467,10 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (fresh && !result) { /* the model stays as it was when that fails */
         const ssdgs_settings *s = &model->settings;
         const int scaled = ssdgs__has_unit(s);
-        /* the logarithm of I / d^2 at the object averages 0: few strong lights, or one inside of it, must not
-           darken all others */
-        const double nearest2 = 0.25 * trainer->unit * trainer->unit;
+        for (int j = 0; scaled && j < 3; j++) model->settings.centre[j] = (ssdgs_real)middle[j];
         if (scaled) model->settings.length_unit = (ssdgs_real)(0.5 * trainer->unit);
-        for (int i = 0; i < photo_count; i++) {
-            double d2 = 0, intensity = 0;
-            for (int j = 0; j < 3; j++) {
-                const double centre = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
-                const double d = (double)photos[i].light.position[j] - centre;
-                d2 += d * d;
-                intensity += (double)photos[i].light.intensity[j] / 3;
-                if (scaled) model->settings.centre[j] = (ssdgs_real)centre;
-            }
-            intensity /= photos[i].light.kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : d2 > nearest2 ? d2 : nearest2;
-            if (!(intensity > 0)) continue;
-            irradiance += log(intensity);
-            lit++;
-        }
-        const double scale = lit ? exp(-irradiance / lit) : 1;
+        /* the logarithm of E averages 0: few strong lights must not darken all others */
+        const double scale = dark < photo_count ? exp(-irradiance / (photo_count - dark)) : 1;
         model->settings.light_scale = (ssdgs_real)(scale < SSDGS__MOST_LIGHT ? scale : SSDGS__MOST_LIGHT);
         ssdgs__globals_reset(model, o->seed);
     }
@@ -11611,6 +11701,7 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
                                trainer->unit, angle);
     if (moves[0] && o->rates.position.start > 0)
         ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
+    if (trainer->photos[photo].more_count) return;
     if (moves[1])
         ssdgs__correction_step(correction, gradient, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
@@ -11774,7 +11865,11 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     memset(&out, 0, sizeof out);
     out.color = rendered;
     out.alpha = planes;
-    result = ssdgs__render_model(model, &photo->camera, &photo->light, 1, &options, &out, NULL);
+    ssdgs_light *lights;
+    result = ssdgs__photo_lights(context, photo, &photo->light, &lights);
+    if (!result)
+        result =
+            ssdgs__render_model(model, &photo->camera, lights, 1 + photo->more_count, &options, &out, NULL);
     if (!result) {
         ssdgs_compose(rendered, out.alpha, pixels, model->settings.transfer, background, rendered);
         ssdgs__photo_planes(context->k, photo, model->settings.transfer, background, 0, pixels, planes);
@@ -11848,6 +11943,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
+        if (photo->more_count) continue;
         ssdgs__correction_step(&correction, gradient, 1, rate, ssdgs__light_unit(&light, unit), angle);
         ssdgs__intensity_step(&correction, gradient);
     }
@@ -11951,12 +12047,16 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
         const ssdgs_photo *photo = trainer->photos + i;
         const ssdgs_camera *camera = &photo->camera;
         const ssdgs_real optics[5] = {camera->fx, camera->fy, camera->cx, camera->cy, camera->near_plane};
-        const int kind[4] = {camera->width, camera->height, (int)photo->light.kind, (int)photo->format};
+        const int kind[3] = {camera->width, camera->height, (int)photo->format};
         head->inputs = ssdgs__fold(head->inputs, camera->view, sizeof camera->view);
         head->inputs = ssdgs__fold(head->inputs, optics, sizeof optics);
         head->inputs = ssdgs__fold(head->inputs, kind, sizeof kind);
-        head->inputs = ssdgs__fold(head->inputs, photo->light.position, sizeof photo->light.position);
-        head->inputs = ssdgs__fold(head->inputs, photo->light.intensity, sizeof photo->light.intensity);
+        for (int l = 0; l <= photo->more_count; l++) {
+            const ssdgs_light *light = ssdgs__photo_light(photo, l);
+            head->inputs = ssdgs__fold(head->inputs, &light->kind, sizeof light->kind);
+            head->inputs = ssdgs__fold(head->inputs, light->position,
+                                       offsetof(ssdgs_light, unshadowed) - offsetof(ssdgs_light, position));
+        }
     }
     head->global_count = trainer->model->global_count;
     head->photo_count = trainer->photo_count;

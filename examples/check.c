@@ -207,6 +207,7 @@ static int report_photographs(check *k) {
          "%d of %d are softer than the others: out of focus, or moved?");
 
     printf("Light\n");
+    TELL(k, set->frames[i].more_count > 0, "%d of %d have several lights: what follows goes by the first");
     double share = 0, weight = 0, least_cosine = 1;
     for (int i = 0; i < set->count; i++) { /* only light from the side leaves parts that no lamp reaches */
         const double cosine = olat__dot(f[i].camera, f[i].light);

@@ -1,4 +1,4 @@
-/* olat.h - reads and writes datasets of photographs under one light at a time, and PNG; reads OpenEXR. MIT,
+/* olat.h - reads and writes datasets of photographs under known lights, and PNG; reads OpenEXR. MIT,
    see ssdgs.h.
 
    #include "ssdgs.h"
@@ -10,18 +10,19 @@
 
    KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at
    the top or in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep);
-   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity. Or a
-   frame is a camera's, with lists of its photographs: light_positions, light_intensities, file_paths, less
-   those that exclude_list.txt names. A frame's own key wins over the top's, one that tells a focal length
-   over all of those. Distorted lenses are refused.
-   IMAGES    PNG of any kind, as bytes or words; OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS
-   or ZIP, as halves or floats: the display window, alpha divided out, R G B A or Y of the image or of its
-   first layer. A name without an ending is .png, or .exr where there is no such PNG.
-   ADAPTED   Coordinates far from 0 become relative to an origin, photographs whose files say that they are
-   not sRGB become so, masks become alpha. The dataset's notes say what was done. ERRORS    Functions return
-   0, or 1 and one message that names the file and the key and line, or the byte. Nothing is kept. HOSTILE
-   Every byte of a file may be wrong. Image paths reach only regular files below the folder (or through its
-   links). SYSTEMS   POSIX, MinGW. All functions are static and keep no state. */
+   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity; pl_mu and
+   pl_axis, along which an LED shines that fades as cos^mu; or in place of these pl_lights: a list of objects
+   that have them, where several lights shine. Or a frame is a camera's, with lists of its photographs:
+   light_positions, light_intensities, file_paths, less those that exclude_list.txt names. A frame's own key
+   wins over the top's, one that tells a focal length over all of those. Distorted lenses are refused. IMAGES
+   PNG of any kind, as bytes or words; OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS or ZIP,
+   as halves or floats: the display window, alpha divided out, R G B A or Y of the image or of its first
+   layer. A name without an ending is .png, or .exr where there is no such PNG. ADAPTED   Coordinates far from
+   0 become relative to an origin, photographs whose files say that they are not sRGB become so, masks become
+   alpha. The dataset's notes say what was done. ERRORS    Functions return 0, or 1 and one message that names
+   the file and the key and line, or the byte. Nothing is kept. HOSTILE Every byte of a file may be wrong.
+   Image paths reach only regular files below the folder (or through its links). SYSTEMS   POSIX, MinGW. All
+   functions are static and keep no state. */
 
 #ifndef OLAT_H
 #define OLAT_H
@@ -69,9 +70,13 @@ enum {                     /* flags of olat_load */
        OLAT_ALLOW_PARENT = 2 /* image paths may contain ".." */
 };
 
+enum { OLAT_MOST_LIGHTS = 64 }; /* of a photograph */
+
 typedef struct olat_frame {
     ssdgs_camera camera;
     ssdgs_light light;
+    ssdgs_light *more; /* (more_count) those beside it */
+    int more_count;
     char *file, *mask; /* folder/path of the image and its mask; NULL if the frame names none */
     void *pixels;      /* (h,w,4) straight alpha, tightly packed; NULL without image */
     ssdgs_pixels format;
@@ -1787,6 +1792,23 @@ static void olat__read_pose(olat__json *j, const olat__node *node, const double 
     }
 }
 
+/* How many lights a frame has, or one too many, and the node that says what light number `at` is. */
+static int olat__light_count(const olat__json *j, const olat__node *frame) {
+    const olat__node *lights = olat__find(j, frame, "pl_lights");
+    if (!lights) return 1;
+    if (lights->type != OLAT__ARRAY) return 0;
+    return lights->size < OLAT_MOST_LIGHTS ? lights->size
+                                           : OLAT_MOST_LIGHTS + (lights->size > OLAT_MOST_LIGHTS);
+}
+
+static const olat__node *olat__light_node(const olat__json *j, const olat__node *frame, int at) {
+    const olat__node *lights = olat__find(j, frame, "pl_lights");
+    if (!lights) return frame;
+    const olat__node *node = &j->nodes[lights->child];
+    while (at-- > 0) node = &j->nodes[node->next];
+    return node;
+}
+
 /* What the frames' positions had better be relative to: where cameras and point lights lie too far away for
    floats to tell them apart, their mean, rounded so that floats hold it; else 0. Cameras in one place do not
    tell how large the scene is: they must be further away than millimetres can explain. What is wrong with a
@@ -1797,9 +1819,10 @@ static void olat__find_origin(olat__json *j, const olat__node *frames, double or
     for (int turn = 0; turn < 2; turn++) {
         const olat__node *node = &j->nodes[frames->child];
         for (int i = 0; i < frames->size && !j->failed; i++, node = &j->nodes[node->next])
-            for (int light = 0; light < 2; light++) {
+            for (int light = 0; light <= olat__light_count(j, node); light++) {
                 double place[3] = {0, 0, 0};
-                if (light && !olat__get(j, node, "pl_pos", 3, place)) continue;
+                if (light && !olat__get(j, olat__light_node(j, node, light - 1), "pl_pos", 3, place))
+                    continue;
                 double view[12];
                 if (!light) olat__read_pose(j, node, mean, view);
                 for (int k = 0; k < 3; k++) {
@@ -1859,10 +1882,38 @@ static void olat__read_light(olat__json *j, const olat__node *node, const double
         olat__numbers(j, intensity, 3, rgb);
     else if (intensity && olat__numbers(j, intensity, 1, rgb)) rgb[1] = rgb[2] = rgb[0];
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) olat__json_fail(j, intensity, "an intensity is negative");
+    double mu = 0, axis[3] = {0, 0, 0};
+    if (olat__get(j, node, "pl_mu", 1, &mu) && mu != 0) {
+        if (!is_point || !(mu > 0 && mu <= 1000))
+            olat__json_fail(j, node, is_point ? "pl_mu is not in 0 .. 1000" : "pl_mu goes with pl_pos");
+        length = olat__get(j, node, "pl_axis", 3, axis) ? sqrt(olat__dot(axis, axis)) : 0;
+        if (!(fabs(length - 1) < 1e-2)) olat__json_fail(j, node, "pl_mu needs pl_axis, a unit vector");
+    }
+    light->focus = (ssdgs_real)mu;
     light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
     for (int i = 0; i < 3 && !j->failed; i++) {
         light->position[i] = (ssdgs_real)(is_far ? v[i] / length : v[i] - origin[i]);
+        light->direction[i] = (ssdgs_real)(axis[i] / length);
         light->intensity[i] = (ssdgs_real)rgb[i];
+    }
+}
+
+/* All of a frame's. */
+static void olat__read_lights(olat__json *j, const olat__node *node, const double origin[3],
+                              olat_frame *frame) {
+    const int count = olat__light_count(j, node);
+    if (count < 1 || count > OLAT_MOST_LIGHTS)
+        olat__json_fail(j, olat__find(j, node, "pl_lights"), "a list of 1 to %d lights was expected",
+                        OLAT_MOST_LIGHTS);
+    if (count > 1 && !j->failed) {
+        frame->more = (ssdgs_light *)calloc((size_t)count - 1, sizeof *frame->more);
+        if (frame->more) frame->more_count = count - 1;
+        else olat__json_fail(j, node, "out of memory");
+    }
+    for (int i = 0; i < count && !j->failed; i++) {
+        const olat__node *light = olat__light_node(j, node, i);
+        if (light->type != OLAT__OBJECT) olat__json_fail(j, light, "an object was expected");
+        else olat__read_light(j, light, origin, i ? frame->more + i - 1 : &frame->light);
     }
 }
 
@@ -2169,7 +2220,7 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
         if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
         olat__lens lens = top;
         olat__read_lens(j, node, &lens);
-        olat__read_light(j, node, out->origin, &frame->light);
+        olat__read_lights(j, node, out->origin, frame);
         olat__read_paths(j, node, folder, flags, &frame->file, &frame->mask);
         frame->camera.width = lens.w ? lens.w : olat__side(lens.centre[0]);
         frame->camera.height = lens.h ? lens.h : olat__side(lens.centre[1]);
@@ -2287,6 +2338,7 @@ OLAT__API void olat_free(olat_dataset *set) {
         free(set->frames[i].file);
         free(set->frames[i].mask);
         free(set->frames[i].pixels);
+        free(set->frames[i].more);
     }
     free(set->frames);
     memset(set, 0, sizeof *set);
@@ -2573,11 +2625,25 @@ static void olat__write_path(olat__writer *w, const char *key, const char *file,
     olat__write(w, ", ");
 }
 
+static void olat__write_light(olat__writer *w, const ssdgs_light *light, const double origin[3]) {
+    const int is_point = light->kind == SSDGS_LIGHT_POINT;
+    double v[3];
+    for (int k = 0; k < 3; k++) v[k] = (double)light->position[k] + (is_point ? origin[k] : 0);
+    olat__write_numbers(w, is_point ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, is_point ? 16 : 9, "], ");
+    if (light->focus > 0) {
+        v[0] = (double)light->focus;
+        olat__write_numbers(w, "\"pl_mu\": ", v, 1, 9, ", ");
+        for (int k = 0; k < 3; k++) v[k] = (double)light->direction[k];
+        olat__write_numbers(w, "\"pl_axis\": [", v, 3, 9, "], ");
+    }
+    for (int k = 0; k < 3; k++) v[k] = (double)light->intensity[k];
+    olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]");
+}
+
 static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3],
                               const char *folder) {
     static const double last_row[4] = {0, 0, 0, 1};
     const ssdgs_camera *camera = &frame->camera;
-    const int is_point = frame->light.kind == SSDGS_LIGHT_POINT;
     olat__write_path(w, "\"file_path\": ", frame->file, folder);
     olat__write_path(w, "\"mask_path\": ", frame->mask, folder);
     double v[4];
@@ -2598,10 +2664,12 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
         olat__write_numbers(w, "", v + 3, 1, 16, "], ");
     }
     olat__write_numbers(w, "[", last_row, 4, 9, "]],\n  ");
-    for (int k = 0; k < 3; k++) v[k] = (double)frame->light.position[k] + (is_point ? origin[k] : 0);
-    olat__write_numbers(w, is_point ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, is_point ? 16 : 9, "], ");
-    for (int k = 0; k < 3; k++) v[k] = (double)frame->light.intensity[k];
-    olat__write_numbers(w, "\"pl_intensity\": [", v, 3, 9, "]}");
+    if (frame->more_count) olat__write(w, "\"pl_lights\": [\n  {");
+    for (int i = 0; i <= frame->more_count; i++) {
+        if (i) olat__write(w, "},\n  {");
+        olat__write_light(w, i ? frame->more + i - 1 : &frame->light, origin);
+    }
+    olat__write(w, frame->more_count ? "}]}" : "}");
 }
 
 /* Writes the frames' cameras and lights as olat_load reads them, image paths relative to folder: refined
@@ -2816,7 +2884,17 @@ OLAT__API ssdgs_photo olat_photo(const olat_frame *frame) {
     photo.light = frame->light;
     photo.pixels = frame->pixels;
     photo.format = frame->format;
+    photo.more = frame->more;
+    photo.more_count = frame->more_count;
     return photo;
+}
+
+/* Its lights in one array, as renders take them: how many. */
+OLAT__API int olat_lights(const ssdgs_photo *photo, ssdgs_light lights[OLAT_MOST_LIGHTS]) {
+    const int more = photo->more_count < OLAT_MOST_LIGHTS ? photo->more_count : OLAT_MOST_LIGHTS - 1;
+    lights[0] = photo->light;
+    for (int i = 0; i < more; i++) lights[1 + i] = photo->more[i];
+    return 1 + more;
 }
 
 /* All frames so: (count), to be freed; NULL if out of memory. */

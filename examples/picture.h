@@ -333,13 +333,15 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
     const float black[3] = {0, 0, 0};
     ssdgs_render_options options = ssdgs_render_options_exact();
     memcpy(options.ambient[0], ssdgs_model_settings(s->models[0])->ambient, sizeof options.ambient[0]);
+    ssdgs_light lights[OLAT_MOST_LIGHTS];
     ssdgs_image image;
     ssdgs_result result = view__room(s, 2 * pixels) ? SSDGS_OK : SSDGS_ERR_MEMORY;
     memset(&image, 0, sizeof image);
     image.color = s->planes;
     image.alpha = s->planes + 3 * pixels;
     if (!result)
-        result = ssdgs_render_ex(s->models[0], &photo->camera, &photo->light, 1, &options, &image, NULL);
+        result = ssdgs_render_ex(s->models[0], &photo->camera, lights, olat_lights(photo, lights), &options,
+                                 &image, NULL);
     *note = 0;
     if (result) {
         view__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));

@@ -326,7 +326,8 @@ static int make_trajectory(job *j) {
     int count = 2 * (150 + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
     ssdgs_camera first = data->frames[0].camera;
-    const ssdgs_light light = data->frames[0].light;
+    ssdgs_light light = data->frames[0].light;
+    light.focus = 0; /* it shines to all sides on its way */
     double axes[3][3];
     find_axes(data, axes);
     orbit camera_orbit;
@@ -423,7 +424,7 @@ static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats
                       : !stats->visible ? "no Gaussian is in the picture: is this the model's dataset?"
                       : !stats->shaded  ? "the Gaussians in the picture are too faint or too small to show"
                       : stats->blackened == stats->shaded ? "the Gaussians' colours are not finite"
-                      : !baked && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0)
+                      : !baked && !frame->more_count && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0)
                           ? "the light's intensity is 0"
                           : "no light reaches what the camera sees: is the light where it should be, and its "
                             "intensity in the model's unit?";
@@ -447,15 +448,16 @@ static ssdgs_result render(job *j, int index, int components) {
         planes.alpha = j->planes.alpha;
     }
     ssdgs_render_stats stats;
-    const ssdgs_result result =
-        ssdgs_render_ex(j->model, &frame->camera, &frame->light, 1, &options, &planes, &stats);
+    ssdgs_light lights[OLAT_MOST_LIGHTS];
+    const ssdgs_photo photo = olat_photo(frame);
+    const ssdgs_result result = ssdgs_render_ex(j->model, &photo.camera, lights, olat_lights(&photo, lights),
+                                                &options, &planes, &stats);
     if (result) return result;
     size_t i;
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
     if (i == 3 * pixels) tell_black(j, frame, &stats);
     ssdgs_compose(planes.color, planes.alpha, pixels, settings->transfer, j->background, j->image);
     if (!frame->has_image) return SSDGS_OK;
-    const ssdgs_photo photo = olat_photo(frame);
     olat_compose(&photo, settings->transfer, j->background, j->photo);
     score *s = j->scores[0] + index;
     s->flip = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);

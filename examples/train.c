@@ -51,7 +51,7 @@ static const char *const option_names[OPTION_COUNT] = {
 
 static const char *const help[] = {
     "usage: train DATASET -o MODEL.ply [OPTION...]",
-    "Trains a relightable model on a folder of photographs, each under one known light, and tests it on",
+    "Trains a relightable model on a folder of photographs, each under known light, and tests it on",
     "transforms_test.json where the folder has one. examples/olat.h says what a folder holds.",
     "",
     "  -o MODEL.ply             the model",

@@ -192,6 +192,12 @@ check "fitted gains: $(fitted) over $(psnr "$out/fitted")" awk -v a="$(fitted)" 
 check "each view" test "$(grep -c '"file"' "$out/fitted/metrics.json")" -eq 8
 check "without it there is none" says 0 "4 images" relight --out "$out/fixed"
 check "only fixed ones" test -z "$(grep fitted "$out/fixed/metrics.json")"
+# two lights of 30 and 70 in one place are one of 100
+mkdir -p "$out/lamps"
+cp -r "$set/test" "$out/lamps"
+tr -d '\n' <"$set/transforms_test.json" | sed 's/"pl_intensity": *\[ *100.0, *100.0, *100.0 *\], *"pl_pos": *\(\[[^]]*\]\)/"pl_lights": [{"pl_intensity": 30, "pl_pos": \1}, {"pl_intensity": 70, "pl_pos": \1}]/g' >"$out/lamps/transforms_test.json"
+check "two lamps" says 0 "4 images" "$build/relight" "$model" "$out/lamps" --out "$out/lit" --threads 1
+check "look like one" near "$(psnr "$out/lit")" "$(psnr "$out/fixed")" 0.02
 
 # splats for viewers: as near to the model without its highlights as colours of a byte allow, and nothing of the user's replaced
 export_of() { "$build/export" "$@"; }

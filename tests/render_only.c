@@ -9,7 +9,7 @@ int main(void) {
     static ssdgs_real color[SIDE * SIDE * 3], depth[SIDE * SIDE], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0},
                                                                   up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
-    ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0};
+    ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0, 0};
     ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_settings settings[2];
     uint64_t hash = 1;

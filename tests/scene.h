@@ -85,8 +85,13 @@ static inline ssdgs_camera camera_from(double x, double y, double z) {
 }
 
 static inline ssdgs_light point_light(double x, double y, double z) {
-    ssdgs_light light = {
-        SSDGS_LIGHT_POINT, {(ssdgs_real)x, (ssdgs_real)y, (ssdgs_real)z}, {9, 8, 7}, {0, 0, 0}, {0, 0}, 0, 0};
+    const double position[3] = {x, y, z};
+    ssdgs_light light;
+    memset(&light, 0, sizeof light);
+    for (int c = 0; c < 3; c++) {
+        light.position[c] = (ssdgs_real)position[c];
+        light.intensity[c] = (ssdgs_real)(9 - c);
+    }
     return light;
 }
 

@@ -206,7 +206,7 @@ static void run(const scene *s) {
     }
     {
         tally t = {0, 0, 0, 0};
-        for (int c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_POINT && !s->settings.transport; c++)
+        for (int c = 0; c < 3 && lights[0].kind != SSDGS_LIGHT_DIRECTIONAL && !s->settings.transport; c++)
             compare(s, model, &camera, lights, &fixed, lights[0].position + c, light_gradient[c], &t);
         for (int c = 0; c < 3 && lights[0].kind == SSDGS_LIGHT_DIRECTIONAL; c++) { /* stays a unit vector */
             double move[10] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, side[4];
@@ -629,6 +629,24 @@ int main(void) {
         if (i == 2) s.options.terms = SSDGS_SCATTERING_TERM;
         const double direction[3] = {0.48, -0.8, 0.36};
         memcpy(s.lights[0].position, direction, sizeof direction);
+        run(&s);
+    }
+    for (int i = 0; i < 4; i++) { /* the last two leave some Gaussians dark */
+        static const char *const names[4] = {"LED", "spot with a range, geometric ASG",
+                                             "narrow LED, two lights", "LED amid them, scattering alone"};
+        s = base, s.name = names[i];
+        s.lights[0].direction[0] = -0.48, s.lights[0].direction[1] = 0.6, s.lights[0].direction[2] = -0.64;
+        s.lights[0].focus = i == 2 ? 40 : 1.5;
+        if (i == 1) {
+            s.settings.asg = SSDGS_ASG_GEOMETRIC;
+            s.lights[0].kind = SSDGS_LIGHT_SPOT, s.lights[0].cone[0] = 0.02, s.lights[0].cone[1] = 0.6;
+            s.lights[0].range = 2.5, s.lights[0].focus = 0;
+        }
+        if (i == 2) s.light_count = 2;
+        if (i == 3) {
+            s.options.terms = SSDGS_SCATTERING_TERM;
+            s.lights[0].position[0] = 0.5, s.lights[0].position[1] = -0.4, s.lights[0].position[2] = 0.2;
+        }
         run(&s);
     }
     for (int i = 0; i < 4; i++) {

@@ -74,6 +74,56 @@ static void test_unshadowed(ssdgs_model *model) {
     }
 }
 
+/* An LED is a point light that fades as cos^focus: of a Gaussian alone that factor, behind it nothing. A spot
+   may have a focus within its cone; turned and mirrored worlds look the same. */
+static void test_focus(ssdgs_model *single, const ssdgs_camera *camera) {
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_light light = point_light(0, -2, 2);
+    double even[3], lit[3], want[3];
+    alone(single, camera, &light, 1, &options, shot);
+    middle_of(shot, 0, even);
+    for (int i = 0; i < 6; i++) {
+        static const double off[6] = {0, 0.3, 0.9, 1.5, 1.6, 0.3}; /* radians from the Gaussian */
+        static const double focus[6] = {2, 2, 0.7, 1, 1, 0};
+        light.kind = i == 1 ? SSDGS_LIGHT_SPOT : SSDGS_LIGHT_POINT;
+        light.cone[0] = 1, light.cone[1] = 2;
+        light.focus = (ssdgs_real)focus[i];
+        light.direction[0] = (ssdgs_real)sin(off[i]);
+        light.direction[1] = (ssdgs_real)(cos(off[i]) * sqrt(0.5));
+        light.direction[2] = -light.direction[1];
+        alone(single, camera, &light, 1, &options, shot + 1);
+        middle_of(shot + 1, 0, lit);
+        for (int c = 0; c < 3; c++) want[c] = even[c] * pow(fmax(cos(off[i]), 0), focus[i]);
+        CHECK_NEAR(lit, want, 3, 1e-6, exactly(1e-5), "an LED's focus");
+    }
+    light.focus = 3;
+    alone(single, camera, &light, 1, &options, shot);
+    middle_of(shot, 0, want);
+    const ssdgs_object object = placed(single, 0.7, 1, 1, 0.3, -0.2, 0.1);
+    ssdgs_camera seen = *camera;
+    ssdgs_light there = light;
+    to_world(&object, light.position, 0, there.position);
+    to_world(&object, light.direction, 1, there.direction);
+    for (int i = 0; i < 3; i++) { /* view x = seen (to_world x) */
+        ssdgs_real *row = seen.view + 4 * i;
+        row[3] = camera->view[4 * i + 3];
+        to_world(&object, camera->view + 4 * i, 1, row);
+        for (int c = 0; c < 3; c++) row[3] -= row[c] * object.to_world[4 * c + 3];
+    }
+    together(&object, 1, &seen, &there, 1, &options, shot + 1);
+    middle_of(shot + 1, 0, lit);
+    CHECK_NEAR(lit, want, 3, 0, exactly(1e-4), "an LED in a world that is turned");
+    for (int i = 0; i < 4; i++) {
+        static const char *const words[4] = {"focus = -1", "focus = 1001", "focus = NaN", "unit vector"};
+        ssdgs_image image = {0, shot[1].value, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+        light.focus = i == 0 ? -1 : i == 1 ? 1001 : i == 2 ? (ssdgs_real)NAN : 1;
+        if (i == 3) light.direction[0] += 1;
+        CHECK(ssdgs_render_ex(single, camera, &light, 1, &options, &image, NULL) == SSDGS_ERR_ARGUMENT);
+        if (!CHECK(strstr(ssdgs_error_message(context), words[i]) != NULL))
+            printf("    %s\n", ssdgs_error_message(context));
+    }
+}
+
 static void test_range(ssdgs_model *model) {
     static const double at[3] = {0, 0, 0}, up[3] = {0, -0.6, 0.8};
     const ssdgs_settings settings = small_settings();
@@ -112,6 +162,7 @@ static void test_range(ssdgs_model *model) {
     together(&object, 1, &doubled, &far_light, 1, &options, shot + 1);
     middle_of(shot + 1, 0, faded);
     CHECK_NEAR(faded, free, 3, 0, exactly(1e-4), "the range of a large world");
+    test_focus(single, &camera);
     ssdgs_model_destroy(single);
     /* blocks that no light reaches are left out, but where S is asked for */
     light = point_light(0.8, -0.8, 0.8);

@@ -888,6 +888,67 @@ static int near_all(const ssdgs_real *got, const double *want, int count) {
     return good;
 }
 
+/* Several lights of a photograph, and LEDs, as told; a file that was written from them tells the same. */
+static void test_lights(void) {
+    static const char text[] = TOP
+        "{" FILE_A POSE
+        ",\"pl_lights\":[{\"pl_pos\":[1000001,1000002,3],\"pl_mu\":1.5,\"pl_axis\":[0,0.6,-0.8]},"
+        "{\"pl_dir\":[0,0.6,0.8],\"pl_intensity\":[2,3,4]},{\"pl_pos\":[1000004,1000005,6],\"pl_mu\":0}]},"
+        "{" FILE_A "\"transform_matrix\":[[1,0,0,1000000],[0,1,0,1000000],[0,0,1,4]],"
+        "\"pl_pos\":[1000001,1000002,3],\"pl_mu\":2,\"pl_axis\":[1,0,0]}]}";
+    static const double at[2][3] = {{1, 2, 3}, {4, 5, 6}}, axis[2][3] = {{0, 0.6, -0.8}, {1, 0, 0}},
+                        sun[3] = {0, 0.6, 0.8}, rgb[3] = {2, 3, 4}, one[3] = {1, 1, 1},
+                        middle[3] = {1e6, 1e6, 0};
+    for (int saved = 0; saved < 2; saved++) {
+        if (saved ? !CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))
+                  : !CHECK((write_text(FOLDER "/lights.json", text), 1)))
+            return;
+        olat_free(&set);
+        if (!CHECK(
+                !olat_load_at(FOLDER, saved ? "saved.json" : "lights.json", 0, middle, NULL, &set, error))) {
+            printf("    %s\n", error);
+            return;
+        }
+        const olat_frame *f = set.frames;
+        CHECK(set.count == 2 && f[0].more_count == 2 && f[1].more_count == 0 && !f[1].more);
+        CHECK(near_all(f[0].light.position, at[0], 3) && f[0].light.kind == SSDGS_LIGHT_POINT &&
+              near_all(f[0].light.direction, axis[0], 3) && near_all(f[0].light.intensity, one, 3) &&
+              fabs((double)f[0].light.focus - 1.5) < 1e-6);
+        CHECK(near_all(f[0].more[0].position, sun, 3) && near_all(f[0].more[0].intensity, rgb, 3) &&
+              f[0].more[0].kind == SSDGS_LIGHT_DIRECTIONAL && f[0].more[0].focus <= 0);
+        CHECK(near_all(f[0].more[1].position, at[1], 3) && f[0].more[1].kind == SSDGS_LIGHT_POINT &&
+              f[0].more[1].focus <= 0);
+        CHECK(near_all(f[1].light.position, at[0], 3) && near_all(f[1].light.direction, axis[1], 3) &&
+              fabs((double)f[1].light.focus - 2) < 1e-6);
+        ssdgs_light lights[OLAT_MOST_LIGHTS];
+        ssdgs_photo photo = olat_photo(f);
+        CHECK(olat_lights(&photo, lights) == 3 && near_all(lights[1].position, sun, 3) &&
+              near_all(lights[2].position, at[1], 3) && near_all(lights[0].position, at[0], 3));
+        photo.more_count = 1000; /* no more than there is room for */
+        photo.more = lights;
+        ssdgs_light few[OLAT_MOST_LIGHTS];
+        CHECK(olat_lights(&photo, few) == OLAT_MOST_LIGHTS);
+    }
+    olat_free(&set);
+    for (int i = 0; i < 2; i++) { /* 64, and one more */
+        char list[8192], *to = list;
+        to += sprintf(to, TOP "{" FILE_A POSE ",\"pl_lights\":[");
+        for (int l = 0; l < OLAT_MOST_LIGHTS + i; l++)
+            to += sprintf(to, "%s{\"pl_pos\":[1,2,%d]}", l ? "," : "", l);
+        sprintf(to, "]}]}");
+        if (i) CHECK(load_fails(list, 0, "pl_lights: a list of 1 to 64 lights"));
+        else CHECK(loads(list, 0) && set.frames->more_count == 63 && set.frames->more[62].position[2] == 63);
+        olat_free(&set);
+    }
+    /* where all is far away an origin is found, by every light too */
+    CHECK(loads(TOP "{" FILE_A "\"transform_matrix\":[[1,0,0,1000000],[0,1,0,1000000],[0,0,1,4]],"
+                    "\"pl_lights\":[{\"pl_pos\":[1000000,1000010,0]},{\"pl_pos\":[1000010,1000000,0]}]}]}",
+                0));
+    CHECK(fabs(set.origin[0] - 1000003.33) < 1 && fabs(set.origin[1] - 1000003.33) < 1);
+    olat_free(&set);
+    CHECK(live == 0);
+}
+
 static void test_datasets(void) {
     static const double view[12] = {1, 0, 0, -0.5, 0, -1, 0, 0, 0, 0, -1, 4}, light[3] = {1, 2, 3},
                         rgb[3] = {2, 3, 4}, one[3] = {7, 7, 7};
@@ -932,6 +993,17 @@ static void test_datasets(void) {
         {TOP "{" FILE_A "\"pl_pos\":[1,NaN,3]," POSE "}]}", "frames[0].pl_pos[1]: NaN"},
         {TOP "{" FILE_A LIGHT "\"pl_intensity\":[1,2]," POSE "}]}", "pl_intensity: 3 numbers"},
         {TOP "{" FILE_A LIGHT "\"pl_intensity\":-1," POSE "}]}", "negative"},
+        {TOP "{" FILE_A LIGHT "\"pl_mu\":2," POSE "}]}", "pl_mu needs pl_axis, a unit vector"},
+        {TOP "{" FILE_A LIGHT "\"pl_mu\":2,\"pl_axis\":[0,2,0]," POSE "}]}", "pl_axis, a unit vector"},
+        {TOP "{" FILE_A LIGHT "\"pl_mu\":-1,\"pl_axis\":[0,1,0]," POSE "}]}", "pl_mu is not in 0 .. 1000"},
+        {TOP "{" FILE_A LIGHT "\"pl_mu\":1001,\"pl_axis\":[0,1,0]," POSE "}]}", "pl_mu is not in"},
+        {TOP "{" FILE_A "\"pl_dir\":[0,1,0],\"pl_mu\":1,\"pl_axis\":[0,1,0]," POSE "}]}", "goes with pl_pos"},
+        {TOP "{" FILE_A "\"pl_lights\":[]," POSE "}]}", "pl_lights: a list of 1 to 64 lights"},
+        {TOP "{" FILE_A "\"pl_lights\":7," POSE "}]}", "pl_lights: a list of 1 to 64 lights"},
+        {TOP "{" FILE_A "\"pl_lights\":[7]," POSE "}]}", "pl_lights[0]: an object"},
+        {TOP "{" FILE_A "\"pl_lights\":[{\"pl_pos\":[1,2,3]},{\"pl_dir\":[1,2,3]}]," POSE "}]}",
+         "pl_lights[1]: pl_dir is not a unit vector"},
+        {TOP "{" FILE_A "\"pl_lights\":[{\"pl_pos\":[1,2,3]},{}]," POSE "}]}", "pl_pos or pl_dir is missing"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[1,2,3]}]}", "3 x 4"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":[]}]}", "3 x 4"},
         {TOP "{" FILE_A LIGHT "\"transform_matrix\":7}]}", "3 x 4"},
@@ -1026,6 +1098,7 @@ static void test_datasets(void) {
     CHECK(loads(TOP "{\"file_path\":\"../t_olat_files/a\"," LIGHT POSE "}]}", OLAT_ALLOW_PARENT));
     olat_free(&set);
     CHECK(live == 0);
+    test_lights();
 
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(load_fails(bad[i][0], 0, bad[i][1]));
     for (size_t i = 0; i < sizeof bad_paths / sizeof *bad_paths; i++) {

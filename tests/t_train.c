@@ -955,20 +955,14 @@ static void test_refinement(void) {
     ssdgs_context_destroy(context);
 }
 
-/* Ambient light that photographs have, and a model that stays, is found; they are then as the model is, and
-   renders are without it unless they ask. */
-static void test_ambient(void) {
-    enum { MANY = 300 };
-    static const ssdgs_real ambient[3] = {6, 2, 10}, black[3] = {0, 0, 0};
-    static ssdgs_real image[SIDE * SIDE * 3], bare[SIDE * SIDE * 3];
-    static float pictures[PHOTOS][SIDE * SIDE * 4];
+/* Gaussians of random places, colours and normals, of linear light. */
+static ssdgs_model *linear_cloud(ssdgs_context *context, int count) {
     ssdgs_settings settings = ssdgs_settings_default();
-    ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     settings.transfer = SSDGS_TRANSFER_NONE;
     settings.light_scale = (ssdgs_real)0.05;
-    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, MANY, &model));
-    for (int i = 0; i < MANY; i++)
+    CHECK(!ssdgs_model_create(context, &settings, count, &model));
+    for (int i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
             ssdgs_real *g = model->gaussians + (size_t)c * model->capacity + i;
             const uint64_t at = (uint64_t)(3 * i + c);
@@ -977,6 +971,19 @@ static void test_ambient(void) {
             g[SSDGS_DIFFUSE * model->capacity] = (ssdgs_real)(3 * ssdgs__uniform(7, at));
             g[SSDGS_FRAME * model->capacity] = (ssdgs_real)(2 * ssdgs__uniform(8, at) - 1);
         }
+    return model;
+}
+
+/* Ambient light that photographs have, and a model that stays, is found; they are then as the model is, and
+   renders are without it unless they ask. */
+static void test_ambient(void) {
+    enum { MANY = 300 };
+    static const ssdgs_real ambient[3] = {6, 2, 10}, black[3] = {0, 0, 0};
+    static ssdgs_real image[SIDE * SIDE * 3], bare[SIDE * SIDE * 3];
+    static float pictures[PHOTOS][SIDE * SIDE * 4];
+    ssdgs_context *context = NULL;
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) return;
+    ssdgs_model *model = linear_cloud(context, MANY);
     ssdgs_photo shots[PHOTOS];
     for (int p = 0; p < PHOTOS; p++) {
         ssdgs_metrics metrics;
@@ -1020,7 +1027,7 @@ static void test_ambient(void) {
         CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         for (int c = 0; c < 3; c++) /* Adam's first step is the rate, of light of E = 1 */
-            CHECK(fabs((double)(model->settings.ambient[c] * settings.light_scale) /
+            CHECK(fabs((double)(model->settings.ambient[c] * model->settings.light_scale) /
                            (SSDGS__AMBIENT_RATE * sqrt((double)batch)) -
                        1) < 1e-3);
         CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
@@ -1052,6 +1059,135 @@ static void test_ambient(void) {
             printf("    from %g to %g dB\n", metrics[0].psnr, metrics[1].psnr);
         ssdgs_trainer_destroy(trainer);
     }
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Photographs of several lights, one of them an LED, are rendered and learnt from with all of them, which
+   stay as they are told. */
+static void test_more_lights(void) {
+    enum { MANY = 40 };
+    static ssdgs_real image[SIDE * SIDE * 3], bare[SIDE * SIDE * 3];
+    static float pictures[PHOTOS][SIDE * SIDE * 4];
+    const char *const path = "build/t_train_more.ckpt";
+    static const ssdgs_real black[3] = {0, 0, 0};
+    ssdgs_context *context = NULL;
+    if (!CHECK(!ssdgs_context_create(NULL, &context))) return;
+    ssdgs_model *model = linear_cloud(context, MANY), *fresh = NULL;
+    ssdgs_light more[2] = {photos[3].light, photos[1].light};
+    for (int c = 0; c < 3; c++) more[1].direction[c] = (ssdgs_real)(c == 1 ? -1 : 0);
+    more[1].focus = 2;
+    more[1].intensity[1] = 10;
+    for (int c = 0; c < 3; c++) more[1].position[c] = (ssdgs_real)(c == 1 ? 3 : 0.4 * c);
+    ssdgs_photo shots[PHOTOS];
+    for (int p = 0; p < PHOTOS; p++) {
+        ssdgs_metrics metrics, less;
+        const ssdgs_light lights[3] = {photos[p].light, more[0], more[1]};
+        ssdgs_render_options options = ssdgs_render_options_exact();
+        ssdgs_image out;
+        memset(&out, 0, sizeof out);
+        out.color = bare;
+        CHECK(!ssdgs_render_ex(model, &photos[p].camera, lights, 3, &options, &out, NULL));
+        shots[p] = photos[p];
+        shots[p].pixels = pictures[p];
+        shots[p].format = SSDGS_PIXELS_RGBA32F;
+        shots[p].more = more;
+        shots[p].more_count = 2;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            for (int c = 0; c < 3; c++) pictures[p][4 * i + c] = (float)bare[3 * i + c];
+            pictures[p][4 * i + 3] = 1;
+        }
+        CHECK(!ssdgs_evaluate(model, shots + p, black, image, &metrics) && metrics.psnr > 99);
+        shots[p].more_count = 1;
+        CHECK(!ssdgs_evaluate(model, shots + p, black, NULL, &less) && less.psnr < 60);
+        shots[p].more_count = 2;
+    }
+    for (int way = 0; way < 2; way++) { /* nothing is left to learn; cameras that are off are found */
+        ssdgs_train_options options = short_run(way ? 60 : 4);
+        ssdgs_trainer *trainer = NULL, *other = NULL;
+        ssdgs_train_stats stats;
+        options.schedule = SSDGS_SCHEDULE_JOINT;
+        options.random_background = options.densify_until = 0;
+        options.dssim = options.normal_weight = 0;
+        if (!way) memset(&options.rates, 0, sizeof options.rates);
+        options.refine = way ? SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY : 0;
+        options.rates.position.start = options.rates.position.end = 0;
+        CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
+        CHECK(!ssdgs_trainer_step(trainer, &stats));
+        if (!way) CHECK(stats.loss < 1e-6);
+        CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+        for (int p = 0; p < PHOTOS && way; p++) {
+            ssdgs_camera camera;
+            ssdgs_light light;
+            CHECK(!ssdgs_trainer_refined(trainer, p, &camera, &light));
+            CHECK(!memcmp(light.position, shots[p].light.position, sizeof light.position) &&
+                  !memcmp(light.intensity, shots[p].light.intensity, sizeof light.intensity));
+            CHECK(memcmp(camera.view, shots[p].camera.view, sizeof camera.view) != 0);
+        }
+        /* a checkpoint knows all lights */
+        CHECK(!ssdgs_trainer_save(trainer, path));
+        ssdgs_trainer_destroy(trainer);
+        for (int i = 0; i < 4; i++) {
+            const ssdgs_light told = more[1];
+            if (i == 1) more[1].focus = 3;
+            if (i == 2) more[1].direction[0] += (ssdgs_real)1e-3;
+            if (i == 3) shots[5].more_count = 1;
+            CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &other));
+            CHECK(ssdgs_trainer_load(other, path) == (i ? SSDGS_ERR_FORMAT : SSDGS_OK));
+            ssdgs_trainer_destroy(other);
+            more[1] = told;
+            shots[5].more_count = 2;
+        }
+    }
+    CHECK(!remove(path));
+    ssdgs_photo moved = shots[1];
+    ssdgs_metrics metrics[2];
+    moved.camera.view[3] += (ssdgs_real)0.02;
+    CHECK(!ssdgs_evaluate(model, &moved, black, NULL, metrics));
+    CHECK(!ssdgs_refine_photo(model, &moved, black, 60));
+    CHECK(!ssdgs_evaluate(model, &moved, black, NULL, metrics + 1));
+    if (!CHECK(metrics[1].psnr > metrics[0].psnr + 10))
+        printf("    from %g to %g dB\n", metrics[0].psnr, metrics[1].psnr);
+    CHECK(!memcmp(moved.light.position, shots[1].light.position, sizeof moved.light.position) &&
+          !memcmp(moved.light.intensity, shots[1].light.intensity, sizeof moved.light.intensity));
+    { /* light_scale makes the lights' E together 1 at the centre; one lit from one place may have others */
+        ssdgs_train_options options = short_run(4);
+        ssdgs_trainer *trainer = NULL;
+        double mean = 0;
+        for (int p = 0; p < PHOTOS; p++) {
+            double e = 0;
+            for (int l = 0; l < 3; l++) {
+                const ssdgs_light *light = l ? more + l - 1 : &shots[p].light;
+                double distance2 = 0, intensity = 0;
+                for (int c = 0; c < 3; c++) {
+                    distance2 += (double)(light->position[c] * light->position[c]);
+                    intensity += (double)light->intensity[c] / 3;
+                }
+                const double cosine = l == 2 ? (double)light->position[1] / sqrt(distance2) : 1;
+                e += intensity * cosine * cosine / distance2;
+            }
+            mean += log(e) / PHOTOS;
+        }
+        CHECK(!ssdgs_model_create(context, ssdgs_model_settings(model), 0, &fresh));
+        CHECK(!ssdgs_trainer_create(fresh, shots, PHOTOS, &options, &trainer));
+        CHECK(fabs((double)fresh->settings.light_scale * exp(mean) - 1) < 1e-4);
+        CHECK(!trainer->one_light);
+        ssdgs_trainer_destroy(trainer);
+        for (int i = 0; i < 4; i++) {
+            static const char *const words[4] = {"-1 lights", "1 lights, but the array is NULL",
+                                                 "have shadows", "direction is not a unit vector"};
+            const ssdgs_light told = more[1];
+            if (i == 0) shots[5].more_count = -1;
+            if (i == 1) shots[5].more_count = 1, shots[5].more = NULL;
+            if (i == 2) more[1].unshadowed = 1;
+            if (i == 3) more[1].direction[1] = 2;
+            CHECK(ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) == SSDGS_ERR_ARGUMENT);
+            CHECK(strstr(ssdgs_error_message(context), words[i]) != NULL);
+            shots[5] = shots[4];
+            more[1] = told;
+        }
+    }
+    ssdgs_model_destroy(fresh);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
@@ -1512,7 +1648,7 @@ static const char *const note_words[NOTES + 1] = {"no random point is inside",
                                                   "taken from one place",
                                                   "in no one place",
                                                   "behind the cameras",
-                                                  "photographs of 6 have a light of intensity 0",
+                                                  "photographs of 6 have no light",
                                                   "photographs of 6 are wholly transparent",
                                                   "are transparent where the others show",
                                                   "taken for empty",
@@ -2502,6 +2638,7 @@ int main(void) {
     test_learning();
     test_refinement();
     test_ambient();
+    test_more_lights();
     test_one_light();
     test_anchor();
     test_schedule();

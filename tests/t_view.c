@@ -342,8 +342,11 @@ static void test_photographs(void) {
     ssdgs_render_options options =
         ssdgs_render_options_exact(); /* with the room's light, as photographs are */
     for (int c = 0; c < 3; c++) options.ambient[0][c] = 0.2f * (float)(c + 1);
-    CHECK(!ssdgs_render_ex(here.show.models[0], &photos[0].camera, &photos[0].light, 1, &options, &image,
-                           NULL));
+    ssdgs_light lights[2] = {photos[0].light, photos[0].light};
+    lights[1].position[0] = 3, lights[1].intensity[1] = 2;
+    for (int number = 0; number < 2; number++)
+        photos[number].more = lights + 1, photos[number].more_count = 1;
+    CHECK(!ssdgs_render_ex(here.show.models[0], &photos[0].camera, lights, 2, &options, &image, NULL));
     ssdgs_compose(color, alpha, PIXELS, ssdgs_model_settings(here.show.models[0])->transfer, black, color);
     for (int number = 0; number < 2; number++) {
         size_t size = 0;
