@@ -813,15 +813,61 @@ SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model);
 SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
 
 /* ==== stages of a frame, seen with SSDGS_STAGES: for GPUs and engines that run some of their own ====
-   ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A hook reads and writes the
-   ssdgs_frame. A result other than SSDGS_OK ends the frame. With any hook set no frame uses results of the
-   last. What a stage writes in ssdgs_splat_view has no memory before it: a hook points the members at its
-   own, valid until the library's call returns; PROJECT also sets tiles_x and tiles_y. All else has memory.
+
+   ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A stage reads and writes the
+   ssdgs_frame as its members say. examples/gpu_gl.c replaces all that a rendering takes.
+
+   What a stage writes in ssdgs_splat_view has no memory before it: a hook points the members at its own. All
+   else has memory. A hook need not write there what it keeps on a device: before the CPU reads what hooks may
+   have left it calls fetch. frame.memory says whose frame it is, a model's or a scene's; models have
+   revisions; `released` hears when one of either is gone.
+
+   The stages up to WALK run for the views of frame.batch, then perhaps for more views. A view that is
+   `cached` is the last frame's of that memory. So is what these stages found for it, in `seen` and the
+   light's rows too, and they leave it as it is. So what a hook has left for a view stays until that stage
+   works on the view again, or the memory is released.
+
+   A result other than SSDGS_OK ends the frame, of which nothing is kept; ssdgs_stage_fail() says why.
+
    Where layer_count is not 0, light is deferred: WALK fills the light maps, SHADE the layers, and COMPOSITE
-   adds the diffuse and specular terms of what they blend to. In training SHADE and SHADE_BACKWARD are
-   replaced together or not at all: the CPU keeps activations in between. An image's components are the CPU's
-   work. It reads layer_pixels and pixel_shadow or, where layer_count is 0, view 0's record, depth, order,
-   tile_start, tile_list and tile_seen, which must be in host memory then. */
+   adds the diffuse and specular terms of what they blend to. An image's components are the CPU's work. It
+   reads layer_pixels and pixel_shadow or, where layer_count is 0, view 0's record, depth, order, tile_start,
+   tile_list and tile_seen. In training SHADE and SHADE_BACKWARD are replaced together or not at all: the CPU
+   keeps activations in between.
+
+   What the CPU's stages agree on, as stages beside them must:
+
+   PROJECT  Raw scales and opacities are clamped to +-20. A Gaussian is drawn where its opacity reaches
+   options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant is above 0 and
+   its box reaches a pixel's centre; in perspective not where |x| or |y| > 1.5 z and its deviation along z is
+   a fifth of z. What is not finite is not drawn.
+
+   SORT  By the depth's bits as whole numbers, ties by index.
+
+   BIN  Tile t is column t % tiles_x of row t / tiles_x. Bit b of a mask is the 4x4 pixels of column b % 4,
+   row b / 4 of the tile. A mask may have bits too many, never too few. A Gaussian's instances are in the
+   order of tiles.
+
+   WALK, COMPOSITE  p = xx dx^2 + xy dx dy + yy dy^2 + log2_opacity, at most log2_opacity; alpha = 2^p, at
+   most 0.999, and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry
+   to entry. Below options.stop nothing more is blended; with scene_depth only what is nearer.
+
+   WALK of the camera  A pixel passes over weights alpha T up to max_error / 32 while all that it passes over
+   sum to no more than max_error. What a pixel blends otherwise is SSDGS_SEEN, the rest SSDGS_SKIPPED.
+
+   WALK of a light  v is the mean of T, weighted by 2^p where that reaches alpha_threshold, over a Gaussian's
+   pixels in all views of the light; T has everything nearer than its own depth - bias[0]. depth_cue is the
+   same mean of the sum of alpha T x (its depth - theirs) over those. Without weights v is 1, depth_cue 0.
+   flux sums solid angle x alpha T, where T has all that is ahead in the list. What lies behind 4x4 pixels
+   that are all darker than options.stop may be left out.
+
+   Light maps  The distance of a place from the light, less bias[1], a millionth of itself, and `nearest`,
+   asks four pixels, whose answers have bilinear weights. One pixel's answer is 1 ahead of its first fall and
+   `behind` after its last. Between two it is what the first one left up to bias[1] ahead of the second, and
+   from there goes in a straight line to what there was before the second.
+
+   SHADE  What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was
+   shaded before them or, without one, after. A Gaussian whose colour is not finite is black. */
 
 typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0, /* Gaussians -> records and depths of every view */
@@ -841,6 +887,13 @@ struct ssdgs_frame;
 typedef struct ssdgs_gpu_hook {
     ssdgs_result (*stage[SSDGS_STAGE_COUNT])(void *user, struct ssdgs_frame *frame);
     void *user;
+    /* Brings to host memory what the CPU is about to read: what `stage` reads of earlier ones; with
+       SSDGS_STAGE_COUNT what frame.last, the last of a run, has left. That is, after COMPOSITE, what
+       frame.image and frame.statistics ask for; without an image, and after other stages, all. NULL: it is
+       there. */
+    ssdgs_result (*fetch)(void *user, struct ssdgs_frame *frame, ssdgs_stage stage);
+    /* A model, or the memory of some frames (frame.memory), is gone. NULL: nobody listens. */
+    void (*released)(void *user, const void *gone);
 } ssdgs_gpu_hook;
 
 #define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, camera depth */
@@ -886,7 +939,7 @@ typedef struct ssdgs_splat_view {
     int orthographic;
     ssdgs_real distance; /* of a point light seen as a parallel one, else 1 */
     int by_distance;     /* order by distance, not by depth */
-    int cached;          /* 1: everything up to SSDGS_STAGE_WALK is the last frame's; never so with hooks */
+    int cached;          /* 1: everything up to SSDGS_STAGE_WALK is the last frame's */
     int compensate;      /* opacity compensated for the blur */
     int blur;            /* ssdgs_blur */
     ssdgs_real variance; /* px^2, of the blur */
@@ -960,7 +1013,12 @@ typedef struct ssdgs_frame {
     int frozen[2];         /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
     int view_count;
-    int batch[2]; /* views at work in the CPU's stages up to WALK: from, to before; all, with hooks */
+    int batch[2];               /* views at work in the stages up to WALK: from, to before */
+    ssdgs_stage last;           /* of those that run now */
+    const ssdgs_image *image;   /* what is asked for; NULL: planes of the frame */
+    int statistics;             /* 1: asked for, of seen, color and views[0] */
+    const unsigned char *reach; /* (1 + lights, objects) 0: out of reach of the camera, of a light: what
+                                   stages find of its Gaussians there is not read; NULL: all are within */
     /* SSDGS_STAGE_WALK */
     size_t light_instances; /* of all lights' views that were walked */
     unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
@@ -1010,8 +1068,10 @@ typedef struct ssdgs_frame {
     struct ssdgs__scratch *scratch;
 } ssdgs_frame;
 
-/* Runs the CPU's version of a stage: what a hook calls for stages that it does not replace. */
+/* Runs the CPU's version of a stage: what a hook calls where it cannot. */
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
+/* Makes `message` that of the context, and returns `result`, for a hook to return. */
+SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result, const char *message);
 
 #ifdef __cplusplus
 }
@@ -2547,9 +2607,15 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
     }
 }
 
+/* Tells a hook to let go of what it has kept for a model or some frames. */
+static void ssdgs__gone(ssdgs_context *context, const void *what) {
+    if (context->gpu.released) context->gpu.released(context->gpu.user, what);
+}
+
 static void ssdgs__model_drop(ssdgs_model *model) {
     if (!model || --model->references) return;
     ssdgs_context *context = model->context;
+    ssdgs__gone(context, model);
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
     ssdgs__frame_memory_destroy(context, model->frame);
@@ -3036,6 +3102,7 @@ static void ssdgs__scratch_destroy(ssdgs_context *context, ssdgs__scratch *scrat
 
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
     if (!m) return;
+    ssdgs__gone(context, m);
     for (int v = 0; v < m->view_room; v++)
         ssdgs__buffers_release(context, (ssdgs__view_memory *)m->view_memory.memory + v,
                                offsetof(ssdgs__view_memory, chunk_room));
@@ -3063,6 +3130,7 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
         return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: a trainer has the model");
     if (memcmp(&from->allocator, &to->allocator, sizeof from->allocator) != 0)
         return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: the contexts' allocators differ");
+    ssdgs__gone(from, model);
     ssdgs__frame_memory_destroy(from, model->frame);
     model->frame = NULL;
     model->context = to;
@@ -3535,9 +3603,8 @@ static int ssdgs__limited(const ssdgs_light *light) {
 
 /* Whether a light, or with -1 the camera, sees an object: rows (objects) of the camera and the lights. Of one
    object alone nobody asks. */
-static unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
-    if (frame->object_count < 2) return NULL;
-    return (unsigned char *)frame->memory->reach.memory + (ptrdiff_t)(light + 1) * frame->object_count;
+static const unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
+    return frame->reach ? frame->reach + (ptrdiff_t)(light + 1) * frame->object_count : NULL;
 }
 
 /* Whether an object is out of the reach of a light, or with -1 the camera: nothing is known of it or asked.
@@ -3781,22 +3848,15 @@ static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
     return (ssdgs__cached_light *)frame->memory->cached_lights.memory;
 }
 
-/* Whether an engine runs a stage of its own: then nothing is left out or kept for it. */
-static int ssdgs__hooked(const ssdgs_frame *frame) {
-    for (int i = 0; i < SSDGS_STAGE_COUNT; i++)
-        if (frame->context->gpu.stage[i]) return 1;
-    return 0;
-}
-
 /* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
-   time, and what hooks leave is theirs. same: the objects are those of the last frame. stirred: for the
+   time. same: the objects are those of the last frame. stirred: for the
    camera and each light, whether one that moved is or was in its reach. */
 static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned char *stirred) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
     ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
     const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
-    int known = !frame->training && same && !ssdgs__hooked(frame);
+    int known = !frame->training && same;
     cache->objects = frame->training ? -1 : frame->object_count;
     known =
         known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
@@ -4213,14 +4273,14 @@ static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
    for the camera and each light, whether one that has moved is or was among them. */
 static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int same, unsigned char **stirred) {
     ssdgs_context *context = frame->context;
-    const int count = frame->object_count, rows = frame->light_count + 1,
-              several = count > 1 && !ssdgs__hooked(frame);
+    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
     unsigned char *reach;
     const size_t size = ((size_t)count + 1) * (size_t)rows;
     const int known = same && frame->memory->reach.bytes >= size;
     SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, size);
     *stirred = reach + (ptrdiff_t)count * rows;
     memset(*stirred, 0, (size_t)rows);
+    frame->reach = several ? reach : NULL;
     for (int i = 0; i < count; i++) {
         ssdgs_placed *o = frame->objects + i;
         const ssdgs_model *model = o->model;
@@ -4282,6 +4342,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d",
                            frame->stride, camera->width);
     frame->scene_depth = image ? image->scene_depth : NULL;
+    frame->image = image;
     for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(frame->options.background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
@@ -4944,8 +5005,6 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
         if (frame->occluder) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
     }
-    if (frame->batch[1] == frame->view_count)
-        frame->memory->cache.camera_ready = frame->memory->cache.lights_ready = 1;
     return SSDGS_OK;
 }
 
@@ -6991,6 +7050,11 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     }
 }
 
+SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result, const char *message) {
+    if (!frame || !message) return SSDGS_ERR_ARGUMENT;
+    return ssdgs__fail(frame->context, result, "%s", message);
+}
+
 static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
     static const char *const names[SSDGS_STAGE_COUNT] = {"project",
                                                          "sort",
@@ -7003,34 +7067,42 @@ static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
                                                          "project backward"};
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
     const ssdgs_tracer *tracer = &frame->context->tracer;
-    for (int stage = first; stage <= last; stage++) {
+    ssdgs_result result = SSDGS_OK;
+    for (int stage = first; stage <= last && !result; stage++) {
         if (tracer->stage) tracer->stage(tracer->user, names[stage]);
-        const ssdgs_result result = gpu->stage[stage] ? gpu->stage[stage](gpu->user, frame)
-                                                      : ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+        if (gpu->stage[stage]) result = gpu->stage[stage](gpu->user, frame);
+        else {
+            if (gpu->fetch) result = gpu->fetch(gpu->user, frame, (ssdgs_stage)stage);
+            if (!result) result = ssdgs_stage_cpu(frame, (ssdgs_stage)stage);
+        }
         if (tracer->stage) tracer->stage(tracer->user, NULL);
-        if (result) return result;
     }
-    return SSDGS_OK;
+    return result;
 }
 
 /* The stages up to WALK run once for every batch of views: what they leave for the others is small. A batch
-   is as many lights as do with SSDGS__BATCH_BYTES, or one. Hooks take all views at once. */
+   is as many lights as do with SSDGS__BATCH_BYTES, or one. */
 static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
-    const int walks = last < SSDGS_STAGE_WALK ? last : SSDGS_STAGE_WALK;
+    const ssdgs_gpu_hook *gpu = &frame->context->gpu;
+    ssdgs__cache *cache = &frame->memory->cache;
+    const int walks = last < SSDGS_STAGE_WALK ? last : SSDGS_STAGE_WALK, finds = first <= walks;
     const size_t room = SSDGS__BATCH_BYTES / (80 * ((size_t)frame->count + 1));
-    const int hooked = ssdgs__hooked(frame);
-    int end = 0;
-    for (int begin = 0; first <= walks && begin < frame->view_count; begin = end) {
+    ssdgs_result result = SSDGS_OK;
+    frame->last = (ssdgs_stage)last;
+    for (int begin = 0, end; finds && !result && begin < frame->view_count; begin = end) {
         for (end = begin + 1; end < frame->view_count; end++) {
             const int within = end > 1 && frame->views[end].light == frame->views[end - 1].light;
-            if (!within && !hooked && (size_t)(end - begin) >= room) break;
+            if (!within && (size_t)(end - begin) >= room) break;
         }
         frame->batch[0] = begin;
         frame->batch[1] = end;
-        const ssdgs_result result = ssdgs__run_each(frame, first, walks);
-        if (result) return result;
+        result = ssdgs__run_each(frame, first, walks);
     }
-    return ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
+    if (!result)
+        result = ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
+    if (!result && gpu->fetch) result = gpu->fetch(gpu->user, frame, SSDGS_STAGE_COUNT);
+    if (finds || result) cache->camera_ready = cache->lights_ready = !result;
+    return result;
 }
 
 typedef struct ssdgs__rows_job {
@@ -7149,6 +7221,7 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
     ssdgs_context *context = frame->context;
     const ssdgs_camera *camera = &frame->camera;
     const int stride = frame->stride;
+    frame->statistics = stats != NULL;
     const ssdgs_result result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;

@@ -631,9 +631,10 @@ int main(void) {
         memcpy(s.lights[0].position, direction, sizeof direction);
         run(&s);
     }
-    for (int i = 0; i < 4; i++) { /* the last two leave some Gaussians dark */
-        static const char *const names[4] = {"LED", "spot with a range, geometric ASG",
-                                             "narrow LED, two lights", "LED amid them, scattering alone"};
+    for (int i = 0; i < 5; i++) { /* the last three leave some or all Gaussians dark */
+        static const char *const names[5] = {"LED", "spot with a range, geometric ASG",
+                                             "narrow LED, two lights", "LED amid them, scattering alone",
+                                             "LED that faces away, geometric ASG"};
         s = base, s.name = names[i];
         s.lights[0].direction[0] = -0.48, s.lights[0].direction[1] = 0.6, s.lights[0].direction[2] = -0.64;
         s.lights[0].focus = i == 2 ? 40 : 1.5;
@@ -646,6 +647,10 @@ int main(void) {
         if (i == 3) {
             s.options.terms = SSDGS_SCATTERING_TERM;
             s.lights[0].position[0] = 0.5, s.lights[0].position[1] = -0.4, s.lights[0].position[2] = 0.2;
+        }
+        if (i == 4) {
+            s.settings.asg = SSDGS_ASG_GEOMETRIC, s.light_count = 2;
+            for (int c = 0; c < 3; c++) s.lights[0].direction[c] *= -1;
         }
         run(&s);
     }
