@@ -22,7 +22,7 @@ LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)
 
 HEADERS = ssdgs.h examples/olat.h examples/picture.h examples/view.h tests/test.h tests/scene.h tests/kernels.h
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/bench
-SOURCES = $(wildcard tests/t_*.c)
+SOURCES = $(filter-out tests/t_gpu.c,$(wildcard tests/t_*.c)) # which is `make test-gpu`
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual $(BUILD)/fuzz
@@ -96,6 +96,9 @@ test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.htm
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry
 	sh tests/gltf.sh $(BUILD)
 
+test-gpu: $(BUILD)/t_gpu ## examples/gpu_gl.c on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
+	$(BUILD)/t_gpu
+
 test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc
 	sh tests/mpi.sh $(BUILD)
 test-asan: ## tests under the address sanitizer
@@ -160,6 +163,9 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/t_ball: examples/ball.c
+$(BUILD)/t_gpu: examples/gpu_gl.c
+$(BUILD)/view $(BUILD)/bench: examples/gpu_gl.c
+$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += -ldl
 $(BUILD)/t_check: examples/check.c
 $(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
@@ -188,5 +194,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo view web test-browser test-gltf test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo view web test-browser test-gltf test-gpu test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

@@ -161,8 +161,8 @@ MACROS, defined before the header; those with * in every file that includes it
 
 ssdgs.h DOES NOT
   find cameras or lights (it corrects small errors: options.refine), read datasets or images
-  (examples/olat.h does), trace light between objects, undistort lenses, contain GPU kernels, compress
-  models, or evaluate spherical harmonics beyond degree 0.
+  (examples/olat.h does), trace light between objects, undistort lenses, contain GPU kernels
+  (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run

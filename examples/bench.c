@@ -3,6 +3,7 @@
    best of several passes, taken view by view. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "gpu_gl.c"
 #include "olat.h"
 #ifndef _WIN32
 #include <sys/time.h>
@@ -378,16 +379,16 @@ static void open_session(const bench *b, session *s, int isa, int threads, int h
                          const ssdgs_allocator *allocator) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    ssdgs_gpu_hook gpu;
-    memset(&gpu, 0, sizeof gpu);
+    ssdgs_gpu_hook hook;
+    memset(&hook, 0, sizeof hook);
     memset(s, 0, sizeof *s);
     desc.isa = (ssdgs_isa)isa;
     desc.threads = threads;
     if (allocator) desc.allocator = *allocator;
-#define SET(name) gpu.stage[SSDGS_STAGE_##name] = time_##name;
+#define SET(name) hook.stage[SSDGS_STAGE_##name] = time_##name;
     STAGES(SET)
-    gpu.user = s;
-    if (hooks) desc.gpu = &gpu;
+    hook.user = s;
+    if (hooks) desc.gpu = &hook;
     check(NULL, ssdgs_context_create(&desc, &s->context));
     check(s->context, ssdgs_model_load(s->context, b->model, &s->model, NULL));
 }
@@ -1064,6 +1065,112 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
     measure_training(b);
 }
 
+/* ---- a GPU beside the CPU ---- */
+
+/* So many Gaussians in place of the model's, each of which becomes several that cover as much. */
+static ssdgs_model *crowd(ssdgs_context *context, const ssdgs_model *from, int count) {
+    ssdgs_model *model;
+    check(context, ssdgs_model_create(context, &from->settings, count, &model));
+    memcpy(model->globals, from->globals, from->global_count * sizeof *from->globals);
+    const double parts = (double)count / from->count;
+    for (int i = 0; i < count; i++) {
+        const size_t parent = (size_t)((double)i * from->count / count);
+        ssdgs_real raw[4], q[4], r[9], *to = model->gaussians + i;
+        for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+            to[c * model->capacity] = from->gaussians[c * from->capacity + parent];
+        for (size_t c = 0; c < 4; c++) raw[c] = to[(SSDGS_ROTATION + c) * model->capacity];
+        ssdgs__rotation_scalar(raw, q, r);
+        for (size_t axis = 0; axis < 3 && parts > 1; axis++) {
+            ssdgs_real *log_scale = to + (SSDGS_LOG_SCALE + axis) * model->capacity;
+            const double step =
+                3 * exp((double)*log_scale) * (ssdgs__uniform(3, 3 * (uint64_t)i + axis) - 0.5);
+            for (size_t c = 0; c < 3; c++)
+                to[(SSDGS_POSITION + c) * model->capacity] += (ssdgs_real)(step * (double)r[3 * c + axis]);
+            *log_scale -= (ssdgs_real)(0.5 * log(parts));
+        }
+    }
+    check(context, ssdgs_model_sort(model));
+    return model;
+}
+
+typedef struct stage_times {
+    double began, seconds[SSDGS_STAGE_COUNT];
+    int stage;
+} stage_times;
+
+static void note_stage(void *user, const char *name) {
+    stage_times *t = (stage_times *)user;
+    if (name) t->began = olat_seconds();
+    else t->seconds[t->stage++] += olat_seconds() - t->began;
+    t->stage %= SSDGS_STAGE_COMPOSITE + 1;
+}
+
+/* Milliseconds of a frame, the mean of some. The camera moves, the light where that is asked for. */
+static double frame_ms(bench *b, ssdgs_model *model, int width, int height, int lights_move, int picture) {
+    ssdgs_image image = {0, picture ? b->color : NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    double start = 0;
+    int frames = -2; /* which warm up */
+    for (; frames < 1 || (frames < 200 && olat_seconds() < start + (b->quick ? 0.2 : 1)); frames++) {
+        const ssdgs_photo *photo = b->photos + (frames + 2) % b->photo_count;
+        const ssdgs_camera camera = scaled_camera(&photo->camera, width, height);
+        if (!frames) start = olat_seconds();
+        check(model->context, ssdgs_render_ex(model, &camera, lights_move ? &photo->light : &b->photos->light,
+                                              1, NULL, &image, NULL));
+    }
+    return 1e3 * (olat_seconds() - start) / frames;
+}
+
+/* Frames of models of several sizes on a GPU and on the CPU, and the GPU's stages. */
+static void measure_gpu(bench *b) {
+    static const int counts[3] = {30000, 300000, 1000000},
+                     sizes[3][2] = {{256, 256}, {800, 800}, {1920, 1080}};
+    static const char *const stages[] = {"project", "sort", "bin", "walk", "shade", "composite"};
+    char message[256];
+    gpu *device = gpu_create(message, sizeof message);
+    if (!device) die("--gpu", message);
+    printf(
+        "%s beside %s; milliseconds a frame, each from another camera, default options\n"
+        "  Gaussians      pixels | GPU, no picture, picture, light moves | CPU, light moves | GPU's stages\n",
+        gpu_name(device), b->cpu);
+    for (int i = 0; i < (b->quick ? 1 : 3); i++) {
+        ssdgs_model *models[2], *loaded;
+        ssdgs_context *contexts[2];
+        stage_times times;
+        const ssdgs_gpu_hook hook = gpu_hook(device);
+        for (int on = 0; on < 2; on++) {
+            ssdgs_context_desc desc;
+            memset(&desc, 0, sizeof desc);
+            if (on) desc.gpu = &hook, desc.tracer.stage = note_stage, desc.tracer.user = &times;
+            memset(&times, 0, sizeof times);
+            check(NULL, ssdgs_context_create(&desc, contexts + on));
+            check(contexts[on], ssdgs_model_load(contexts[on], b->model, &loaded, NULL));
+            models[on] = crowd(contexts[on], loaded, b->quick ? 3000 : counts[i]);
+            ssdgs_model_destroy(loaded);
+        }
+        for (int size = 0; size < (b->quick ? 1 : 3); size++) {
+            const int w = sizes[size][0], h = sizes[size][1];
+            double ms[5], sum = 0;
+            for (int j = 0; j < 5; j++) ms[j] = frame_ms(b, models[j < 3], w, h, j == 2 || j == 4, j > 0);
+            printf("  %9d %5d x %4d | %8.2f %8.2f %8.2f | %8.1f %8.1f |", models[1]->count, w, h, ms[0],
+                   ms[1], ms[2], ms[3], ms[4]);
+            gpu_wait(device, 1);
+            memset(&times, 0, sizeof times);
+            const double all = frame_ms(b, models[1], w, h, 1, 1);
+            gpu_wait(device, 0);
+            for (int j = 0; j <= SSDGS_STAGE_COMPOSITE; j++) sum += times.seconds[j];
+            for (int j = 0; j <= SSDGS_STAGE_COMPOSITE; j++)
+                printf(" %s %.2f", stages[j], all * times.seconds[j] / sum);
+            printf("\n");
+            fflush(stdout);
+        }
+        for (int on = 0; on < 2; on++) {
+            ssdgs_model_destroy(models[on]);
+            ssdgs_context_destroy(contexts[on]);
+        }
+    }
+    gpu_destroy(device);
+}
+
 /* ---- the chart: each shortcut's time against its error, from exact on ---- */
 
 static const struct {
@@ -1367,6 +1474,20 @@ static void look_at_machine(bench *b) {
     if (all > 2) b->threads[b->thread_count++] = all;
 }
 
+/* All but the GPU, into files beside the program. */
+static void measure_all(bench *b, char paths[2][1024], const char *program, double start) {
+    measure_machine(b);
+    measure_model(b, "", paths[0]);
+    measure_model(b, "published_", paths[1]);
+    b->prefix = "";
+    add_facts(b, "bench_seconds", olat_seconds() - start);
+    printf("\n");
+    for (int i = 0; i < b->fact_count; i++)
+        if (b->facts[i].value > none) printf("%-46s %.7g\n", b->facts[i].key, b->facts[i].value);
+    write_beside(b, program, ".json", write_json);
+    write_beside(b, program, ".svg", write_svg);
+}
+
 static const char *const help[] = {
     "usage: bench [OPTION...] [DATASET DEFAULT.ply PUBLISHED.ply]",
     "Measures this machine: peak arithmetic, every stage and instruction set, frames of both models",
@@ -1374,6 +1495,7 @@ static const char *const help[] = {
     "beside the program.",
     "",
     "  --quick       about a minute: fewer views, the best instruction set alone",
+    "  --gpu         alone: frames on a GPU beside the CPU's, of models made as large as engines' are",
     "  --models DIR  where waxcow.ply and waxcow_published.ply are; build/demo",
     "  DATASET ...   another dataset, with models of the default and the published networks;",
     "                examples/data/waxcow"};
@@ -1381,7 +1503,7 @@ static const char *const help[] = {
 int main(int argc, char **argv) {
     static bench b;
     const char *given[3] = {NULL, NULL, NULL}, *folder = "build/demo";
-    int files = 0;
+    int files = 0, on_gpu = 0;
     double start = olat_seconds();
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--help")) {
@@ -1389,6 +1511,7 @@ int main(int argc, char **argv) {
             return 0;
         }
         if (!strcmp(argv[i], "--quick")) b.quick = 1;
+        else if (!strcmp(argv[i], "--gpu")) on_gpu = 1;
         else if (!strcmp(argv[i], "--models") && i + 1 < argc) folder = argv[++i];
         else if (argv[i][0] != '-' && files < 3) given[files++] = argv[i];
         else files = 4;
@@ -1414,16 +1537,8 @@ int main(int argc, char **argv) {
     look_at_machine(&b);
     printf("%s, %s, %d threads, %s; %s, %d test views\n", b.cpu, ssdgs_isa_string((ssdgs_isa)b.best_isa),
            b.threads[b.thread_count - 1], COMPILER, b.dataset, b.photo_count);
-    measure_machine(&b);
-    measure_model(&b, "", paths[0]);
-    measure_model(&b, "published_", paths[1]);
-    b.prefix = "";
-    add_facts(&b, "bench_seconds", olat_seconds() - start);
-    printf("\n");
-    for (int i = 0; i < b.fact_count; i++)
-        if (b.facts[i].value > none) printf("%-46s %.7g\n", b.facts[i].key, b.facts[i].value);
-    write_beside(&b, argv[0], ".json", write_json);
-    write_beside(&b, argv[0], ".svg", write_svg);
+    if (on_gpu) measure_gpu(&b);
+    else measure_all(&b, paths, argv[0], start);
     for (int i = 0; i < b.photo_count; i++) free((void *)(uintptr_t)b.scaled[i].pixels);
     free(b.color);
     olat_free(&b.data);

@@ -1,10 +1,11 @@
-/* cc -O2 examples/view.c -o view -lm -lpthread (Windows: -lws2_32): models in a browser on this machine.
-   Prints the address to open; Ctrl-C ends it. */
+/* cc -O2 examples/view.c -o view -lm -lpthread (Windows: -lws2_32; before glibc 2.34: -ldl): models in a
+   browser on this machine. Prints the address to open; Ctrl-C ends it. */
 #define SSDGS_IMPLEMENTATION
 #ifdef _WIN32
 #include <winsock2.h> /* before windows.h */
 #endif
 #include "../ssdgs.h"
+#include "gpu_gl.c"
 #include "olat.h"
 #include "picture.h"
 #include "view.h"
@@ -16,14 +17,14 @@ static void end(int number) {
 }
 
 static int usage(void) {
-    fprintf(stderr, "usage: view MODEL.ply [MODEL.ply ...] [--port N] [--page view.html]\n");
+    fprintf(stderr, "usage: view MODEL.ply [MODEL.ply ...] [--port N] [--page view.html] [--gpu]\n");
     return 2;
 }
 
 int main(int argc, char **argv) {
     static view_server s;
     char error[512] = "", page[OLAT__MAX_PATH] = "";
-    int failed = 0;
+    int failed = 0, wants_gpu = 0;
     view_page(__FILE__, page, sizeof page);
     for (int i = 1; i < argc; i++) {
         char *rest = NULL;
@@ -31,6 +32,7 @@ int main(int argc, char **argv) {
             s.port = (int)strtol(argv[++i], &rest, 10);
             if (*rest || s.port < 1 || s.port > 65535) return usage();
         } else if (!strcmp(argv[i], "--page") && i + 1 < argc) snprintf(page, sizeof page, "%s", argv[++i]);
+        else if (!strcmp(argv[i], "--gpu")) wants_gpu = 1;
         else if (argv[i][0] != '-' && s.show.count < VIEW__MODELS) s.show.names[s.show.count++] = argv[i];
         else return usage();
     }
@@ -39,6 +41,13 @@ int main(int argc, char **argv) {
     memset(&desc, 0, sizeof desc);
     desc.tracer.stage = view_stage;
     desc.tracer.user = &s.show;
+    gpu *const device = wants_gpu ? gpu_create(error, sizeof error) : NULL;
+    ssdgs_gpu_hook hook;
+    if (device) {
+        hook = gpu_hook(device);
+        desc.gpu = &hook;
+        printf("on %s\n", gpu_name(device));
+    } else if (wants_gpu) fprintf(stderr, "view: %s: the CPU renders\n", error);
     ssdgs_result result = ssdgs_context_create(&desc, &s.show.context);
     for (int i = 0; i < s.show.count && !result; i++)
         result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, NULL);
@@ -57,5 +66,6 @@ int main(int argc, char **argv) {
     view_close(&s);
     for (int i = 0; i < s.show.count; i++) ssdgs_model_destroy(s.show.models[i]);
     ssdgs_context_destroy(s.show.context);
+    gpu_destroy(device);
     return failed || result;
 }
