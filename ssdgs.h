@@ -825,7 +825,7 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    The stages up to WALK run for the views of frame.batch, then perhaps for more views. A view that is
    `cached` is the last frame's of that memory. So is what these stages found for it, in `seen` and the
    light's rows too, and they leave it as it is. So what a hook has left for a view stays until that stage
-   works on the view again, or the memory is released.
+   works on the view again, or the memory is released. Where it is lost, PROJECT clears `cached`.
 
    A result other than SSDGS_OK ends the frame, of which nothing is kept; ssdgs_stage_fail() says why.
 
@@ -866,8 +866,24 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    `behind` after its last. Between two it is what the first one left up to bias[1] ahead of the second, and
    from there goes in a straight line to what there was before the second.
 
-   SHADE  What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was
-   shaded before them or, without one, after. A Gaussian whose colour is not finite is black. */
+   SHADE  In E 1 / distance^2 is at most 1e6 / length_unit^2. The shadow network sees position (3 octaves), wi
+   (3), v and the material; the scattering network position (4), wo and wi (settings.octaves), normal,
+   material and then, if settings ask for them, depth_cue (4) and what true transport brings in each length,
+   over 1 / distance^2. x of n octaves is x, sin 2^i x of all coordinates and i, cos 2^i x alike; positions
+   are relative to settings.centre, in length_units where residual_shadow, depth_cue or transport is set, cues
+   always. Layers are out x in weights, then biases, with max(0, x) but behind the last. S is sigmoid(answer),
+   with residual_shadow sigmoid(answer + logit v), v within 0.01 .. 0.99. Of sigmoids u the optics are
+   sigma_s, sigma_a = 2 u + 0.05 and r = 3 u + 0.1. A light out of whose reach are all 64 neighbours of a
+   block leaves it out.
+
+   What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was shaded
+   before them or, without one, after. A Gaussian whose colour is not finite is black.
+
+   True transport brings from each Gaussian's flux e^(-d / l) / (2 pi l d), d^2 = distance^2 + s^2, with
+   s = 0.02 and l = 0.04 to 0.64 length units, each twice the last. Under lights without shadow it is max(0,
+   n.wi) e^(-s / l).
+
+   Highlights  >>highlight_kernel has the formula, in which exponents of lobes' widths are within +-12. */
 
 typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0, /* Gaussians -> records and depths of every view */
