@@ -900,7 +900,7 @@ typedef enum ssdgs_stage {
 } ssdgs_stage;
 
 struct ssdgs_frame;
-typedef struct ssdgs_gpu_hook {
+typedef struct ssdgs_gpu_hook { /* set to 0 first */
     ssdgs_result (*stage[SSDGS_STAGE_COUNT])(void *user, struct ssdgs_frame *frame);
     void *user;
     /* Brings to host memory what the CPU is about to read: what `stage` reads of earlier ones; with
@@ -8142,11 +8142,11 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
     ssdgs__loss_values values;
     if (!result) {
         ssdgs_real *p = (ssdgs_real *)planes.memory;
-        for (size_t i = 0; i < pixels; i++)
-            for (size_t c = 0; c < 6; c++) {
-                const ssdgs_real x = (c < 3 ? image : reference)[3 * i + c % 3];
-                p[pixels * c + i] = x > 0 ? (x < 1 ? x : 1) : 0;
-            }
+        for (size_t i = 0; i < 3 * pixels; i++) {
+            ssdgs_real *to = p + pixels * (i % 3) + i / 3;
+            to[0] = image[i] > 0 ? (image[i] < 1 ? image[i] : 1) : 0;
+            to[3 * pixels] = reference[i] > 0 ? (reference[i] < 1 ? reference[i] : 1) : 0;
+        }
         const ssdgs__images images = {p, p + 3 * pixels, width, height};
         result = ssdgs__loss(context, &memory, &images, (ssdgs_real)0.2, NULL, &values);
     }

@@ -139,6 +139,7 @@ static void test_same_bits(void) {
             desc.threads = threads[variant];
             if (variant == 3) desc.parallel.run = backwards_run;
             ssdgs_gpu_hook gpu;
+            memset(&gpu, 0, sizeof gpu);
             if (variant == 4) {
                 desc.gpu = &gpu;
                 gpu.user = calls;
