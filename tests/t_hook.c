@@ -119,7 +119,7 @@ static ssdgs_result on_device(void *user, ssdgs_frame *frame, ssdgs_stage stage)
     const ssdgs_result result = ssdgs_stage_cpu(frame, stage);
     d->stages++;
     d->memory = frame->memory;
-    if (!result && (int)stage < RENDERED) take_away(d, frame, stage);
+    if (!result && (int)stage < RENDERED) take_away(d, frame, (int)stage);
     return result;
 }
 #define HOOK(name, stage) \
