@@ -7117,7 +7117,7 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     if (!result)
         result = ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
     if (!result && gpu->fetch) result = gpu->fetch(gpu->user, frame, SSDGS_STAGE_COUNT);
-    if (finds || result) cache->camera_ready = cache->lights_ready = !result;
+    if (finds) cache->camera_ready = cache->lights_ready = !result;
     return result;
 }
 
