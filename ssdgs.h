@@ -619,7 +619,7 @@ typedef enum ssdgs_pixels {
                              it */
     SSDGS_PIXELS_RGBA32F
 } ssdgs_pixels;
-typedef struct ssdgs_photo {
+typedef struct ssdgs_photo { /* set to 0 first */
     ssdgs_camera camera;
     ssdgs_light light;
     const void *pixels; /* (h,w,4) packed, straight alpha; must outlive the trainer */
@@ -3902,8 +3902,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
         lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
                          ssdgs__casts(light) == ssdgs__casts(last);
         lights[i].kept = lights[i].kept && !memcmp(light->position, last->position, sizeof light->position) &&
-                         !memcmp(&light->range, &last->range, 2 * sizeof light->range); /* focus, too */
-        if (ssdgs__aimed(light))
+                         !memcmp(&light->range, &last->range, sizeof light->range);
+        if (light->kind == SSDGS_LIGHT_SPOT) /* whose map follows its cone; a focus is of shading alone */
             lights[i].kept = lights[i].kept &&
                              !memcmp(light->direction, last->direction, sizeof light->direction) &&
                              !memcmp(light->cone, last->cone, sizeof light->cone);
@@ -5859,30 +5859,45 @@ static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
     }
 }
 
-/* What of a light's irradiance its range, its cone, as in glTF's KHR_lights_punctual, and its focus leave at
-   d, from it. slope: its gradient. */
-static double ssdgs__reach_at(const ssdgs_light *light, const double direction[3], double inverse_range,
-                              const double d[3], double slope[3]) {
+/* What of a light's irradiance its range, its cone, as in glTF's KHR_lights_punctual, and its focus leave. */
+typedef struct ssdgs__reaching {
+    double direction[3], range2, outer, width,
+        focus; /* 1 / range^2; the cone's cosines: the outer, how far on */
+} ssdgs__reaching;
+
+static ssdgs__reaching ssdgs__reaching_of(const ssdgs_light *light, const ssdgs_real direction[3],
+                                          double scale) {
+    const double inverse_range = light->range > 0 ? scale / (double)light->range : 0;
+    ssdgs__reaching r;
+    for (int c = 0; c < 3; c++) r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] : 0;
+    r.range2 = inverse_range * inverse_range;
+    r.outer = light->kind == SSDGS_LIGHT_SPOT ? cos((double)light->cone[1]) : 0;
+    r.width = light->kind == SSDGS_LIGHT_SPOT ? cos((double)light->cone[0]) - r.outer : 0; /* 0: no cone */
+    r.focus = (double)light->focus;
+    return r;
+}
+
+/* What is left at d, from the light. slope: its gradient. */
+static double ssdgs__reach_at(const ssdgs__reaching *r, const double d[3], double slope[3]) {
     const double distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2],
-                 distance = sqrt(distance2 > 1e-60 ? distance2 : 1e-60),
-                 range2 = inverse_range * inverse_range, way2 = distance2 * range2,
+                 distance = sqrt(distance2 > 1e-60 ? distance2 : 1e-60), way2 = distance2 * r->range2,
                  left = way2 < 1 ? 1 - way2 * way2 : 0,
-                 cosine = (d[0] * direction[0] + d[1] * direction[1] + d[2] * direction[2]) / distance,
-                 focus = (double)light->focus;
+                 cosine =
+                     (d[0] * r->direction[0] + d[1] * r->direction[1] + d[2] * r->direction[2]) / distance;
     double cone = 1, fade = 1, by_cosine[2] = {0, 0}; /* how they change with the cosine */
-    if (light->kind == SSDGS_LIGHT_SPOT) {
-        const double outer = cos((double)light->cone[1]), width = cos((double)light->cone[0]) - outer,
-                     t = (cosine - outer) / width;
+    if (r->width > 0) {
+        const double t = (cosine - r->outer) / r->width;
         cone = t > 1 ? 1 : t > 0 ? t * t : 0;
-        by_cosine[0] = t > 0 && t < 1 ? 2 * t / width : 0;
+        by_cosine[0] = t > 0 && t < 1 ? 2 * t / r->width : 0;
     }
-    if (focus > 0) { /* below 1 it is endlessly steep at its edge */
-        fade = cosine > 0 ? pow(cosine, focus) : 0;
-        by_cosine[1] = focus * fade / (cosine > 1e-3 ? cosine : 1e-3);
+    if (r->focus > 0) { /* below 1 it is endlessly steep at its edge */
+        fade = cosine > 0 ? pow(cosine, r->focus) : 0;
+        by_cosine[1] = r->focus * fade / (cosine > 1e-3 ? cosine : 1e-3);
     }
     const double steep = left * (by_cosine[0] * fade + cone * by_cosine[1]) / distance,
-                 nearer = left > 0 ? cone * fade * 4 * way2 * range2 : 0;
-    for (int c = 0; c < 3; c++) slope[c] = steep * (direction[c] - cosine * d[c] / distance) - nearer * d[c];
+                 nearer = left > 0 ? cone * fade * 4 * way2 * r->range2 : 0;
+    for (int c = 0; c < 3; c++)
+        slope[c] = steep * (r->direction[c] - cosine * d[c] / distance) - nearer * d[c];
     return cone * fade * left;
 }
 
@@ -5892,11 +5907,10 @@ static int ssdgs__reach_row(const ssdgs_frame *frame, const ssdgs_placed *o, int
                             const ssdgs_real *gauss, ssdgs_real *reach, ssdgs_real *slope) {
     const ssdgs_light *light = frame->lights + index;
     const ssdgs__lighting *k = ssdgs__lightings(frame, o) + index;
-    const double inverse_range = light->range > 0 ? (double)(o->scale / light->range) : 0;
     int any = 0;
-    ssdgs_real turned[3] = {0, 0, 0};
-    if (ssdgs__aimed(light)) ssdgs__turn(o, 1, light->direction, turned);
-    const double direction[3] = {(double)turned[0], (double)turned[1], (double)turned[2]};
+    ssdgs_real direction[3];
+    ssdgs__turn(o, 1, light->direction, direction);
+    const ssdgs__reaching reaching = ssdgs__reaching_of(light, direction, (double)o->scale);
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         double d[3], by[3], distance2 = 0;
         for (int c = 0; c < 3; c++) {
@@ -5904,7 +5918,7 @@ static int ssdgs__reach_row(const ssdgs_frame *frame, const ssdgs_placed *o, int
             distance2 += d[c] * d[c];
         }
         if (distance2 < (double)k->least_distance2) distance2 = (double)k->least_distance2;
-        reach[s] = (ssdgs_real)ssdgs__reach_at(light, direction, inverse_range, d, by);
+        reach[s] = (ssdgs_real)ssdgs__reach_at(&reaching, d, by);
         for (int c = 0; slope && c < 3; c++) slope[c * SSDGS__BLOCK + s] = (ssdgs_real)(by[c] / distance2);
         any |= reach[s] > 0;
     }
@@ -9993,8 +10007,7 @@ static const ssdgs_light *ssdgs__photo_light(const ssdgs_photo *photo, int i) {
 /* A light's mean E at a place, no nearer than `nearest`. */
 static double ssdgs__light_at(const ssdgs_light *light, const double place[3], double nearest) {
     double d[3], distance2 = 0, slope[3], intensity = 0;
-    const double direction[3] = {(double)light->direction[0], (double)light->direction[1],
-                                 (double)light->direction[2]};
+    const ssdgs__reaching reaching = ssdgs__reaching_of(light, light->direction, 1);
     for (int c = 0; c < 3; c++) {
         d[c] = place[c] - (double)light->position[c];
         distance2 += d[c] * d[c];
@@ -10002,7 +10015,7 @@ static double ssdgs__light_at(const ssdgs_light *light, const double place[3], d
     }
     if (light->kind == SSDGS_LIGHT_DIRECTIONAL) return intensity;
     return intensity / (distance2 > nearest * nearest ? distance2 : nearest * nearest) *
-           ssdgs__reach_at(light, direction, light->range > 0 ? 1 / (double)light->range : 0, d, slope);
+           ssdgs__reach_at(&reaching, d, slope);
 }
 
 /* Goes only a part of the way to the intensity that fits best: what does not fit yet may be the model. */
@@ -11538,7 +11551,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
              j++) {}
         within += j == 3;
         double e =
-            0; /* no nearer than half the unit: one light inside of the object must not darken others */
+            0; /* as from half the unit at least: a light inside of the object must not darken others */
         for (int l = 0; l <= photos[i].more_count; l++)
             e += ssdgs__light_at(ssdgs__photo_light(photos + i, l), middle, 0.5 * trainer->unit);
         if (e > 0) irradiance += log(e);

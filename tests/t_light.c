@@ -99,6 +99,18 @@ static void test_focus(ssdgs_model *single, const ssdgs_camera *camera) {
     light.focus = 3;
     alone(single, camera, &light, 1, &options, shot);
     middle_of(shot, 0, want);
+    /* a focus or an LED's direction that changes leaves the light's map, and does what it does in a first
+     * frame */
+    for (int i = 0; i < 2; i++) {
+        ssdgs_light changed = light;
+        if (i) changed.focus = 8;
+        else changed.direction[0] = 0, changed.direction[1] = 1, changed.direction[2] = 0;
+        alone(single, camera, &changed, 1, &options, shot + 1);
+        CHECK(shot[1].stats.lights_cached == 1 && !same(shot, shot + 1));
+        ssdgs_model_arrays(single); /* forgets */
+        alone(single, camera, &changed, 1, &options, shot + 2);
+        CHECK(shot[2].stats.lights_cached == 0 && same(shot + 1, shot + 2));
+    }
     const ssdgs_object object = placed(single, 0.7, 1, 1, 0.3, -0.2, 0.1);
     ssdgs_camera seen = *camera;
     ssdgs_light there = light;
