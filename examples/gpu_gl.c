@@ -1,6 +1,6 @@
 /* ssdgs.h on a GPU: an ssdgs_gpu_hook in OpenGL 4.3 compute shaders. EGL and OpenGL are found when the
    program runs (libEGL.so.1), without a window; building needs neither their headers nor a library but
-   dlopen's. Include this file after ssdgs.h with SSDGS_STAGES, or compile it on its own and declare the four
+   dlopen's. Include this file after ssdgs.h with SSDGS_STAGES, or compile it on its own and declare the
    functions of its face.
 
        char message[256];
@@ -30,9 +30,8 @@ typedef struct gpu gpu;
 gpu *gpu_create(char *message, size_t size); /* NULL: message says why, as where there is no OpenGL 4.3 */
 void gpu_destroy(gpu *g);                    /* after the contexts that have its hook; NULL is fine */
 ssdgs_gpu_hook gpu_hook(gpu *g);
-const char *gpu_name(const gpu *g);    /* of the device */
-void gpu_wait(gpu *g, int waits);      /* 1: a stage ends when the device is done with it, for timing */
-const char *gpu_message(const gpu *g); /* what its last failure was about */
+const char *gpu_name(const gpu *g); /* of the device */
+void gpu_wait(gpu *g, int waits);   /* 1: a stage ends when the device is done with it, for timing */
 
 /* ==== EGL and OpenGL ==== */
 
@@ -124,7 +123,6 @@ typedef struct gpu_buffer {
 
 /* The compute programs, compiled when they are first used. */
 typedef enum gpu_program {
-    GPU_SELFTEST,
     GPU_SEEN_COUNT,
     GPU_SEEN_SUM,
     GPU_SEEN_LIST,
@@ -1033,13 +1031,6 @@ void main() {
 }
 );
 
-/* Tries the platform. */
-static const char gpu_selftest[] = GPU_GLSL(
-layout(std140, binding = 0) uniform parameters { uint count; float factor; };
-layout(std430, binding = 0) buffer numbers { float number[]; };
-void main() { if (item() < count) number[item()] *= factor; }
-);
-
 /* What views, records and lists are. */
 static const char gpu_types[] = GPU_GLSL(
 struct fact { uint gaussians, visible, instances; float nearest; };
@@ -1780,7 +1771,6 @@ void main() {
 static const struct {
     const char *name, *part[GPU_PARTS]; /* after gpu_common */
 } gpu_sources[GPU_PROGRAMS] = {
-    {"selftest", {gpu_selftest}},
     {"seen: count", {gpu_types, gpu_scan, gpu_seen, gpu_seen_count}},
     {"seen: sum", {gpu_types, gpu_scan, gpu_seen, gpu_seen_sum}},
     {"seen: list", {gpu_types, gpu_scan, gpu_seen, gpu_seen_list}},
@@ -1829,7 +1819,6 @@ static void gpu_check(gpu *g, const char *what) {
     else if (error) gpu_fail(g, SSDGS_ERR_ISA, "%s: OpenGL error 0x%x", what, (unsigned)error);
 }
 
-const char *gpu_message(const gpu *g) { return g->message; }
 const char *gpu_name(const gpu *g) { return g->name; }
 void gpu_wait(gpu *g, int waits) { g->waits = waits; }
 
@@ -2913,24 +2902,17 @@ static void gpu_released(void *user, const void *gone) {
     if (g->owner == gone) g->owner = NULL;
 }
 
-static ssdgs_result gpu_hook_project(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_PROJECT);
-}
-static ssdgs_result gpu_hook_sort(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_SORT);
-}
-static ssdgs_result gpu_hook_bin(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_BIN);
-}
-static ssdgs_result gpu_hook_walk(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_WALK);
-}
-static ssdgs_result gpu_hook_shade(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_SHADE);
-}
-static ssdgs_result gpu_hook_composite(void *user, ssdgs_frame *frame) {
-    return gpu_stage(user, frame, SSDGS_STAGE_COMPOSITE);
-}
+#define GPU_HOOK(name, stage) \
+    static ssdgs_result gpu_hook_##name(void *user, ssdgs_frame *frame) { \
+        return gpu_stage(user, frame, stage); \
+    }
+GPU_HOOK(project, SSDGS_STAGE_PROJECT)
+GPU_HOOK(sort, SSDGS_STAGE_SORT)
+GPU_HOOK(bin, SSDGS_STAGE_BIN)
+GPU_HOOK(walk, SSDGS_STAGE_WALK)
+GPU_HOOK(shade, SSDGS_STAGE_SHADE)
+GPU_HOOK(composite, SSDGS_STAGE_COMPOSITE)
+#undef GPU_HOOK
 
 ssdgs_gpu_hook gpu_hook(gpu *g) {
     ssdgs_gpu_hook hook;
