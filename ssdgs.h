@@ -864,7 +864,8 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    Light maps  The distance of a place from the light, less bias[1], a millionth of itself, and `nearest`,
    asks four pixels, whose answers have bilinear weights. One pixel's answer is 1 ahead of its first fall and
    `behind` after its last. Between two it is what the first one left up to bias[1] ahead of the second, and
-   from there goes in a straight line to what there was before the second.
+   from there goes in a straight line to what there was before the second. In training COMPOSITE_BACKWARD asks
+   again: a pixel's dL/dv goes to its depth and to the camera, while the map is held fixed.
 
    SHADE  In E 1 / distance^2 is at most 1e6 / length_unit^2. The shadow network sees position (3 octaves), wi
    (3), v and the material; the scattering network position (4), wo and wi (settings.octaves), normal,
@@ -6641,10 +6642,11 @@ typedef struct ssdgs__composite_job {
 
 /* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all
    along the gap behind a veil, until the next fall is nearer than `thick`, and from there goes straight to
-   what there was before that. */
+   what there was before that. steep: its derivative by the distance. */
 static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
-                                              ssdgs_real thick) {
+                                              ssdgs_real thick, ssdgs_real *steep) {
     const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
+    *steep = 0;
     if (tile == UINT32_MAX) return 1;
     const ssdgs_light_pixel *at =
         map->light_map + (size_t)tile * 256 + ((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3));
@@ -6657,11 +6659,14 @@ static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x
                                  ? at->distance[level] - thick
                                  : at->distance[level - 1];
     if (distance <= begin) return left;
+    *steep = (at->before[level - 1] - left) / (at->distance[level] - begin);
     return left + (at->before[level - 1] - left) * (distance - begin) / (at->distance[level] - begin);
 }
 
-/* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. */
-static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias) {
+/* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. slope: its gradient
+   by the place, or NULL. */
+static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias,
+                                   ssdgs_real *slope) {
     const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1),
                      half = (ssdgs_real)0.5;
     ssdgs_real t[3];
@@ -6673,19 +6678,58 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     ssdgs_real u = map->fx * t[0] * inverse_z + map->cx - half;
     ssdgs_real w = map->fy * t[1] * inverse_z + map->cy - half;
     if (!(u >= -half && w >= -half && u <= wide + half && w <= high + half)) return -1;
+    const int inside[2] = {0 < u && u < wide, 0 < w && w < high};
     u = u < 0 ? 0 : u > wide ? wide : u;
     w = w < 0 ? 0 : w > high ? high : w;
-    ssdgs_real distance = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    distance -= bias + (ssdgs_real)1e-6 * distance + map->nearest;
+    const ssdgs_real far_off = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
+    const ssdgs_real distance = far_off - (bias + (ssdgs_real)1e-6 * far_off + map->nearest);
     const int x = u < wide ? (int)u : map->width - 2;
     const int y = w < high ? (int)w : map->height - 2;
     u -= (ssdgs_real)x;
     w -= (ssdgs_real)y;
-    ssdgs_real row[2];
-    for (int i = 0; i < 2; i++)
-        row[i] = (1 - u) * ssdgs__passed(map, x, y + i, distance, bias) +
-                 u * ssdgs__passed(map, x + 1, y + i, distance, bias);
+    ssdgs_real row[2], by_u[2], by_distance[2];
+    for (int i = 0; i < 2; i++) {
+        ssdgs_real steep[2];
+        const ssdgs_real left = ssdgs__passed(map, x, y + i, distance, bias, steep),
+                         right = ssdgs__passed(map, x + 1, y + i, distance, bias, steep + 1);
+        row[i] = (1 - u) * left + u * right;
+        by_u[i] = right - left;
+        by_distance[i] = (1 - u) * steep[0] + u * steep[1];
+    }
+    if (slope) {
+        const ssdgs_real du = inside[0] ? ((1 - w) * by_u[0] + w * by_u[1]) * map->fx * inverse_z : 0,
+                         dw = inside[1] ? (row[1] - row[0]) * map->fy * inverse_z : 0,
+                         dd = ((1 - w) * by_distance[0] + w * by_distance[1]) * (1 - (ssdgs_real)1e-6);
+        ssdgs_real dt[3] = {du, dw, map->orthographic ? 0 : -(du * t[0] + dw * t[1]) * inverse_z};
+        for (int i = 0; i < 3; i++) dt[i] += map->by_distance ? dd * t[i] / far_off : i == 2 ? dd : 0;
+        for (int c = 0; c < 3; c++)
+            slope[c] = map->view[c] * dt[0] + map->view[4 + c] * dt[1] + map->view[8 + c] * dt[2];
+    }
     return (1 - w) * row[0] + w * row[1];
+}
+
+/* Transmittance from a light to a place in the world, by its maps; -1 where none knows it. slope as above. */
+static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, const ssdgs_real at[3],
+                                     ssdgs_real *slope) {
+    ssdgs_real passed = -1;
+    int view = 1; /* views are in the order of lights */
+    while (view < frame->view_count && frame->views[view].light < light) view++;
+    for (; view < frame->view_count && frame->views[view].light == light && passed < 0; view++)
+        if (frame->views[view].light_map)
+            passed = ssdgs__passed_to(frame->views + view, at, frame->bias[1], slope);
+    return passed;
+}
+
+/* The camera's ray (x, y, 1) of a tile's pixel i, [micro-tile][16 lanes], and where in the world it is at
+   depth z. */
+static void ssdgs__place_of_pixel(const ssdgs__lighting *k, const ssdgs__tile *tile, int i, ssdgs_real z,
+                                  ssdgs_real ray[2], ssdgs_real at[3]) {
+    const ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3)),
+                     y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2));
+    ray[0] = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
+    ray[1] = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
+    for (int c = 0; c < 3; c++)
+        at[c] = k->eye[c] + z * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
 }
 
 /* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at
@@ -6695,25 +6739,14 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
-    int first = 1; /* views are in the order of lights */
-    while (first < frame->view_count && frame->views[first].light < light) first++;
     for (int i = 0; i < 256; i++) {
         const int lane = i / 16 * 64 + i % 16;
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
-        ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3));
-        ssdgs_real y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2)), passed = -1;
+        ssdgs_real ray[2], at[3];
         visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
-        const ssdgs_real z = depth[0] / depth[32];
-        x = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
-        y = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
-        ssdgs_real at[3];
-        for (int c = 0; c < 3; c++)
-            at[c] = k->eye[c] + z * (k->view[c] * x + k->view[4 + c] * y + k->view[8 + c]);
-        for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
-             view++)
-            if (frame->views[view].light_map)
-                passed = ssdgs__passed_to(frame->views + view, at, frame->bias[1]);
+        ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
+        const ssdgs_real passed = ssdgs__passed_from(frame, light, at, NULL);
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
@@ -6892,6 +6925,34 @@ static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradie
         }
 }
 
+/* A shadow's edge is at the right place where the surface that receives it is: adds to the gradient of the
+   pixels' depths what dL/dv, the fourth of the light's last layer, asks of them through the light's map, and
+   to the highlights' sums what it asks of the camera. The map is held fixed. */
+static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
+                                  const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
+                                  ssdgs_real *sums) {
+    const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
+    for (int i = 0; i < 256; i++) {
+        const int lane = i / 16 * 64 + i % 16, layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
+        const ssdgs_real cover = pixels[layer + 32];
+        ssdgs_real ray[2], at[3], slope[3], along = 0;
+        if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
+        const ssdgs_real z = pixels[layer] / cover;
+        ssdgs__place_of_pixel(k, tile, i, z, ray, at);
+        if (ssdgs__passed_from(frame, light, at, slope) < 0) continue;
+        for (int c = 0; c < 3; c++) { /* at = eye + z (x, y, 1) R */
+            const ssdgs_real d = dv[lane] * slope[c];
+            along += d * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
+            sums[3 + c] += d;
+            sums[6 + c] += d * z * ray[0];
+            sums[9 + c] += d * z * ray[1];
+            sums[12 + c] += d * z;
+        }
+        gradient[layer] += along / cover;
+        gradient[layer + 32] -= along * z / cover;
+    }
+}
+
 static void ssdgs__composite_backward_task(void *data, int index) {
     const ssdgs__uncomposite_job *job = (const ssdgs__uncomposite_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -6928,9 +6989,12 @@ static void ssdgs__composite_backward_task(void *data, int index) {
                                  pixels + lit + layer * SSDGS__TILE_LAYER);
         ssdgs_real visibility[SSDGS__TILE_LAYER];
         ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
-        k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient,
-                              job->highlight_sums +
-                                  (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS);
+        ssdgs_real *highlight_sums =
+            job->highlight_sums + (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS;
+        k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient, highlight_sums);
+        if (!frame->visibility_given)
+            ssdgs__place_backward(frame, job->lightings + light, light, &tile, pixels, gradient,
+                                  highlight_sums);
         if (!light) continue;
         for (int layer = 0; layer < SSDGS__PER_LIGHT;
              layer++) { /* training has one light: these may take long */
@@ -7435,7 +7499,7 @@ static void ssdgs__shadow_task(void *data, int chunk) {
     for (int i = chunk * SSDGS__CHUNK; i < job->count && i / SSDGS__CHUNK == chunk; i++) {
         ssdgs_real passed = -1;
         for (const ssdgs_splat_view *v = job->view; v < job->end && passed < 0; v++)
-            passed = ssdgs__passed_to(v, job->points + 3 * (size_t)i, job->bias);
+            passed = ssdgs__passed_to(v, job->points + 3 * (size_t)i, job->bias, NULL);
         job->fraction[i] = passed < 0 ? 1 : passed; /* beside all objects */
     }
 }
@@ -14198,12 +14262,14 @@ SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const 
     a->factor = F(shadow_factor)(k, a->visibility, a->residual);
 }
 
-/* Writes the gradient of the layer with the residual, returns what goes to the cover, times that. */
+/* Writes the gradient of the layer with the residual and, as its fourth, the map's; returns what goes to the
+   cover, times that. */
 SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
     const V dresidual = F(shadow_factor_backward)(k, a->visibility, a->factor, &dvisibility);
     const V dgauss = VMUL(dvisibility, a->soft), dsoft = VMUL(dvisibility, VSUB(a->gauss, a->map));
+    VSTORE(dmore + SSDGS__TILE_FOURTH, VMUL(dvisibility, VSUB(VSET(1), a->soft)));
     VSTORE(dmore, VMUL(dresidual, a->inverse_cover));
     VSTORE(dmore + 16, VMUL(dgauss, a->inverse_cover));
     VSTORE(dmore + 32, VMUL(dsoft, a->inverse_cover));

@@ -107,6 +107,18 @@ default_configuration() { details default; }
 
 published_configuration() { details published --preset published; }
 
+error_parts() {
+    printf '\nPercent of the squared error of the test views, on percent of the pixels. Outlines: within 2 px of where the\n'
+    printf "photograph's alpha changes. Shadow edges: of where the rendering's S does. Highlights: what is too dark by 10 of 255\n"
+    printf 'where the photograph is brighter than 64 in all channels. Lit, half lit, dark: S above 0.7, between, below 0.3.\n'
+    printf '\n| scene | PSNR of all pixels | outlines | shadow edges | highlights | lit | half lit | dark | background |\n'
+    printf '| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n'
+    for s in $scenes; do
+        run "$s" default
+        echo "| ${s%%:*} | $(look show parts "$data/${s%%:*}" "${s##*:}" "$out/${s%%:*}.default.ply")"
+    done
+}
+
 components() {
     head_line 'terms' paper
     row 'A: diffuse' '20.07 (20.92)' a --terms diffuse
@@ -220,6 +232,7 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
 {
     sed '/^## /,$d' tests/EXPERIMENTS.md | sed '$d'
     part default_configuration 'Default configuration'
+    part error_parts 'Where the squared error lies'
     part published_configuration 'Published configuration (--preset published)'
     part components 'Reflectance components (Tables 2 and 4)'
     part schedules 'Training schedules (Tables 2 and 4)'

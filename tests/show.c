@@ -1,10 +1,22 @@
 /* What tests/experiments.sh needs beside train and relight:
-   show pipeline OUT.png DATASET BACKGROUND MODEL      shadow: per ray from the light, coarse, refined, the
-   image (Figure 3) show sweeps OUT.png DATASET BACKGROUND MODEL        one view under six lights, six views
-   under one light (Figure 10) show backlit OUT.png DATASET BACKGROUND MODEL...    the middle of the brightest
-   test view lit from behind, photograph first show strip OUT.png COLUMNS FILE.png...              images side
-   by side show poses TRUE.json FITTED.json                    how far cameras and lights are from the
-   truth */
+
+   show pipeline OUT.png DATASET BACKGROUND MODEL
+       shadow: per ray from the light, coarse, refined; the image (Figure 3)
+
+   show sweeps OUT.png DATASET BACKGROUND MODEL
+       one view under six lights, six views under one light (Figure 10)
+
+   show backlit OUT.png DATASET BACKGROUND MODEL...
+       the middle of the brightest test view lit from behind, photograph first
+
+   show strip OUT.png COLUMNS FILE.png...
+       images side by side
+
+   show parts DATASET BACKGROUND MODEL
+       where the squared error of the test views lies, a row of a table
+
+   show poses TRUE.json FITTED.json
+       how far cameras and lights are from the truth */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "../examples/olat.h"
@@ -16,7 +28,8 @@ typedef struct show {
     ssdgs_context *context, *coarse; /* coarse shows a Gaussian's visibility as its colour */
     ssdgs_model *model, *coarse_model;
     olat_dataset set, other;
-    ssdgs_real background[3], *image, *alpha; /* of the view at hand: (h,w,3), (h,w) */
+    ssdgs_real background[3], *image, *alpha, /* of the view at hand: (h,w,3), (h,w) */
+        *planes;                              /* (h,w,8) to compare with */
     unsigned char *bytes, *sheet;
     int width, height, columns, rows; /* of a cell in pixels; of the sheet in cells */
     char error[512];
@@ -225,6 +238,85 @@ static int strip(show *s, int columns, const char *const *files, int count) {
     return 0;
 }
 
+/* ---- where the error lies ---- */
+
+/* The largest step between neighbours within two pixels of one. */
+static double steepest(const show *s, const ssdgs_real *plane, int x, int y) {
+    double most = 0;
+    for (int j = y > 2 ? y - 2 : 0; j <= y + 2 && j < s->height; j++)
+        for (int i = x > 2 ? x - 2 : 0; i <= x + 2 && i < s->width; i++) {
+            const ssdgs_real *at = plane + (size_t)j * (size_t)s->width + (size_t)i;
+            const double across = i ? fabs((double)(at[0] - at[-1])) : 0,
+                         down = j ? fabs((double)(at[0] - at[-s->width])) : 0;
+            most = fmax(most, fmax(across, down));
+        }
+    return most;
+}
+
+enum { OUTLINE, SHADOW_EDGE, HIGHLIGHT, LIT, HALF_LIT, DARK, BACKGROUND, PARTS };
+
+/* Of a pixel: its photograph and rendering, the photograph's alpha and the rendering's S, both (h,w). */
+static int part_of(const show *s, const ssdgs_real *photo, const ssdgs_real *rendered,
+                   const ssdgs_real *alpha, const ssdgs_real *shadow, int x, int y) {
+    const size_t at = (size_t)y * (size_t)s->width + (size_t)x;
+    double missing = 0, least = 1;
+    if (steepest(s, alpha, x, y) > 0.02) return OUTLINE;
+    if (!(alpha[at] > (ssdgs_real)0.999)) return BACKGROUND;
+    if (steepest(s, shadow, x, y) > 0.25) return SHADOW_EDGE;
+    for (size_t c = 0; c < 3; c++) {
+        missing = fmax(missing, (double)(photo[3 * at + c] - rendered[3 * at + c]));
+        least = fmin(least, (double)photo[3 * at + c]);
+    }
+    if (missing > 0.04 && least > 0.25) return HIGHLIGHT;
+    return shadow[at] > (ssdgs_real)0.7 ? LIT : shadow[at] < (ssdgs_real)0.3 ? DARK : HALF_LIT;
+}
+
+static int parts(show *s) {
+    static const ssdgs_real black[3] = {0, 0, 0}, white[3] = {1, 1, 1};
+    const size_t pixels = (size_t)s->width * (size_t)s->height;
+    double error[PARTS], total = 0;
+    size_t count[PARTS], all = pixels * (size_t)s->set.count;
+    memset(error, 0, sizeof error);
+    memset(count, 0, sizeof count);
+    s->planes = (ssdgs_real *)malloc(sizeof *s->planes * 8 * pixels);
+    if (!s->planes) return failed(s, "out of memory");
+    ssdgs_real *photo = s->planes, *other = photo + 3 * pixels, *alpha = other + 3 * pixels,
+               *shadow = alpha + pixels;
+    const int transfer = ssdgs_model_settings(s->model)->transfer;
+    for (int i = 0; i < s->set.count; i++) {
+        const olat_frame *frame = s->set.frames + i;
+        const ssdgs_photo from = olat_photo(frame);
+        ssdgs_light lights[OLAT_MOST_LIGHTS];
+        ssdgs_image planes;
+        memset(&planes, 0, sizeof planes);
+        planes.color = s->image;
+        planes.alpha = s->alpha;
+        planes.shadow = shadow;
+        if (ssdgs_render(s->model, &frame->camera, lights, olat_lights(&from, lights), &planes))
+            return failed(s, ssdgs_error_message(s->context));
+        ssdgs_compose(s->image, s->alpha, pixels, transfer, s->background, s->image);
+        olat_compose(&from, transfer, black, photo);
+        olat_compose(&from, transfer, white, other);
+        for (size_t p = 0; p < pixels; p++) alpha[p] = 1 - (other[3 * p] - photo[3 * p]);
+        olat_compose(&from, transfer, s->background, photo);
+        for (size_t p = 0; p < pixels; p++) {
+            const int part = part_of(s, photo, s->image, alpha, shadow, (int)(p % (size_t)s->width),
+                                     (int)(p / (size_t)s->width));
+            for (size_t c = 3 * p; c < 3 * p + 3; c++) {
+                const double off = (double)(photo[c] - s->image[c]);
+                error[part] += off * off;
+                total += off * off;
+            }
+            count[part]++;
+        }
+    }
+    printf("%.2f |", -10 * log10(total / (3 * (double)all)));
+    for (int part = 0; part < PARTS; part++)
+        printf(" %.0f %% on %.1f |", 100 * error[part] / total, 100 * (double)count[part] / (double)all);
+    printf("\n");
+    return 0;
+}
+
 /* ---- poses ---- */
 
 /* How far apart, in px, two cameras see the corners of a cube as wide as half of the bounds, on average: what
@@ -285,6 +377,8 @@ int main(int argc, char **argv) {
     memset(&s, 0, sizeof s);
     int status;
     if (!strcmp(what, "poses") && argc == 4) status = poses(&s, argv[2], argv[3]);
+    else if (!strcmp(what, "parts") && argc == 5)
+        status = open_dataset(&s, argv[2], argv[3]) || open_model(&s, argv[4]) || parts(&s);
     else if (!strcmp(what, "strip") && argc > 4 && columns > 0)
         status = strip(&s, columns, files - 1, argc - 4);
     else if (argc > 5 && (!strcmp(what, "pipeline") || !strcmp(what, "sweeps") || !strcmp(what, "backlit"))) {
@@ -303,6 +397,7 @@ int main(int argc, char **argv) {
     olat_free(&s.set);
     olat_free(&s.other);
     free(s.image);
+    free(s.planes);
     free(s.bytes);
     free(s.sheet);
     return status;

@@ -18,6 +18,7 @@ typedef struct scene {
     ssdgs_light lights[2];
     int light_count, wall;
     int shine; /* ambient light on highlights: of these c_s alone learns from it */
+    int given; /* pixels' visibility comes from elsewhere */
 } scene;
 
 static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
@@ -46,6 +47,22 @@ static void build_wall(ssdgs_model *model) {
     model->gaussians[SSDGS_OPACITY * model->capacity] = 12;
 }
 
+/* A frame's views from the lights with maps of their own, which other frames can hold. */
+static void keep_maps(const ssdgs_frame *frame, ssdgs_splat_view *views) {
+    for (int i = 1; i < frame->view_count; i++) {
+        const ssdgs_splat_view *from = frame->views + i;
+        const size_t tiles = (size_t)from->tiles_x * (size_t)from->tiles_y;
+        size_t used = 0;
+        views[i] = *from;
+        if (!from->light_map) continue;
+        for (size_t t = 0; t < tiles; t++) used += from->map_tile[t] != UINT32_MAX;
+        views[i].map_tile = (uint32_t *)malloc(tiles * sizeof(uint32_t));
+        views[i].light_map = (ssdgs_light_pixel *)malloc((used + 1) * 256 * sizeof(ssdgs_light_pixel));
+        memcpy(views[i].map_tile, from->map_tile, tiles * sizeof(uint32_t));
+        memcpy(views[i].light_map, from->light_map, used * 256 * sizeof(ssdgs_light_pixel));
+    }
+}
+
 /* A smooth objective of the image, deferred also of the blended normals and their alpha: the product with
    fixed weights. */
 static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *camera,
@@ -56,15 +73,15 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
     double sum = 0;
     if (ssdgs__frame_of_model(frame, model, camera, lights, s->light_count, &s->options, 0, 1)) exit(1);
     if (ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK)) exit(1);
-    if (fixed) { /* visibility, depth cue and flux are held fixed */
+    if (fixed) { /* the Gaussians' visibility, depth cue, flux and the lights' maps are held fixed */
         if (frame->flux) memcpy(frame->flux, fixed->flux, n * sizeof(ssdgs_real));
         memcpy(frame->visibility, fixed->visibility, n * sizeof(ssdgs_real));
         memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
-        frame->visibility_given = frame->layer_count > 0;
-        if (frame->visibility_given)
-            memcpy(frame->pixel_visibility, fixed->pixel_visibility,
-                   pixels * (size_t)s->light_count * sizeof(ssdgs_real));
+        for (int i = 1; i < frame->view_count; i++) frame->views[i] = fixed->views[i];
     }
+    frame->visibility_given = s->given;
+    for (size_t i = 0; i < pixels && s->given; i++)
+        frame->pixel_visibility[i] = 0.5 + 0.6 * sin(0.7 * (double)i);
     for (size_t i = 0; i < COUNT; i++) frame->seen[i] = 1;
     if (ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE)) exit(1);
     for (size_t c = 0; c < 3; c++)
@@ -146,21 +163,19 @@ static void run(const scene *s) {
     ssdgs_real *gradient = (ssdgs_real *)malloc(stride * SSDGS_CHANNELS * sizeof *gradient);
     ssdgs_real *global_gradient = (ssdgs_real *)malloc(model->global_count * sizeof *gradient);
     ssdgs_real *visibility = (ssdgs_real *)malloc(COUNT * 2 * sizeof *visibility);
-    ssdgs_real *pixel_visibility = (ssdgs_real *)malloc(SIDE * SIDE * 2 * sizeof *pixel_visibility);
     ssdgs_real *cue = (ssdgs_real *)malloc(COUNT * 2 * sizeof *cue);
     ssdgs_real *flux = (ssdgs_real *)malloc(COUNT * 2 * sizeof *flux);
     memcpy(gradient, frame.gradient, stride * SSDGS_CHANNELS * sizeof *gradient);
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
     memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
-    if (frame.layer_count)
-        memcpy(pixel_visibility, frame.pixel_visibility,
-               SIDE * SIDE * (size_t)s->light_count * sizeof *pixel_visibility);
     if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
     ssdgs_frame fixed = frame;
     fixed.flux = flux;
     fixed.visibility = visibility;
-    fixed.pixel_visibility = pixel_visibility;
+    ssdgs_splat_view views[1 + 2 * 6];
+    keep_maps(&frame, views);
+    fixed.views = views;
     fixed.depth_cue = cue;
     ssdgs_photo photo;
     memset(&photo, 0, sizeof photo);
@@ -258,7 +273,11 @@ static void run(const scene *s) {
     free(gradient);
     free(global_gradient);
     free(visibility);
-    free(pixel_visibility);
+    for (int i = 1; i < fixed.view_count; i++)
+        if (views[i].light_map) {
+            free(views[i].light_map);
+            free(views[i].map_tile);
+        }
     free(cue);
     free(flux);
     ssdgs_model_destroy(model);
@@ -619,6 +638,11 @@ int main(void) {
     run(&s);
     s = base, s.name = "directional and point light", s.light_count = 2,
     s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
+    run(&s);
+    s = base, s.name = "light amid them, six maps", s.light_count = 2;
+    for (int i = 0; i < 3; i++) s.lights[0].position[i] = i == 0 ? 0.5 : i == 1 ? -0.4 : 0.2;
+    run(&s);
+    s = base, s.name = "pixels' visibility given", s.given = 1;
     run(&s);
     for (int i = 0; i < 3; i++) { /* highlights per pixel, per Gaussian, and light that scatters */
         static const char *const names[3] = {"directional light", "directional light, geometric ASG",
