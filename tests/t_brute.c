@@ -1509,6 +1509,28 @@ static void test_normals(void) {
     if (!CHECK(most < (DOUBLE ? 1e-12 : 5e-5))) printf("    normals of a depth image: off by %.3g\n", most);
 }
 
+/* A fall in a later batch of a walk knows what the batches before it left. */
+static void test_map_batches(void) {
+    static ssdgs_light_pixel map[256];
+    ssdgs_real after[3][16], next[16];
+    const ssdgs_real distance[2] = {2, 3};
+    unsigned char level[16];
+    ssdgs__tile tile;
+    memset(&tile, 0, sizeof tile);
+    memset(level, 0, sizeof level);
+    tile.light_map = map;
+    for (int lane = 0; lane < 16; lane++) {
+        after[0][lane] = (ssdgs_real)0.95;
+        after[1][lane] = (ssdgs_real)0.4;
+        after[2][lane] = (ssdgs_real)0.3;
+    }
+    ssdgs__light_map_note(&tile, 1, 1u << 5, 3, after, distance, next, level);
+    const ssdgs_light_pixel *at = map + 16 + 5;
+    CHECK(level[5] == 2 && next[5] == ssdgs__map_level[2] && at->before[0] == (ssdgs_real)0.95);
+    for (int l = 0; l < 2; l++) CHECK(at->distance[l] == 2 && at->left[l] == (ssdgs_real)0.4);
+    CHECK(!level[4] && map[16 + 4].distance[0] == 0);
+}
+
 int main(int argc, char **argv) {
     const int full = argc > 1 && !strcmp(argv[1], "full");
     make_contexts();
@@ -1521,6 +1543,7 @@ int main(int argc, char **argv) {
     TEST_ROW("25", "coincident Gaussians", test_coincident());
     TEST_ROW("45", "slabs, gaps, added occluders", (test_layers(), test_gap(), test_veil(), test_occluder()));
     test_no_map();
+    test_map_batches();
     TEST_ROW("3", "images of one pixel, row, column; crops", test_crop());
     TEST_ROW("21,22", "scaled, moved, turned scenes", test_similarity());
     test_projection();
