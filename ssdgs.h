@@ -864,8 +864,8 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    Light maps  The distance of a place from the light, less bias[1], a millionth of itself, and `nearest`,
    asks four pixels, whose answers have bilinear weights. One pixel's answer is 1 ahead of its first fall and
    `behind` after its last. Between two it is what the first one left up to bias[1] ahead of the second, and
-   from there goes in a straight line to what there was before the second. In training COMPOSITE_BACKWARD asks
-   again: a pixel's dL/dv goes to its depth and to the camera, while the map is held fixed.
+   from there goes in a straight line to what there was before the second. In training COMPOSITE_BACKWARD
+   reads the maps, too: a pixel's dL/dv goes to its depth and to the camera. The maps are held fixed.
 
    SHADE  In E 1 / distance^2 is at most 1e6 / length_unit^2. The shadow network sees position (3 octaves), wi
    (3), v and the material; the scattering network position (4), wo and wi (settings.octaves), normal,
@@ -6708,13 +6708,20 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     return (1 - w) * row[0] + w * row[1];
 }
 
-/* Transmittance from a light to a place in the world, by its maps; -1 where none knows it. slope as above. */
-static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, const ssdgs_real at[3],
+/* The first view of a light, or where it would be: views are in the order of lights. */
+static int ssdgs__first_view(const ssdgs_frame *frame, int light) {
+    int first = 1;
+    while (first < frame->view_count && frame->views[first].light < light) first++;
+    return first;
+}
+
+/* Transmittance from a light to a place in the world, by its maps from its first view on; -1 where none knows
+   it. slope as above. */
+static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, int first, const ssdgs_real at[3],
                                      ssdgs_real *slope) {
     ssdgs_real passed = -1;
-    int view = 1; /* views are in the order of lights */
-    while (view < frame->view_count && frame->views[view].light < light) view++;
-    for (; view < frame->view_count && frame->views[view].light == light && passed < 0; view++)
+    for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
+         view++)
         if (frame->views[view].light_map)
             passed = ssdgs__passed_to(frame->views + view, at, frame->bias[1], slope);
     return passed;
@@ -6739,6 +6746,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
+    const int first = ssdgs__first_view(frame, light);
     for (int i = 0; i < 256; i++) {
         const int lane = i / 16 * 64 + i % 16;
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
@@ -6746,7 +6754,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
         ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
-        const ssdgs_real passed = ssdgs__passed_from(frame, light, at, NULL);
+        const ssdgs_real passed = ssdgs__passed_from(frame, light, first, at, NULL);
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
@@ -6925,13 +6933,14 @@ static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradie
         }
 }
 
-/* A shadow's edge is at the right place where the surface that receives it is: adds to the gradient of the
-   pixels' depths what dL/dv, the fourth of the light's last layer, asks of them through the light's map, and
-   to the highlights' sums what it asks of the camera. The map is held fixed. */
+/* Where a shadow's edge falls depends on the depth of the surface that receives it. Takes dL/dv, the fourth
+   of the light's last layer, through the light's map, which is held fixed: adds to the gradient of the
+   pixels' depths and, for the camera, to the highlights' sums. */
 static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
     const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
+    const int first = ssdgs__first_view(frame, light);
     for (int i = 0; i < 256; i++) {
         const int lane = i / 16 * 64 + i % 16, layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
@@ -6939,7 +6948,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
         const ssdgs_real z = pixels[layer] / cover;
         ssdgs__place_of_pixel(k, tile, i, z, ray, at);
-        if (ssdgs__passed_from(frame, light, at, slope) < 0) continue;
+        if (ssdgs__passed_from(frame, light, first, at, slope) < 0) continue;
         for (int c = 0; c < 3; c++) { /* at = eye + z (x, y, 1) R */
             const ssdgs_real d = dv[lane] * slope[c];
             along += d * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
@@ -14262,8 +14271,8 @@ SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const 
     a->factor = F(shadow_factor)(k, a->visibility, a->residual);
 }
 
-/* Writes the gradient of the layer with the residual and, as its fourth, the map's; returns what goes to the
-   cover, times that. */
+/* Writes the gradient of the layer with the residual and, as its fourth, dL/dv of the map's v; returns what
+   goes to the cover, times that. */
 SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
@@ -14302,8 +14311,8 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
     }
 }
 
-/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7; adds to sums
-   (SSDGS__HIGHLIGHT_SUMS). */
+/* gradient: layer 0 holds dL/d(pixel). Adds to layers 1 to 4, writes 5 to 7 and dL/dv as the fourth of 7;
+   adds to sums (SSDGS__HIGHLIGHT_SUMS). */
 SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile *tile, const R *layers,
                                      const R *visibility, R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
