@@ -9440,6 +9440,9 @@ struct ssdgs_trainer {
     ssdgs__buffer sums; /* of a batch */
 };
 
+#define SSDGS__RATE(field, first, last) \
+    o.rates.field.start = (ssdgs_real)(first), o.rates.field.end = (ssdgs_real)(last)
+
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     ssdgs_train_options o;
     memset(&o, 0, sizeof o);
@@ -9466,21 +9469,18 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.prune_outside = (ssdgs_real)0.02;
     o.adam_epsilon = (ssdgs_real)0.1;
     o.finish = (ssdgs_real)0.3;
-#define SSDGS__RATE(field, first, last) \
-    o.rates.field.start = (ssdgs_real)(first), o.rates.field.end = (ssdgs_real)(last)
-    SSDGS__RATE(position, 1.6e-4, 1.6e-6);
+    SSDGS__RATE(position, 6.4e-4, 6.4e-6);
     SSDGS__RATE(opacity, 0.05, 0.05);
-    SSDGS__RATE(scale, 0.005, 0.005);
+    SSDGS__RATE(scale, 0.015, 0.005);
     SSDGS__RATE(rotation, 0.001, 0.001);
-    SSDGS__RATE(color, 0.01, 0.01);
+    SSDGS__RATE(color, 0.03, 0.01);
     SSDGS__RATE(asg, 0.01, 1e-4);
     SSDGS__RATE(frame, 0.01, 1e-4);
     SSDGS__RATE(material, 0.001, 1e-5);
-    SSDGS__RATE(shadow, 0.001, 1e-5);
-    SSDGS__RATE(scattering, 0.001, 1e-5);
+    SSDGS__RATE(shadow, 0.003, 3e-5);
+    SSDGS__RATE(scattering, 0.003, 3e-5);
     SSDGS__RATE(camera, 1e-3, 1e-5);
     SSDGS__RATE(light, 1e-3, 5e-5);
-#undef SSDGS__RATE
     return o;
 }
 
@@ -9495,8 +9495,14 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.densify_shadow = 0;
     o.prune_weight = o.prune_outside = o.adam_epsilon = 0;
     o.finish = 1;
+    SSDGS__RATE(position, 1.6e-4, 1.6e-6);
+    SSDGS__RATE(scale, 0.005, 0.005);
+    SSDGS__RATE(color, 0.01, 0.01);
+    SSDGS__RATE(shadow, 0.001, 1e-5);
+    SSDGS__RATE(scattering, 0.001, 1e-5);
     return o;
 }
+#undef SSDGS__RATE
 
 /* The iteration on the scale of a 60,000-iteration run. */
 static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) {
