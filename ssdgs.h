@@ -9477,8 +9477,8 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     SSDGS__RATE(asg, 0.01, 1e-4);
     SSDGS__RATE(frame, 0.01, 1e-4);
     SSDGS__RATE(material, 0.001, 1e-5);
-    SSDGS__RATE(shadow, 0.003, 3e-5);
-    SSDGS__RATE(scattering, 0.003, 3e-5);
+    SSDGS__RATE(shadow, 0.001, 1e-5);
+    SSDGS__RATE(scattering, 0.001, 1e-5);
     SSDGS__RATE(camera, 1e-3, 1e-5);
     SSDGS__RATE(light, 1e-3, 5e-5);
     return o;
@@ -9498,8 +9498,6 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(scale, 0.005, 0.005);
     SSDGS__RATE(color, 0.01, 0.01);
-    SSDGS__RATE(shadow, 0.001, 1e-5);
-    SSDGS__RATE(scattering, 0.001, 1e-5);
     return o;
 }
 #undef SSDGS__RATE
