@@ -705,7 +705,7 @@ typedef struct ssdgs_train_options {
 } ssdgs_train_options;
 
 SSDGS_API ssdgs_train_options ssdgs_train_options_default(void);
-/* The paper's order, density control and length. */
+/* The paper's order, density control, rates and length. */
 SSDGS_API ssdgs_train_options ssdgs_train_options_published(void);
 
 typedef struct ssdgs_train_stats {

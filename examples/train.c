@@ -59,6 +59,7 @@ static const char *const help[] = {
     "  --background COLOUR      black (default) or white: behind transparent pixels, around opaque",
     "                           objects",
     "  --preset NAME            default, or published: the paper's model, order of terms, density control",
+    "                           and rates",
     "  --transfer NAME          srgb: shade in linear light, compare as seen (default); none (published)",
     "                           or, for OpenEXR, linear: fit the numbers in the files",
     "  --schedule NAME          order of the terms: merged (default), progressive (published), joint,",

@@ -1344,6 +1344,17 @@ static void test_schedule(void) {
           ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 5000, learns) == SSDGS_ALL_TERMS);
 }
 
+/* The published preset has the paper's learning rates, whatever the default has. */
+static void test_published_rates(void) {
+    static const double paper[10][2] = {{1.6e-4, 1.6e-6}, {0.05, 0.05}, {0.005, 0.005}, {0.001, 0.001},
+                                        {0.01, 0.01},     {0.01, 1e-4}, {0.01, 1e-4},   {0.001, 1e-5},
+                                        {0.001, 1e-5},    {0.001, 1e-5}}; /* in the order of ssdgs_rates */
+    const ssdgs_train_options o = ssdgs_train_options_published();
+    const ssdgs_rate *rates = &o.rates.position;
+    for (int i = 0; i < 10; i++)
+        CHECK(rates[i].start == (ssdgs_real)paper[i][0] && rates[i].end == (ssdgs_real)paper[i][1]);
+}
+
 /* What is not drawn, or was in another frame, does not reach what is. */
 static void test_isolation(void) {
     static ssdgs_real color[SIDE * SIDE * 3], again[SIDE * SIDE * 3];
@@ -2643,5 +2654,6 @@ int main(void) {
     test_one_light();
     test_anchor();
     test_schedule();
+    test_published_rates();
     TEST_END();
 }
