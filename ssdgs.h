@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.1.0 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.0 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -164,6 +164,12 @@ ssdgs.h DOES NOT
   (examples/olat.h does), trace light between objects, undistort lenses, contain GPU kernels
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
+CHANGES
+  0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
+         For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.
+         For real photographs: a room's light, several lamps, exposures; notes on what cannot be right.
+  Models of 0.1.0 load, its checkpoints do not.
+
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
   >>model >>frame                    parameters and networks; a frame's memory, views and cache
@@ -183,7 +189,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 100 /* 0.1.0; written into files */
+#define SSDGS_VERSION 200 /* 0.2.0; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)

@@ -625,6 +625,34 @@ static void test_words(void) {
 
 /* Far from 0 files hold positions as doubles, in the coordinates of the dataset; they come back to 1e-9 of
    what they were. */
+/* Files of older versions load, 0.1.0's are of 100; of newer ones nothing is known. */
+static void test_versions(void) {
+    static const struct {
+        unsigned char version;
+        int loads;
+    } cases[4] = {{0, 0}, {100, 1}, {SSDGS_VERSION, 1}, {SSDGS_VERSION + 1, 0}};
+    ssdgs_model *model = make_model(3);
+    bytes file = saved(model);
+    const document d = parse(&file);
+    unsigned char *version = NULL;
+    for (int t = 0; t < d.tables; t++)
+        for (int c = 0; c < d.table[t].columns; c++)
+            if (!strcmp(d.table[t].name, "ssdgs_settings") && !strcmp(d.table[t].column[c].name, "version"))
+                version = file.data + (d.table[t].data - file.data) + 4 * c;
+    for (int i = 0; i < 4 && CHECK(version != NULL); i++) {
+        ssdgs_model *back = NULL;
+        *version = cases[i].version;
+        if (!cases[i].loads) {
+            CHECK(refused(file.data, file.size) && strstr(ssdgs_error_message(context), ": of version "));
+            continue;
+        }
+        CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK && same(model, back));
+        ssdgs_model_destroy(back);
+    }
+    ssdgs_model_destroy(model);
+    free(file.data);
+}
+
 static void test_origin(void) {
     const ssdgs_real origin[3] = {5000000, -650000, (ssdgs_real)0.5};
     ssdgs_model *home = make_model(7), *model = NULL, *back = NULL;
@@ -1079,6 +1107,7 @@ int main(void) {
     TEST_ROW("81", "every variant of PLY", test_variants());
     TEST_ROW("82", "other tools' files", (test_foreign(), test_words(), test_mending()));
     test_edited();
+    test_versions();
     test_origin();
     test_numbers();
     test_order();
