@@ -71,6 +71,17 @@ check "into files that are links to each other" says 0 "4 images" relight --out 
 check "relight again" says 0 "4 images" relight --out "$out/relit" --sheet "$out/sheet.png" --components
 check "the dataset is as it was" unchanged
 
+# where the error lies: all of it, on all pixels; its mean is the views'
+shares() {
+    awk -F'[|]' 'FNR == NR { if (/"file"/) { sub(/.*"psnr": /, ""); sum += 10 ^ (-$0 / 10); views++ } next }
+        { for (i = 2; i < NF; i++) { split($i, share, / %| on /); error += share[1]; pixels += share[3] } }
+        END { off = $1 + 10 * log(sum / views) / log(10)
+            exit !(NF == 9 && error > 96 && error < 104 && pixels > 99.6 && pixels < 100.4 && off > -0.01 && off < 0.01) }' \
+        "$out/relit/metrics.json" "$out/log"
+}
+check "show parts" says 0 "%" "$build/show" parts "$set" black "$model"
+check "its shares" shares
+
 # a level of detail is written, and is what the pictures show
 check "--reduce" says 0 "4 images" relight --out "$out/reduced" --reduce 50
 check "as reduced" says 0 "4 images" "$build/relight" "$out/reduced/reduced.ply" "$set" --out "$out/reduced2" --threads 1
