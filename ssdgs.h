@@ -947,7 +947,7 @@ typedef struct ssdgs_record {
 /* A pixel of a light's map: where on its way the transmittance falls. */
 typedef struct ssdgs_light_pixel {
     ssdgs_real
-        distance[3]; /* at which it falls below 0.9, 0.5, 0.1, less the nearest Gaussian's; 1e30: nowhere */
+        distance[3]; /* at which it falls below 0.98, 0.5, 0.1, less the nearest Gaussian's; 1e30: nowhere */
     ssdgs_real left[2];   /* what is left after the first two steps */
     ssdgs_real before[2]; /* what there was before the last two */
     ssdgs_real behind;    /* what is left behind all */
@@ -1500,7 +1500,7 @@ static const ssdgs_real ssdgs__micro_y[16] = {0.5, 0.5, 0.5, 0.5, 4.5,  4.5,  4.
 #if SSDGS__NEON
 static const uint32_t ssdgs__lane_bits[4] = {1, 2, 4, 8};
 #endif
-static const ssdgs_real ssdgs__map_level[SSDGS__MAP_STEPS] = {(ssdgs_real)0.9, (ssdgs_real)0.5,
+static const ssdgs_real ssdgs__map_level[SSDGS__MAP_STEPS] = {(ssdgs_real)0.98, (ssdgs_real)0.5,
                                                               (ssdgs_real)0.1};
 /* SSIM's window: 11 taps of a Gaussian of sigma 1.5, normalised. */
 static const ssdgs_real ssdgs__window[11] = {

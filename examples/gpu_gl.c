@@ -1597,7 +1597,7 @@ void main() {
 }
 );
 
-/* The light's map, where on its way the transmittance falls below 0.9, 0.5, 0.1, and with flux the sums of solid
+/* The light's map, where on its way the transmittance falls below 0.98, 0.5, 0.1, and with flux the sums of solid
    angle x blend weight. */
 static const char gpu_walk_map[] = GPU_GLSL(
 layout(std430, binding = 3) readonly buffer depths { float depth[]; };
@@ -1609,7 +1609,7 @@ const uint window = 64u;
 shared splat splats[64];
 shared float distances[64];
 shared uint masks[64];
-const float levels[4] = float[4](0.9, 0.5, 0.1, -1);
+const float levels[4] = float[4](0.98, 0.5, 0.1, -1);
 uint fallen;
 vec3 falls;
 vec2 left, before;

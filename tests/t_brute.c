@@ -347,7 +347,7 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
    known, all of these a little higher or lower: from the light bias before a fall on it goes straight to what
    there was just before it. */
 static double passed(const splat *p, int n, int x, int y, double distance, double higher) {
-    static const double level[3] = {0.9, 0.5, 0.1};
+    static const double level[3] = {0.98, 0.5, 0.1};
     const double thick = ((double)s.settings.light_map.bias + 1e-5) * (double)s.settings.length_unit;
     double t = 1, fall[3], before[3], left[3];
     int falls = 0;
@@ -1123,7 +1123,9 @@ static void test_veil(void) {
     settings.shadow.layers = 0;
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     if (!CHECK(!ssdgs_model_create(best(), &settings, FLOOR + 1, &model))) exit(1);
-    for (int tenth = 0; tenth < 10; tenth++) { /* what the veil takes */
+    for (int veil = 0; veil < 12; veil++) {
+        static const double takes[12] = {0, 0.015, 0.03, 0.07, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.8, 0.9};
+        const double taken = takes[veil];
         const ssdgs_model_view v = ssdgs_model_arrays(model);
         for (int i = 0; i <= FLOOR; i++) {
             ssdgs_real *p = v.gaussians + i;
@@ -1135,16 +1137,16 @@ static void test_veil(void) {
                 p[(size_t)(SSDGS_LOG_SCALE + c) * v.stride] = (ssdgs_real)log(c == 2       ? 0.002
                                                                               : i == FLOOR ? 1
                                                                                            : 0.016);
-            p[SSDGS_OPACITY * v.stride] = (ssdgs_real)(i < FLOOR ? 6
-                                                       : tenth   ? log(tenth / (10.0 - tenth))
-                                                                 : -20);
+            p[SSDGS_OPACITY * v.stride] = (ssdgs_real)(i < FLOOR   ? 6
+                                                       : taken > 0 ? log(taken / (1 - taken))
+                                                                   : -20);
             p[(SSDGS_ASG_WEIGHT + 3) * v.stride] = -20; /* hard */
         }
         if (!CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &out, NULL))) exit(1);
         const int i = PX / 2 * PX + PX / 2;
         const double shadow = (double)(out.shadow[i] / out.alpha[i]);
-        if (!CHECK(fabs(shadow - (tenth < 2 ? 1 : 1 - 0.1 * tenth)) < 0.01))
-            printf("    a veil of %d tenths leaves %g\n", tenth, shadow);
+        if (!CHECK(fabs(shadow - (taken < 0.02 ? 1 : 1 - taken)) < 0.005))
+            printf("    a veil of %g leaves %g\n", taken, shadow);
     }
     ssdgs_model_destroy(model);
 }
