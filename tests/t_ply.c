@@ -623,8 +623,6 @@ static void test_words(void) {
     }
 }
 
-/* Far from 0 files hold positions as doubles, in the coordinates of the dataset; they come back to 1e-9 of
-   what they were. */
 /* Files of older versions load, 0.1.0's are of 100; of newer ones nothing is known. */
 static void test_versions(void) {
     static const struct {
@@ -653,6 +651,8 @@ static void test_versions(void) {
     free(file.data);
 }
 
+/* Far from 0 files hold positions as doubles, in the coordinates of the dataset; they come back to 1e-9 of
+   what they were. */
 static void test_origin(void) {
     const ssdgs_real origin[3] = {5000000, -650000, (ssdgs_real)0.5};
     ssdgs_model *home = make_model(7), *model = NULL, *back = NULL;
