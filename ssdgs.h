@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.0 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.1 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -165,10 +165,11 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
+  0.2.1  A highlight's colour is its energy, however narrow: even glossy faces come out brighter, sooner.
   0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
          For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.
          For real photographs: a room's light, several lamps, exposures; notes on what cannot be right.
-  Models of 0.1.0 load, its checkpoints do not.
+  Models of older versions load, their checkpoints do not.
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
@@ -189,7 +190,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 200 /* 0.2.0; written into files */
+#define SSDGS_VERSION 201 /* 0.2.1; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
@@ -374,7 +375,7 @@ typedef struct ssdgs_gaussian {
     ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
     ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
-    ssdgs_real specular[3];   /* c_s: 0 = none, about 1 for a dielectric of the highlight's sharpness */
+    ssdgs_real specular[3];   /* c_s: 0 = none; deferred, the lobe's height: ssdgs_gaussian_mirror() */
     ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
     ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight: 1 = broad, more is narrower */
     ssdgs_real f0;            /* of a deferred highlight, at normal incidence: 0.04 for dielectrics */
@@ -805,7 +806,7 @@ typedef struct ssdgs_model_view {
     int count;             /* Gaussians */
     size_t stride;         /* reals from one plane to the next */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, stride): scale = exp, opacity = sigmoid, colours and weights =
-                              softplus */
+                              softplus; deferred, ssdgs_gaussian's specular is sqrt(lambda mu) times c_s */
     ssdgs_real *asg_basis; /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
     ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
     ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
@@ -2394,6 +2395,7 @@ struct ssdgs_model {
     uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must
                              follow */
     int references;       /* itself and its trainers: the last that goes frees it */
+    int version;          /* that wrote its file, 0 where an editor dropped that; of others this one */
     int count;
     size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -2662,6 +2664,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     context->references++;
     model->references = 1;
     model->settings = s;
+    model->version = SSDGS_VERSION;
     model->revision = ++context->revisions;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&s, first);
@@ -2789,6 +2792,27 @@ static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
     return g->softness >= 0 && g->softness <= 1 ? NULL : "softness";
 }
 
+/* sqrt(lambda mu) of raw ASG weights `stride` apart: with it c_s is a deferred highlight's energy, however
+   narrow, and c_s times it the height of its lobe. */
+static ssdgs_real ssdgs__lobe_height(const ssdgs_real *raw, size_t stride) {
+    ssdgs_real sum = 0;
+    for (int i = 0; i < 2; i++) {
+        const ssdgs_real log_sharp = raw[(size_t)i * stride];
+        sum += log_sharp > SSDGS__SHARPEST    ? SSDGS__SHARPEST
+               : log_sharp < -SSDGS__SHARPEST ? -SSDGS__SHARPEST
+                                              : log_sharp;
+    }
+    return ssdgs__exp_scalar(sum / 2);
+}
+
+/* Writes c_s of a deferred highlight of these heights, after its ASG weights. */
+static void ssdgs__specular_store(const ssdgs_real heights[3], ssdgs_real *plane, size_t stride) {
+    const double height = (double)ssdgs__lobe_height(plane + SSDGS_ASG_WEIGHT * stride, stride);
+    for (size_t i = 0; i < 3; i++)
+        plane[(SSDGS_SPECULAR + i) * stride] =
+            (ssdgs_real)ssdgs__softplus_inverse((double)heights[i] / height);
+}
+
 /* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that has
    the normal already stays: what it says of directions along the surface would be lost. */
 static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
@@ -2826,11 +2850,14 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
     }
     for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++) raw[SSDGS_MATERIAL + i] = (double)g->material[i];
     for (int i = 0; i < SSDGS_CHANNELS; i++) plane[(size_t)i * stride] = (ssdgs_real)raw[i];
+    if (deferred) ssdgs__specular_store(g->specular, plane, stride);
 }
 
-static void ssdgs__gaussian_load(ssdgs_gaussian *g, const ssdgs_real *plane, size_t stride) {
+/* deferred 0: c_s as it is, not a lobe's height. */
+static void ssdgs__gaussian_load(ssdgs_gaussian *g, int deferred, const ssdgs_real *plane, size_t stride) {
     ssdgs_real raw[SSDGS_CHANNELS];
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = plane[(size_t)i * stride];
+    const ssdgs_real height = deferred ? ssdgs__lobe_height(raw + SSDGS_ASG_WEIGHT, 1) : 1;
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw + SSDGS_FRAME, q, r);
     for (int i = 0; i < 3; i++) {
@@ -2838,7 +2865,7 @@ static void ssdgs__gaussian_load(ssdgs_gaussian *g, const ssdgs_real *plane, siz
         g->scale[i] = ssdgs__exp_scalar(raw[SSDGS_LOG_SCALE + i]);
         g->normal[i] = r[3 * i + 2];
         g->diffuse[i] = ssdgs__softplus_scalar(raw[SSDGS_DIFFUSE + i]);
-        g->specular[i] = ssdgs__softplus_scalar(raw[SSDGS_SPECULAR + i]);
+        g->specular[i] = ssdgs__softplus_scalar(raw[SSDGS_SPECULAR + i]) * height;
         g->scattering[i] = ssdgs__softplus_scalar(raw[SSDGS_SCATTERING + i]);
     }
     ssdgs__rotation_scalar(raw + SSDGS_ROTATION, g->rotation, r);
@@ -2853,7 +2880,7 @@ SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void) {
     ssdgs_real plane[SSDGS_CHANNELS];
     ssdgs__gaussian_reset(plane, 1, 0);
     ssdgs_gaussian g;
-    ssdgs__gaussian_load(&g, plane, 1);
+    ssdgs__gaussian_load(&g, 1, plane, 1);
     return g;
 }
 
@@ -2924,7 +2951,9 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
     ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_get");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
-    if (!result) ssdgs__gaussian_load(gaussian, model->gaussians + index, model->capacity);
+    if (!result)
+        ssdgs__gaussian_load(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, model->gaussians + index,
+                             model->capacity);
     return ssdgs__leave(model->context, result);
 }
 
@@ -3005,6 +3034,15 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
 }
 
+/* Files up to 0.2.0 have heights where c_s is now. */
+static void ssdgs__specular_of_heights(ssdgs_model *model) {
+    for (size_t i = 0; i < (size_t)model->count && model->settings.asg == SSDGS_ASG_DEFERRED; i++) {
+        ssdgs_gaussian g;
+        ssdgs__gaussian_load(&g, 0, model->gaussians + i, model->capacity);
+        ssdgs__specular_store(g.specular, model->gaussians + i, model->capacity);
+    }
+}
+
 static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *original) {
     if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
     if (model->settings.baked || original->settings.baked)
@@ -3026,6 +3064,8 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
             x[i] = (ssdgs_real)((double)x[i] + move);
     }
     model->settings = original->settings;
+    if (!model->version && original->version <= 200) ssdgs__specular_of_heights(model);
+    model->version = original->version;
     ssdgs__model_changed(model);
     return SSDGS_OK;
 }
@@ -5948,16 +5988,14 @@ static ssdgs_real ssdgs__lobe_energy(const ssdgs__lighting *k, const ssdgs_real 
                                      ssdgs_real narrower) {
     ssdgs_real sum = 0;
     const ssdgs_real *raw = gauss + SSDGS_ASG_WEIGHT * SSDGS__BLOCK + s;
-    ssdgs_real width = (raw[0] + raw[SSDGS__BLOCK]) / 2;
-    width = width > SSDGS__SHARPEST ? SSDGS__SHARPEST : width < -SSDGS__SHARPEST ? -SSDGS__SHARPEST : width;
-    narrower *= k->deferred ? ssdgs__exp_scalar(width) : 1;
+    narrower *= k->deferred ? ssdgs__lobe_height(raw, SSDGS__BLOCK) : 1;
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         const ssdgs_real *b = k->basis + 12 * j;
         sum += k->deferred ? b[10] * ssdgs__lobe_share(b[9] * narrower, 1)
                            : ssdgs__softplus_scalar(raw[j * SSDGS__BLOCK]) *
                                  ssdgs__lobe_share(SSDGS__SQRT(b[9] * b[10]) * narrower, 0);
     }
-    return (ssdgs_real)12.566370614359172 * sum; /* 4 pi */
+    return (ssdgs_real)12.566370614359172 * sum * (k->deferred ? narrower : 1); /* 4 pi */
 }
 
 /* Adds to a block's scattering rows c_sss times what comes out of the medium: transport's rows are in units
@@ -8509,6 +8547,7 @@ typedef struct ssdgs__ply {
     ssdgs_context *context;
     const char *name; /* of the file, for messages */
     const unsigned char *begin, *at, *end;
+    int version;       /* that wrote it; 0: it does not say */
     double origin[3];  /* to be taken from positions */
     double color_unit; /* of red, green and blue: by their type */
     ssdgs__ply_format format;
@@ -8853,6 +8892,7 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     if (settings->version < 1 || settings->version > SSDGS_VERSION)
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name,
                            settings->version);
+    ply->version = settings->version;
     settings->version = SSDGS_VERSION;
     ply->context->subject = ply->name;
     ply->context->subject_number = -1;
@@ -9019,6 +9059,8 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     for (int kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
+    if (!result) (*out)->version = ply->version;
+    if (!result && ply->version && ply->version <= 200) ssdgs__specular_of_heights(*out);
     return result;
 }
 
@@ -10539,7 +10581,7 @@ static double ssdgs__blob_area(const double scale[3]) {
 
 static void ssdgs__blob_load(const ssdgs_model *model, size_t index, double seen, ssdgs__blob *b) {
     ssdgs_gaussian g;
-    ssdgs__gaussian_load(&g, model->gaussians + index, model->capacity);
+    ssdgs__gaussian_load(&g, 0, model->gaussians + index, model->capacity); /* c_s, not its lobe's height */
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(g.rotation, q, r);
     double scale[3];
@@ -14041,8 +14083,18 @@ SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
     return value;
 }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s, which deferred is
-   1. */
+/* Deferred: lambda or mu of its logarithm. */
+SSDGS__FI V F(sharpness)(V raw) {
+    return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw)));
+}
+/* As ssdgs__lobe_height(): sqrt(lambda mu). */
+SSDGS__FI V F(lobe_height)(const R *gauss) {
+    const R *raw = gauss + SSDGS_ASG_WEIGHT * SSDGS__BLOCK;
+    return VSQRT(VMUL(F(sharpness)(VLOAD(raw)), F(sharpness)(VLOAD(raw + SSDGS__BLOCK))));
+}
+
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s: deferred the
+   lobe's height, as the pixel finds the rest. */
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
@@ -14062,7 +14114,7 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
                 d = VFMA(weight, lobe, d);
             }
         VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s,
-               k->deferred ? VSET(1) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
+               k->deferred ? F(lobe_height)(gauss + s) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
     }
 }
 
@@ -14081,8 +14133,14 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             dn[i] = VLOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
             dlocal[i] = VSET(0);
         }
-        const V df =
-            k->deferred ? VSET(0) : VSEL(g.half, VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s), VSET(0));
+        const V dgloss = VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s),
+                df = k->deferred ? VSET(0) : VSEL(g.half, dgloss, VSET(0));
+        const V dlog = VMUL(VMUL(VSET(0.5), dgloss), F(lobe_height)(gauss + s));
+        for (int j = 0; j < 2 && k->deferred; j++) {
+            const V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
+            R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
+            VSTORE(dw, VADD(VSEL(VLT(VABS(raw), VSET(SSDGS__SHARPEST)), dlog, VSET(0)), VLOAD(dw)));
+        }
         const V dlobe = VMUL(df, g.fresnel);
         if (k->specular && !k->deferred)
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
@@ -14149,10 +14207,11 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
        S (D + M (n.wi / (wo.h)^2) (F0 + (1 - F0) (1 - wo.h)^5) sum_j a_j e_j)
        e_j = exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))
 
-   D = (c_d / pi) f_d E and M = c_s E are blended, and so are the normal n and, over the pixel's alpha, F0 and
-   Q = lambda xx' + mu yy' of the frames' axes. p is h less its part along n: t_j chooses between the normals'
-   mean, right for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what shadowing
-   and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0, wo.h >= SSDGS__GRAZING.
+   D = (c_d / pi) f_d E and M = c_s sqrt(lambda mu) E are blended, and so are the normal n and, over the
+   pixel's alpha, F0 and Q = lambda xx' + mu yy' of the frames' axes. sqrt(lambda mu): as much light is sent
+   back, however narrow the lobe. p is h less its part along n: t_j chooses between the normals' mean, right
+   for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what shadowing and masking
+   of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0, wo.h >= SSDGS__GRAZING.
 
    S is eq. 8's of two blended things: the shadow network's answers, and (1 - soft) v + soft v_g. v is the
    transmittance to the place at the pixel's depth, from the light map. v_g is the Gaussians' own. Softness is
@@ -14441,10 +14500,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
     for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
 }
 
-/* Deferred: lambda or mu of its logarithm, F0 of its logit from 0.04's on, softness of its logit. */
-SSDGS__FI V F(sharpness)(V raw) {
-    return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw)));
-}
+/* Deferred: F0 of its logit from 0.04's on. */
 SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_LOGIT))); }
 
 /* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0,

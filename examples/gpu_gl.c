@@ -644,13 +644,17 @@ void find_frame() {
     vec3 to = eye.xyz - place;
     wo = to / sqrt(max(dot(to, to), eye.w));
 }
+/* Deferred: sqrt(lambda mu). */
+float lobe_height() {
+    return power_of_e(0.5 * (clamp(raw(asg_weight), -12.0, 12.0) + clamp(raw(asg_weight + 1), -12.0, 12.0)));
+}
 void find_geometry(lamp l) {
     bool directional = l.place.w > 0.0;
     vec3 to = directional ? l.place.xyz : l.place.xyz - place;
     irradiance = directional ? 1.0 : 1.0 / max(dot(to, to), eye.w);
     wi = to * sqrt(irradiance);
     cosine = max(0.0, dot(axes[2], wi));
-    gloss = 1.0; /* deferred: the pixels' */
+    gloss = lobe_height(); /* deferred: the pixels' is the rest */
     if (on(deferred)) return;
     vec3 h;
     float missing;
@@ -765,13 +769,13 @@ float lobe_share(float x) {
 }
 float lobe_energy() {
     float sum = 0.0;
-    float narrower = power_of_e(clamp(0.5 * (raw(asg_weight) + raw(asg_weight + 1)), -12.0, 12.0));
+    float narrower = lobe_height();
     for (int j = 0; j < 8; j++) {
         vec4 b = basis[3 * j + 2];
         if (on(deferred)) sum += b.z * lobe_share(b.y * narrower);
         else sum += softplus(raw(asg_weight + j)) * lobe_share(sqrt(basis[3 * j].w * basis[3 * j + 1].w));
     }
-    return 12.566370614359172 * sum;
+    return 12.566370614359172 * sum * (on(deferred) ? narrower : 1.0);
 }
 /* The irradiance of ambient light on a surface with a normal. */
 vec3 ambient_at(vec3 n) {

@@ -336,7 +336,7 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
             const double arrives = falloff * (double)lamp->intensity[i];
             color[i] +=
                 (g->diffuse[i] * diffuse + g->specular[i] * fresnel * d) * arrives * out->value[V + light];
-            out->value[M + 3 * light + i] = g->specular[i] * arrives;
+            out->value[M + 3 * light + i] = g->specular[i] * sqrt(g->sharp[0] * g->sharp[1]) * arrives;
             out->value[D + 3 * light + i] = g->diffuse[i] * diffuse * arrives;
             if (s.settings.asg == SSDGS_ASG_DEFERRED) color[i] = 0;
         }
