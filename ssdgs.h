@@ -9060,7 +9060,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     if (!result) (*out)->version = ply->version;
-    if (!result && ply->version && ply->version <= 200) ssdgs__specular_of_heights(*out);
+    if (!result && ply->version <= 200) ssdgs__specular_of_heights(*out);
     return result;
 }
 

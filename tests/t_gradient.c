@@ -418,23 +418,47 @@ static void test_edges(void) {
     ssdgs_model_destroy(model);
 }
 
-/* Deferred lobes get neither sharper nor broader than the bound, so what lies beyond it has no gradient. */
+/* Deferred lobes get neither sharper nor broader than the bound, so what lies beyond it has no gradient:
+   neither through their tensor nor through their height. */
 static void test_sharpest(void) {
     static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK],
-        dgauss[SSDGS_CHANNELS * SSDGS__BLOCK];
+        dgauss[SSDGS_CHANNELS * SSDGS__BLOCK], rows[SSDGS__ROWS * SSDGS__BLOCK],
+        lane_sums[SSDGS__LANE_SUMS * 16];
     static const double raw[4] = {-SSDGS__SHARPEST - 1, -1, 1, SSDGS__SHARPEST + 1};
+    static ssdgs__lighting lighting;
+    lighting.deferred = lighting.specular = lighting.directional = 1;
+    lighting.light[2] = lighting.eye[2] = 1;
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         gauss[SSDGS_FRAME * SSDGS__BLOCK + s] = 1;
-        for (int i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[s % 4];
+        for (int i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[(s >> 2 * i) % 4];
         for (int i = 0; i < SSDGS__LOBE; i++) drows[i * SSDGS__BLOCK + s] = 1;
     }
-    context->k->lobe_backward(gauss, drows, dgauss);
-    for (int s = 0; s < SSDGS__BLOCK; s++)
-        for (int i = 0; i < 2; i++) {
-            const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s],
-                         want = s % 4 == 0 || s % 4 == 3 ? 0 : exp(raw[s % 4]);
-            CHECK(fabs(d - want) < 1e-14);
+    for (int height = 0; height < 2; height++) {
+        memset(dgauss, 0, sizeof dgauss);
+        if (!height) context->k->lobe_backward(gauss, drows, dgauss);
+        else {
+            context->k->reflect(&lighting, gauss, rows);
+            memset(drows, 0, sizeof drows);
+            for (int s = 0; s < SSDGS__BLOCK; s++) drows[SSDGS__GLOSS * SSDGS__BLOCK + s] = 1;
+            context->k->reflect_backward(&lighting, gauss, drows, dgauss, lane_sums);
         }
+        for (int s = 0; s < SSDGS__BLOCK; s++) {
+            double sum = 0;
+            for (int i = 0; i < 2; i++)
+                sum += fmax(-SSDGS__SHARPEST, fmin(SSDGS__SHARPEST, raw[(s >> 2 * i) % 4])) / 2;
+            if (height) {
+                CHECK(fabs(rows[SSDGS__GLOSS * SSDGS__BLOCK + s] - exp(sum)) < 1e-14 * exp(sum));
+                CHECK(fabs(ssdgs__lobe_height(gauss + SSDGS_ASG_WEIGHT * SSDGS__BLOCK + s, SSDGS__BLOCK) -
+                           exp(sum)) < 1e-14 * exp(sum));
+            }
+            for (int i = 0; i < 2; i++) {
+                const double d = dgauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s],
+                             at = raw[(s >> 2 * i) % 4];
+                const double want = fabs(at) > SSDGS__SHARPEST ? 0 : height ? exp(sum) / 2 : exp(at);
+                CHECK(fabs(d - want) <= 1e-14 * (1 + want));
+            }
+        }
+    }
 }
 
 /* Blended layers of tiles without a Gaussian are 0 whatever the frame before left there: normals beside them
