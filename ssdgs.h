@@ -165,7 +165,7 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
-  0.2.1  A highlight's colour is its energy, however narrow: even glossy faces come out brighter, sooner.
+  0.2.1  A highlight's colour is its energy, however narrow its lobe: glossy scenes train a little better.
   0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
          For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.
          For real photographs: a room's light, several lamps, exposures; notes on what cannot be right.
