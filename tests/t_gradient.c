@@ -421,9 +421,9 @@ static void test_edges(void) {
 /* Deferred lobes get neither sharper nor broader than the bound, so what lies beyond it has no gradient:
    neither through their tensor nor through their height. */
 static void test_sharpest(void) {
-    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], drows[SSDGS__LOBE * SSDGS__BLOCK],
+    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], dlobe[SSDGS__LOBE * SSDGS__BLOCK],
         dgauss[SSDGS_CHANNELS * SSDGS__BLOCK], rows[SSDGS__ROWS * SSDGS__BLOCK],
-        lane_sums[SSDGS__LANE_SUMS * 16];
+        drows[SSDGS__ROWS * SSDGS__BLOCK], lane_sums[SSDGS__LANE_SUMS * 16];
     static const double raw[4] = {-SSDGS__SHARPEST - 1, -1, 1, SSDGS__SHARPEST + 1};
     static ssdgs__lighting lighting;
     lighting.deferred = lighting.specular = lighting.directional = 1;
@@ -431,15 +431,14 @@ static void test_sharpest(void) {
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         gauss[SSDGS_FRAME * SSDGS__BLOCK + s] = 1;
         for (int i = 0; i < 2; i++) gauss[(SSDGS_ASG_WEIGHT + i) * SSDGS__BLOCK + s] = raw[(s >> 2 * i) % 4];
-        for (int i = 0; i < SSDGS__LOBE; i++) drows[i * SSDGS__BLOCK + s] = 1;
+        for (int i = 0; i < SSDGS__LOBE; i++) dlobe[i * SSDGS__BLOCK + s] = 1;
+        drows[SSDGS__GLOSS * SSDGS__BLOCK + s] = 1;
     }
     for (int height = 0; height < 2; height++) {
         memset(dgauss, 0, sizeof dgauss);
-        if (!height) context->k->lobe_backward(gauss, drows, dgauss);
+        if (!height) context->k->lobe_backward(gauss, dlobe, dgauss);
         else {
             context->k->reflect(&lighting, gauss, rows);
-            memset(drows, 0, sizeof drows);
-            for (int s = 0; s < SSDGS__BLOCK; s++) drows[SSDGS__GLOSS * SSDGS__BLOCK + s] = 1;
             context->k->reflect_backward(&lighting, gauss, drows, dgauss, lane_sums);
         }
         for (int s = 0; s < SSDGS__BLOCK; s++) {
