@@ -375,7 +375,7 @@ typedef struct ssdgs_gaussian {
     ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
     ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
-    ssdgs_real specular[3];   /* c_s: 0 = none; deferred, the lobe's height: ssdgs_gaussian_mirror() */
+    ssdgs_real specular[3];   /* c_s; deferred, its lobe's height: see ssdgs_gaussian_mirror(). 0 = none */
     ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
     ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight: 1 = broad, more is narrower */
     ssdgs_real f0;            /* of a deferred highlight, at normal incidence: 0.04 for dielectrics */
@@ -2395,7 +2395,7 @@ struct ssdgs_model {
     uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must
                              follow */
     int references;       /* itself and its trainers: the last that goes frees it */
-    int version;          /* that wrote its file, 0 where an editor dropped that; of others this one */
+    int version;          /* of ssdgs.h that wrote its file, 0 if that does not say; this one's without */
     int count;
     size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -2805,12 +2805,14 @@ static ssdgs_real ssdgs__lobe_height(const ssdgs_real *raw, size_t stride) {
     return ssdgs__exp_scalar(sum / 2);
 }
 
-/* Writes c_s of a deferred highlight of these heights, after its ASG weights. */
-static void ssdgs__specular_store(const ssdgs_real heights[3], ssdgs_real *plane, size_t stride) {
-    const double height = (double)ssdgs__lobe_height(plane + SSDGS_ASG_WEIGHT * stride, stride);
+/* Writes c_s. deferred 1: such that the lobe has the heights `specular`; reads the ASG weights. */
+static void ssdgs__specular_store(const ssdgs_real specular[3], int deferred, ssdgs_real *plane,
+                                  size_t stride) {
+    const double height =
+        deferred ? (double)ssdgs__lobe_height(plane + SSDGS_ASG_WEIGHT * stride, stride) : 1;
     for (size_t i = 0; i < 3; i++)
         plane[(SSDGS_SPECULAR + i) * stride] =
-            (ssdgs_real)ssdgs__softplus_inverse((double)heights[i] / height);
+            (ssdgs_real)ssdgs__softplus_inverse((double)specular[i] / height);
 }
 
 /* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that has
@@ -2835,7 +2837,6 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
         raw[SSDGS_POSITION + i] = (double)g->position[i];
         raw[SSDGS_LOG_SCALE + i] = log((double)g->scale[i]);
         raw[SSDGS_DIFFUSE + i] = ssdgs__softplus_inverse((double)g->diffuse[i]);
-        raw[SSDGS_SPECULAR + i] = ssdgs__softplus_inverse((double)g->specular[i]);
         raw[SSDGS_SCATTERING + i] = ssdgs__softplus_inverse((double)g->scattering[i]);
     }
     if (flat) memcpy(raw + SSDGS_FRAME, raw + SSDGS_ROTATION, 4 * sizeof *raw);
@@ -2850,10 +2851,10 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
     }
     for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++) raw[SSDGS_MATERIAL + i] = (double)g->material[i];
     for (int i = 0; i < SSDGS_CHANNELS; i++) plane[(size_t)i * stride] = (ssdgs_real)raw[i];
-    if (deferred) ssdgs__specular_store(g->specular, plane, stride);
+    ssdgs__specular_store(g->specular, deferred, plane, stride);
 }
 
-/* deferred 0: c_s as it is, not a lobe's height. */
+/* deferred 0: specular is c_s itself, not a lobe's height. */
 static void ssdgs__gaussian_load(ssdgs_gaussian *g, int deferred, const ssdgs_real *plane, size_t stride) {
     ssdgs_real raw[SSDGS_CHANNELS];
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = plane[(size_t)i * stride];
@@ -3034,12 +3035,14 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
 }
 
-/* Files up to 0.2.0 have heights where c_s is now. */
-static void ssdgs__specular_of_heights(ssdgs_model *model) {
-    for (size_t i = 0; i < (size_t)model->count && model->settings.asg == SSDGS_ASG_DEFERRED; i++) {
+/* Gaussians as a file of that version has them become today's: up to 0.2.0 c_s was a deferred lobe's height.
+ */
+static void ssdgs__gaussians_update(ssdgs_model *model, int version) {
+    const int older = version <= 200 && model->settings.asg == SSDGS_ASG_DEFERRED;
+    for (size_t i = 0; i < (size_t)model->count && older; i++) {
         ssdgs_gaussian g;
         ssdgs__gaussian_load(&g, 0, model->gaussians + i, model->capacity);
-        ssdgs__specular_store(g.specular, model->gaussians + i, model->capacity);
+        ssdgs__specular_store(g.specular, 1, model->gaussians + i, model->capacity);
     }
 }
 
@@ -3064,7 +3067,7 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
             x[i] = (ssdgs_real)((double)x[i] + move);
     }
     model->settings = original->settings;
-    if (!model->version && original->version <= 200) ssdgs__specular_of_heights(model);
+    if (!model->version) ssdgs__gaussians_update(model, original->version);
     model->version = original->version;
     ssdgs__model_changed(model);
     return SSDGS_OK;
@@ -9059,9 +9062,10 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     for (int kind = 0; kind < SSDGS__PLY_KINDS && !result; kind++)
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
-    if (!result) (*out)->version = ply->version;
-    if (!result && ply->version <= 200) ssdgs__specular_of_heights(*out);
-    return result;
+    if (result) return result;
+    (*out)->version = ply->version;
+    ssdgs__gaussians_update(*out, ply->version);
+    return SSDGS_OK;
 }
 
 /* Notes what a model will not do that its user may expect. */
@@ -14093,8 +14097,8 @@ SSDGS__FI V F(lobe_height)(const R *gauss) {
     return VSQRT(VMUL(F(sharpness)(VLOAD(raw)), F(sharpness)(VLOAD(raw + SSDGS__BLOCK))));
 }
 
-/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s: deferred the
-   lobe's height, as the pixel finds the rest. */
+/* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s. Deferred,
+   f_s is the lobe's height; the rest of it is the pixel's. */
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
@@ -14135,11 +14139,13 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         }
         const V dgloss = VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s),
                 df = k->deferred ? VSET(0) : VSEL(g.half, dgloss, VSET(0));
-        const V dlog = VMUL(VMUL(VSET(0.5), dgloss), F(lobe_height)(gauss + s));
-        for (int j = 0; j < 2 && k->deferred; j++) {
-            const V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
-            R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-            VSTORE(dw, VADD(VSEL(VLT(VABS(raw), VSET(SSDGS__SHARPEST)), dlog, VSET(0)), VLOAD(dw)));
+        if (k->deferred) { /* d sqrt(lambda mu) / d(log lambda) is half of it */
+            const V dlog = VMUL(VMUL(VSET(0.5), dgloss), F(lobe_height)(gauss + s));
+            for (int j = 0; j < 2; j++) {
+                const V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
+                R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
+                VSTORE(dw, VADD(VSEL(VLT(VABS(raw), VSET(SSDGS__SHARPEST)), dlog, VSET(0)), VLOAD(dw)));
+            }
         }
         const V dlobe = VMUL(df, g.fresnel);
         if (k->specular && !k->deferred)

@@ -654,7 +654,7 @@ void find_geometry(lamp l) {
     irradiance = directional ? 1.0 : 1.0 / max(dot(to, to), eye.w);
     wi = to * sqrt(irradiance);
     cosine = max(0.0, dot(axes[2], wi));
-    gloss = lobe_height(); /* deferred: the pixels' is the rest */
+    gloss = lobe_height(); /* deferred: the rest is the pixels' */
     if (on(deferred)) return;
     vec3 h;
     float missing;
