@@ -43,6 +43,7 @@ void gpu_wait(gpu *g, int waits);   /* 1: a stage ends when the device is done w
     X(void, BufferData, (uint32_t target, intptr_t size, const void *data, uint32_t usage)) \
     X(void, BufferSubData, (uint32_t target, intptr_t offset, intptr_t size, const void *data)) \
     X(void, CompileShader, (uint32_t shader)) \
+    X(void, CopyBufferSubData, (uint32_t source, uint32_t to, intptr_t read, intptr_t write, intptr_t size)) \
     X(uint32_t, CreateProgram, (void)) \
     X(uint32_t, CreateShader, (uint32_t type)) \
     X(void, DeleteProgram, (uint32_t program)) \
@@ -69,13 +70,17 @@ enum {
     GPU_GL_RENDERER = 0x1F01,
     GPU_GL_MAJOR_VERSION = 0x821B,
     GPU_GL_MINOR_VERSION = 0x821C,
+    GPU_GL_STREAM_READ = 0x88E1,
     GPU_GL_DYNAMIC_DRAW = 0x88E8,
     GPU_GL_UNIFORM_BUFFER = 0x8A11,
     GPU_GL_COMPILE_STATUS = 0x8B81,
     GPU_GL_LINK_STATUS = 0x8B82,
+    GPU_GL_COPY_READ_BUFFER = 0x8F36,
+    GPU_GL_COPY_WRITE_BUFFER = 0x8F37,
     GPU_GL_SHADER_STORAGE_BUFFER = 0x90D2,
     GPU_GL_COMPUTE_SHADER = 0x91B9,
-    GPU_GL_ALL_BARRIER_BITS = -1,
+    GPU_GL_BUFFER_UPDATE_BARRIER_BIT = 0x0200,
+    GPU_GL_SHADER_STORAGE_BARRIER_BIT = 0x2000,
     GPU_EGL_DEVICES = 16,
     GPU_EGL_EXTENSIONS = 0x3055,
     GPU_EGL_READ = 0x305A,
@@ -166,6 +171,8 @@ typedef struct gpu_view {
 /* The maps of a light's faces, one after the other: map_tile (faces, tiles) counts through all of them. */
 typedef struct gpu_light {
     gpu_buffer light_map, map_tile;
+    int ready; /* 1: the nodes are of the flux, and transport of what has this revision */
+    uint32_t revision;
 } gpu_light;
 
 /* What only the device counts of a view. */
@@ -184,8 +191,9 @@ typedef struct gpu_frame {
     gpu_buffer seen, visibility, depth_cue, flux;
     gpu_buffer shaded, color, layers; /* shaded: its count, then the Gaussians */
     gpu_buffer pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow;
-    gpu_buffer networks, lamps, exposures, nodes, transport, tally, neighbours; /* of SHADE */
-    gpu_buffer faces;                                                           /* of the highlights */
+    gpu_buffer networks, lamps, exposures, tally, neighbours; /* of SHADE */
+    gpu_buffer nodes, transport, arrived; /* arrived: the revision, (lights, blocks of 64 Gaussians) */
+    gpu_buffer faces;                     /* of the highlights */
 } gpu_frame;
 
 /* What stages use while they run. */
@@ -202,7 +210,7 @@ struct gpu {
     gpu_gl gl;
     gpu_current callers;
     uint32_t program[GPU_PROGRAMS];
-    gpu_buffer parameters;
+    gpu_buffer parameters, staging; /* staging: what downloads go by */
     gpu_frame frame;
     void *host; /* what gpu_host() gives */
     size_t host_size;
@@ -211,6 +219,9 @@ struct gpu {
     const void *model;    /* which one, of which revision, is uploaded */
     uint64_t revision;
     int exposed;         /* with what of ambient light comes to its Gaussians */
+    uint32_t revisions;  /* that flux has had so far */
+    double detail;       /* options.transport_detail that transport has */
+    int busy;            /* 1: programs may still run */
     const void *owner;   /* frame.memory of the last frame: what views have left is of its */
     int lost;            /* 1: something has failed, and all is the CPU's from then on */
     int waits;           /* 1: for the device at the end of each stage */
@@ -411,53 +422,82 @@ void main() {
 }
 );
 
-/* Where light enters: nodes of 64 Gaussians, neighbours as training leaves them. */
+/* Where light enters: nodes of 64 Gaussians, neighbours as training leaves them, and after them nodes of 64
+   nodes. */
 static const char gpu_transport_in[] = GPU_GLSL(
 layout(std140, binding = 0) uniform parameters {
     uint count, stride, light, nodes;
     float soft2, longest, far_radii, scale; /* of the sums of the shortest length */
+    uint revision;
 };
 layout(std430, binding = 0) readonly buffer gauss_block { float gauss[]; };
 layout(std430, binding = 1) readonly buffer flux_block { float flux[]; };
-const uint node_size = 64u;
 struct node {
     vec4 middle; /* of the flux; w: its sum */
     vec4 radius;
 };
+uint above() { return (nodes + 63u) / 64u; }
+uint first_node() { return light * (nodes + above()); }
 vec4 source(uint g) { return vec4(gauss[g], gauss[stride + g], gauss[2u * stride + g], flux[light * count + g]); }
 );
 
+/* A group makes 64 nodes and the one above them; a thread sums 16 Gaussians. */
 static const char gpu_transport_nodes[] = GPU_GLSL(
 layout(std430, binding = 2) writeonly buffer node_block { node node_of[]; };
+shared vec4 middles[256];
+shared float radii[256];
+vec4 joined(vec4 a, vec4 b) {
+    if (!(b.w > 0.0)) return a;
+    return vec4(a.xyz + (b.xyz - a.xyz) * (b.w / (a.w + b.w)), a.w + b.w);
+}
 void main() {
-    uint first = node_size * item(), end = min(first + node_size, count);
+    uint first = 16u * item(), mine = lane() / 4u, own = 64u * group() + mine;
     vec4 sum = vec4(0);
     float radius = 0.0;
-    if (first >= count) return;
-    for (uint g = first; g < end; g++) {
-        vec4 of = source(g);
-        sum.w += of.w;
-        if (of.w > 0.0) sum.xyz += (of.xyz - sum.xyz) * (of.w / sum.w);
-    }
-    for (uint g = first; g < end; g++) {
+    if (64u * group() >= nodes) return;
+    for (uint g = first; g < min(first + 16u, count); g++) sum = joined(sum, source(g));
+    middles[lane()] = sum;
+    barrier();
+    sum = vec4(0);
+    for (uint i = 4u * mine; i < 4u * mine + 4u; i++) sum = joined(sum, middles[i]);
+    for (uint g = first; g < min(first + 16u, count); g++) {
         vec4 of = source(g);
         if (of.w > 0.0) radius = max(radius, distance(of.xyz, sum.xyz));
     }
-    node_of[item()] = node(sum, vec4(radius));
+    radii[lane()] = radius;
+    barrier();
+    for (uint i = 4u * mine; i < 4u * mine + 4u; i++) radius = max(radius, radii[i]);
+    barrier();
+    middles[mine] = sum;
+    radii[mine] = radius;
+    barrier();
+    if (lane() % 4u == 0u && own < nodes) node_of[first_node() + own] = node(sum, vec4(radius));
+    if (lane() > 0u) return;
+    for (uint i = 1u; i < 64u; i++) sum = joined(sum, middles[i]);
+    radius = 0.0;
+    for (uint i = 0u; i < 64u; i++)
+        if (middles[i].w > 0.0) radius = max(radius, distance(middles[i].xyz, sum.xyz) + radii[i]);
+    node_of[first_node() + nodes + group()] = node(sum, vec4(radius));
 }
 );
 
-/* To 64 Gaussians a group, by four threads each: sums of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2),
-   for each length l. Nodes that are far from all 64 are points, of the others each Gaussian is. */
+/* To 64 neighbours a group, by four threads each: sums of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2),
+   for each length l. Nodes that are far from all 64 are points, the others are opened. What one of the 64 needs
+   all get, so what is kept does not depend on what has been seen before. */
 static const char gpu_transport[] = GPU_GLSL(
 const uint lengths = 5u;
+const uint is_seen = 1u;
 layout(std430, binding = 2) readonly buffer node_block { node node_of[]; };
-layout(std430, binding = 3) readonly buffer shaded_block { uint shaded_count; uint shaded[]; };
+layout(std430, binding = 3) readonly buffer seen_block { uint seen[]; };
 layout(std430, binding = 4) writeonly buffer transport_block { float transported[]; };
+layout(std430, binding = 5) buffer arrived_block { uint arrived[]; }; /* the revision of each 64 */
 shared vec4 points[256];
-shared uint nearby[256];
+shared uint opened[512]; /* nodes of nodes; nodes */
+shared uint bits[16]; /* of 256 nodes: those far away; those to be opened */
 shared float parts[256 * 5];
+shared uint wanted;
 vec3 place;
+vec4 middle; /* of the 64; how far they are from it */
 float sum[lengths];
 void add_points(uint many) {
     barrier();
@@ -474,7 +514,7 @@ void add_points(uint many) {
     barrier();
 }
 /* The box's middle, and how far the 64 are from it. */
-vec4 find_middle() {
+void find_middle() {
     points[lane()] = vec4(place, 0);
     barrier();
     vec3 low = place, high = place;
@@ -483,38 +523,59 @@ vec4 find_middle() {
         low = min(low, points[i].xyz);
         high = max(high, points[i].xyz);
     }
-    vec3 middle = 0.5 * (low + high);
-    for (uint i = 0u; i < 64u; i++) reach = max(reach, distance(points[i].xyz, middle));
-    return vec4(middle, reach);
+    middle.xyz = 0.5 * (low + high);
+    for (uint i = 0u; i < 64u; i++) reach = max(reach, distance(points[i].xyz, middle.xyz));
+    middle.w = reach;
+}
+/* Adds those of 256 nodes that are far away; lists the others, and says how many. */
+uint open(uint at, bool there, uint list) {
+    node of = node_of[first_node() + (there ? at : 0u)];
+    bool some = there && of.middle.w > 0.0;
+    bool apart = some && distance(of.middle.xyz, middle.xyz) > of.radius.x * far_radii + middle.w;
+    uint kind = apart ? 0u : 8u, own = lane() >> 5u, place_of = 0u, counts[2] = uint[2](0u, 0u);
+    barrier();
+    if (lane() < 16u) bits[lane()] = 0u;
+    barrier();
+    if (some) atomicOr(bits[kind + own], 1u << (lane() & 31u));
+    barrier();
+    for (uint word = 0u; word < 16u; word++) counts[word >> 3u] += uint(bitCount(bits[word]));
+    for (uint word = 0u; word < own; word++) place_of += uint(bitCount(bits[kind + word]));
+    place_of += uint(bitCount(bits[kind + own] & (1u << (lane() & 31u)) - 1u));
+    if (apart) points[place_of] = of.middle;
+    else if (some) opened[list + place_of] = at;
+    add_points(counts[0]);
+    return counts[1];
 }
 void main() {
     uint first = 64u * group();
-    if (first >= shaded_count) return;
-    uint me = shaded[min(first + (lane() & 63u), shaded_count - 1u)];
+    if (first >= count) return;
+    uint me = min(first + (lane() & 63u), count - 1u);
+    if (lane() == 0u) wanted = 0u;
+    barrier();
+    if (seen[me] == is_seen) wanted = 1u;
+    barrier();
+    if (wanted == 0u || arrived[light * nodes + group()] == revision) return;
     place = source(me).xyz;
     for (uint k = 0u; k < lengths; k++) sum[k] = 0.0;
-    vec4 middle = find_middle();
-    for (uint base = 0u; base < nodes; base += 256u) {
-        uint at = base + lane(), found;
-        node of = node_of[min(at, nodes - 1u)];
-        bool some = at < nodes && of.middle.w > 0.0;
-        bool apart = some && distance(of.middle.xyz, middle.xyz) > of.radius.x * far_radii + middle.w;
-        uint to = scan(some ? apart ? 1u : 0x10000u : 0u, found);
-        if (apart) points[to & 0xffffu] = of.middle;
-        else if (some) nearby[to >> 16u] = at;
-        add_points(found & 0xffffu);
-        for (uint i = 0u; i < found >> 16u; i += 256u / node_size) {
-            uint which = i + lane() / node_size;
-            uint g = which < found >> 16u ? node_size * nearby[which] + lane() % node_size : count;
-            points[lane()] = g < count ? source(g) : vec4(0);
-            add_points(256u);
+    find_middle();
+    for (uint base = 0u; base < above(); base += 256u) {
+        uint tops = open(nodes + base + lane(), base + lane() < above(), 0u);
+        for (uint top = 0u; top < tops; top += 4u) {
+            uint own = top + lane() / 64u, at = own < tops ? 64u * (opened[own] - nodes) + lane() % 64u : nodes;
+            uint near = open(at, at < nodes, 256u);
+            for (uint i = 0u; i < near; i += 4u) {
+                uint which = i + lane() / 64u, g = which < near ? 64u * opened[256u + which] + lane() % 64u : count;
+                points[lane()] = g < count ? source(g) : vec4(0);
+                add_points(256u);
+            }
         }
     }
     for (uint k = 0u; k < lengths; k++) parts[256u * k + lane()] = sum[k];
     barrier();
-    for (uint k = 0u, at = lane(); k < lengths && lane() < 64u && first + lane() < shaded_count; k++, at += 256u)
+    for (uint k = 0u, at = lane(); k < lengths && first + lane() < min(first + 64u, count); k++, at += 256u)
         transported[(light * lengths + k) * count + me] =
             scale / float(1u << k) * (parts[at] + parts[at + 64u] + parts[at + 128u] + parts[at + 192u]);
+    if (lane() == 0u) arrived[light * nodes + group()] = revision;
 }
 );
 
@@ -1385,7 +1446,7 @@ layout(std140, binding = 0) uniform parameters {
     float log2_threshold, stop, max_error, bias, cx, cy, inverse_focal;
     uint orthographic, cue, flux, map, shared_views, gaussians, first_layer, layers, deferred;
 };
-layout(std430, binding = 0) readonly buffer records { splat record[]; };
+layout(std430, binding = 0) readonly buffer records { vec4 record[]; }; /* two of each splat */
 layout(std430, binding = 1) readonly buffer lists { pair tile_list[]; };
 layout(std430, binding = 2) readonly buffer starts { uint tile_start[]; };
 );
@@ -1401,12 +1462,11 @@ uvec2 pixel() {
 }
 bool inside() { return pixel().x < width && pixel().y < height; }
 vec2 centre() { return vec2(pixel()) + 0.5; }
-float weight_of(splat s, vec2 at, out bool drawn) {
-    precise float dx = at.x - s.x, dy = at.y - s.y;
-    precise float p = fma(fma(s.yy, dy, s.xy * dx), dy, fma(s.xx * dx, dx, s.log2_opacity));
-    p = min(s.log2_opacity, p);
-    drawn = p >= log2_threshold;
-    return drawn ? exp2(p) : 0;
+float weight_of(vec4 splat, vec2 spread, vec2 at) { /* x, y, xx, xy; yy, log2 opacity; 0: not drawn */
+    precise float dx = at.x - splat.x, dy = at.y - splat.y;
+    precise float p = fma(fma(spread.x, dy, splat.w * dx), dy, fma(splat.z * dx, dx, spread.y));
+    p = min(spread.y, p);
+    return p >= log2_threshold ? exp2(p) : 0;
 }
 float alpha_of(float weight) { return min(weight, 0.999); }
 /* Has every pixel of the group fallen below the stop by this step, of 1, 2 ..? What is dark stays so. */
@@ -1418,17 +1478,36 @@ bool is_dark(float t, uint step) {
 }
 );
 
+/* Entries of a tile's list, and the weights of four of them, which do not wait for one another. Masks are 0
+   after the last entry. */
+static const char gpu_window_64[] = GPU_GLSL(const uint window = 64u;);
+static const char gpu_window_256[] = GPU_GLSL(const uint window = 256u;);
+static const char gpu_weights[] = GPU_GLSL(
+shared vec4 splats[window];
+shared vec2 spreads[window];
+shared uint masks[window];
+bool any_of_four(uint i, uint bit) {
+    return ((masks[i] | masks[i + 1u] | masks[i + 2u] | masks[i + 3u]) & bit) != 0u;
+}
+vec4 weights_of(uint i, uint bit, vec2 at) {
+    vec4 weights;
+    for (uint k = 0u; k < 4u; k++) {
+        float weight = weight_of(splats[i + k], spreads[i + k], at);
+        weights[k] = (masks[i + k] & bit) != 0u ? weight : 0;
+    }
+    return weights;
+}
+);
+
 /* Which micro-tiles blend an entry, and whether it must be shaded. A pixel passes over small weights as long as
    their sum stays within max_error: what no pixel needs adds up to no more in any. What is heavy in some pixel
    is shaded anyway and takes nothing of that, so it is found in a round before. */
 static const char gpu_walk_camera[] = GPU_GLSL(
 layout(std430, binding = 3) writeonly buffer seens { uint tile_seen[]; };
 layout(std430, binding = 4) writeonly buffer neededs { uint tile_needed[]; };
-shared splat splats[256];
-shared uint masks[256];
-shared uint blends[256];
-shared uint heavy[256];
-shared uint must[256];
+shared uint blends[16 * 8]; /* a bit an entry, 8 words for each micro-tile */
+shared uint heavy[8];
+shared uint must[8];
 void main() {
     if (group() >= tiles) return;
     uint begin = tile_start[group()], end = tile_start[group() + 1u], bit = 1u << micro(), step = 0u;
@@ -1436,37 +1515,50 @@ void main() {
     bool dark = false, thrifty = max_error > 0;
     vec2 at = centre();
     if (lane() == 0u) lit = 0u;
-    for (uint from = begin; from < end; from += 256u) {
-        uint entries = min(256u, end - from);
+    for (uint from = begin; from < end; from += window) {
+        uint entries = min(window, end - from);
         barrier();
-        blends[lane()] = 0u;
-        heavy[lane()] = 0u;
-        must[lane()] = 0u;
+        if (lane() < 128u) blends[lane()] = 0u;
+        if (lane() < 8u) heavy[lane()] = must[lane()] = 0u;
+        masks[lane()] = 0u;
         if (lane() < entries) {
-            splats[lane()] = record[tile_list[from + lane()].first];
-            masks[lane()] = tile_list[from + lane()].second;
+            pair entry = tile_list[from + lane()];
+            splats[lane()] = record[2u * entry.first];
+            spreads[lane()] = record[2u * entry.first + 1u].xy;
+            masks[lane()] = entry.second;
         }
         barrier();
         float before = t;
         for (uint round = thrifty ? 0u : 1u; round < 2u && !dark; round++) {
             t = before;
-            for (uint i = 0u; i < entries && t >= stop; i++) {
-                if ((masks[i] & bit) == 0u) continue;
-                bool drawn;
-                float alpha = alpha_of(weight_of(splats[i], at, drawn)), w = alpha * t;
-                t = fma(-alpha, t, t);
-                if (!drawn) continue;
-                if ((blends[i] & bit) == 0u) atomicOr(blends[i], bit);
-                if (round == 0u && w > slight && heavy[i] == 0u) atomicOr(heavy[i], 1u);
-                if (round == 0u || !thrifty || heavy[i] != 0u) continue;
-                over += w;
-                if (over > max_error && must[i] == 0u) atomicOr(must[i], 1u);
+            for (uint word = 0u; 32u * word < entries && t >= stop; word++) {
+                uint blended = 0u, marked = 0u, strong = heavy[word];
+                for (uint i = 32u * word; i < min(32u * word + 32u, entries) && t >= stop; i += 4u) {
+                    if (!any_of_four(i, bit)) continue;
+                    vec4 weights = weights_of(i, bit, at);
+                    for (uint k = 0u; k < 4u; k++) {
+                        if (!(weights[k] > 0) || t < stop) continue;
+                        float alpha = alpha_of(weights[k]), w = alpha * t;
+                        uint own = 1u << (i + k & 31u);
+                        t = fma(-alpha, t, t);
+                        blended |= own;
+                        if (round == 0u && w > slight) marked |= own;
+                        if (round == 0u || !thrifty || (strong & own) != 0u) continue;
+                        over += w;
+                        if (over > max_error) marked |= own;
+                    }
+                }
+                if (round == 1u && blended != 0u) atomicOr(blends[8u * micro() + word], blended);
+                if (round == 0u && marked != 0u) atomicOr(heavy[word], marked);
+                if (round == 1u && marked != 0u) atomicOr(must[word], marked);
             }
             barrier();
         }
         if (lane() < entries) {
-            tile_seen[from + lane()] = blends[lane()];
-            if (thrifty) tile_needed[from + lane()] = heavy[lane()] | must[lane()];
+            uint word = lane() >> 5u, place = lane() & 31u, mask = 0u;
+            for (uint m = 0u; m < 16u; m++) mask |= (blends[8u * m + word] >> place & 1u) << m;
+            tile_seen[from + lane()] = mask;
+            if (thrifty) tile_needed[from + lane()] = (heavy[word] | must[word]) >> place & 1u;
         }
         dark = dark || is_dark(t, ++step);
     }
@@ -1493,21 +1585,30 @@ void main() {
 }
 );
 
-/* Sums of one value of each pixel for 8 entries: 32 threads an entry, each of every 32nd pixel, then one. */
+/* Sums over the pixels of up to three values of each of 8 entries: 32 threads an entry, each of every 32nd
+   pixel; then four a value. */
 static const char gpu_sums[] = GPU_GLSL(
 const uint at_once = 8u;
 shared float part[3][8][256];
-void add_up(uint which) {
-    uint entry = lane() >> 5u, first = lane() & 31u;
-    float sum = 0;
-    for (uint i = first; i < 256u; i += 32u) sum += part[which][entry][i];
-    part[which][entry][first] = sum;
+void add_up(uint values) {
+    uint entry = lane() >> 5u, first = lane() & 31u, which = first >> 2u;
+    barrier();
+    for (uint v = 0u; v < values; v++) {
+        float sum = 0;
+        for (uint i = first; i < 256u; i += 32u) sum += part[v][entry][i];
+        part[v][entry][first] = sum;
+    }
+    barrier();
+    if (which < values) {
+        float sum = 0;
+        for (uint i = first & 3u; i < 32u; i += 4u) sum += part[which][entry][i];
+        part[which][entry][first & 3u] = sum;
+    }
+    barrier();
 }
-/* Of entry lane(), after add_up() and a barrier. */
-float added(uint which) {
-    float sum = 0;
-    for (uint i = 0u; i < 32u; i++) sum += part[which][lane()][i];
-    return sum;
+/* After add_up(). */
+float added(uint which, uint entry) {
+    return (part[which][entry][0] + part[which][entry][1]) + (part[which][entry][2] + part[which][entry][3]);
 }
 );
 
@@ -1521,36 +1622,41 @@ layout(std430, binding = 4) readonly buffer of_gaussians { pair of_gaussian[]; }
 layout(std430, binding = 5) writeonly buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
 const uint window = 64u;
-shared splat near_splats[64];
+shared vec4 near_splats[64];
+shared vec2 near_spreads[64];
 shared float near_depths[64];
 shared uint near_masks[64];
-shared splat far_splats[64];
+shared vec4 far_splats[64];
+shared vec2 far_spreads[64];
 shared float far_depths[64];
 shared uint far_masks[64];
 shared uint far_alone[64];
 float t, met; /* transmittance; sum of blend weight x distance */
 uint applying;
 
-/* All that is nearer than this. */
+/* All that is nearer than this. Some compilers go on with `applying` where a loop ends by return or break. */
 void apply(float reach, uint begin, uint end, float nearest, vec2 at) {
-    for (; applying < end; applying++) {
+    bool nearer = true;
+    while (nearer && applying < end) {
         uint i = (applying - begin) % window;
         if (i == 0u) {
             barrier();
             if (lane() < window && applying + lane() < end) {
                 pair entry = tile_list[applying + lane()];
-                near_splats[lane()] = record[entry.first];
+                near_splats[lane()] = record[2u * entry.first];
+                near_spreads[lane()] = record[2u * entry.first + 1u].xy;
                 near_depths[lane()] = depth[entry.first];
                 near_masks[lane()] = entry.second;
             }
             barrier();
         }
-        if (reach <= near_depths[i]) return;
-        if ((near_masks[i] >> micro() & 1u) == 0u) continue;
-        bool drawn;
-        float alpha = alpha_of(weight_of(near_splats[i], at, drawn));
-        met += alpha * t * (near_depths[i] - nearest);
-        t = max(fma(-alpha, t, t), 1e-20);
+        nearer = near_depths[i] < reach;
+        if (nearer && (near_masks[i] & 1u << micro()) != 0u) {
+            float alpha = alpha_of(weight_of(near_splats[i], near_spreads[i], at));
+            met += alpha * t * (near_depths[i] - nearest);
+            t = max(fma(-alpha, t, t), 1e-20);
+        }
+        applying += nearer ? 1u : 0u;
     }
 }
 );
@@ -1566,36 +1672,38 @@ void main() {
     applying = begin;
     if (lane() == 0u) lit = 0u;
     for (uint from = begin, step = 1u; from < end; from += at_once, step++) {
-        uint loaded = (from - begin) % window;
+        uint loaded = (from - begin) % window, entries = min(at_once, end - from), sampled = 0u;
         barrier();
-        if (loaded == 0u && lane() < window && from + lane() < end) {
-            pair entry = tile_list[from + lane()];
-            far_splats[lane()] = record[entry.first];
-            far_depths[lane()] = depth[entry.first];
-            far_masks[lane()] = entry.second;
-            far_alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+        if (loaded == 0u) {
+            if (lane() < window && from + lane() < end) {
+                pair entry = tile_list[from + lane()];
+                far_splats[lane()] = record[2u * entry.first];
+                far_spreads[lane()] = record[2u * entry.first + 1u].xy;
+                far_depths[lane()] = depth[entry.first];
+                far_masks[lane()] = entry.second;
+                far_alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+            }
+            barrier();
         }
-        barrier();
-        uint entries = min(at_once, end - from);
         for (uint i = 0u; i < entries; i++) {
-            splat s = far_splats[loaded + i];
-            float distance = far_depths[loaded + i];
-            bool drawn = false;
-            if (!dark) apply(distance - bias, begin, end, nearest, at);
-            float rho = (far_masks[loaded + i] >> micro() & 1u) != 0u ? weight_of(s, at, drawn) : 0;
-            part[0][i][lane()] = rho * t;
-            part[1][i][lane()] = rho;
-            part[2][i][lane()] = rho * ((distance - nearest) - (distance - nearest) * t - met);
+            if (dark && far_alone[loaded + i] != 0u) continue;
+            bool covers = (far_masks[loaded + i] & 1u << micro()) != 0u;
+            part[1][i][lane()] = covers ? weight_of(far_splats[loaded + i], far_spreads[loaded + i], at) : 0;
+            sampled |= 1u << i;
         }
-        bool was_dark = dark;
-        dark = dark || is_dark(t, step);
-        barrier();
-        for (uint which = 0u; which < (cue != 0u ? 3u : 2u); which++) add_up(which);
-        barrier();
+        for (uint i = 0u; i < entries; i++) {
+            float distance = far_depths[loaded + i], rho = part[1][i][lane()];
+            if (!dark) apply(distance - bias, begin, end, nearest, at);
+            part[0][i][lane()] = rho * t;
+            if (cue != 0u) part[2][i][lane()] = rho * ((distance - nearest) - (distance - nearest) * t - met);
+        }
+        if (!dark) dark = is_dark(t, step);
+        if (sampled != 0u) add_up(cue != 0u ? 3u : 2u);
         if (lane() < entries) {
-            bool skipped = was_dark && far_alone[loaded + lane()] != 0u;
-            tile_sums[from + lane()] = skipped ? vec4(0, 1, 0, 0)
-                                               : vec4(added(0u), added(1u), cue != 0u ? added(2u) : 0, 0);
+            vec4 sum = vec4(0, 1, 0, 0);
+            if ((sampled >> lane() & 1u) != 0u)
+                sum = vec4(added(0u, lane()), added(1u, lane()), cue != 0u ? added(2u, lane()) : 0, 0);
+            tile_sums[from + lane()] = sum;
         }
     }
 }
@@ -1609,10 +1717,7 @@ layout(std430, binding = 4) writeonly buffer maps { vec4 light_map[]; };
 layout(std430, binding = 5) buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
 layout(std430, binding = 7) writeonly buffer map_tiles { uint map_tile[]; };
-const uint window = 64u;
-shared splat splats[64];
-shared float distances[64];
-shared uint masks[64];
+shared float distances[window];
 const float levels[4] = float[4](0.98, 0.5, 0.1, -1);
 uint fallen;
 vec3 falls;
@@ -1646,31 +1751,31 @@ void main() {
     left = before = vec2(0);
     if (lane() == 0u) lit = 0u;
     for (uint from = begin, step = 1u; from < end && !dark; from += window, step++) {
-        uint entries = min(window, end - from);
+        uint entries = min(window, end - from), bit = 1u << micro();
         barrier();
+        if (lane() < window) masks[lane()] = 0u;
         if (lane() < entries) {
             pair entry = tile_list[from + lane()];
-            splats[lane()] = record[entry.first];
+            splats[lane()] = record[2u * entry.first];
+            spreads[lane()] = record[2u * entry.first + 1u].xy;
             distances[lane()] = depth[entry.first] - nearest;
             masks[lane()] = entry.second;
         }
         barrier();
         for (uint first = 0u; first < entries; first += at_once) {
-            uint some = min(at_once, entries - first);
-            for (uint i = 0u; i < some; i++) {
-                float alpha = 0, past = t;
-                bool drawn;
-                if ((masks[first + i] >> micro() & 1u) != 0u)
-                    alpha = alpha_of(weight_of(splats[first + i], at, drawn));
-                t = max(fma(-alpha, t, t), 1e-20);
-                if (t < levels[fallen]) note(past, t, distances[first + i]);
-                if (flux != 0u) part[0][i][lane()] = omega * alpha * past;
+            for (uint four = first; four < first + at_once; four += 4u) {
+                vec4 weights = any_of_four(four, bit) ? weights_of(four, bit, at) : vec4(0);
+                for (uint i = four; i < four + 4u; i++) {
+                    float alpha = alpha_of(weights[i - four]), past = t;
+                    t = max(fma(-alpha, t, t), 1e-20);
+                    if (t < levels[fallen]) note(past, t, distances[i]);
+                    if (flux != 0u) part[0][i - first][lane()] = omega * alpha * past;
+                }
             }
             if (flux == 0u) continue;
-            barrier();
-            add_up(0u);
-            barrier();
-            if (lane() < some) tile_sums[from + first + lane()].w = added(0u);
+            add_up(1u);
+            if (lane() < at_once && first + lane() < entries)
+                tile_sums[from + first + lane()].w = added(0u, lane());
             barrier();
         }
         dark = is_dark(t, step);
@@ -1720,14 +1825,11 @@ layout(std430, binding = 5) readonly buffer layer_colors { vec4 layer[]; };
 layout(std430, binding = 6) writeonly buffer all_pixels { float pixels[]; };
 layout(std430, binding = 7) writeonly buffer all_layer_pixels { float layer_pixels[]; };
 layout(std430, binding = 8) writeonly buffer transmittances { float transmittance[]; };
-const uint window = 64u;
-shared splat splats[64];
-shared uint masks[64];
-shared vec3 values[64 * at_once];
+shared vec4 values[window * at_once];
 vec3 sums[at_once];
-vec3 value_of(uint which, uint gaussian) {
-    if (which == 0u) return color[gaussian].rgb;
-    return which < first_layer + layers ? layer[(which - 1u) * gaussians + gaussian].rgb : vec3(0);
+vec4 value_of(uint which, uint gaussian) {
+    if (which == 0u) return color[gaussian];
+    return which < first_layer + layers ? layer[(which - 1u) * gaussians + gaussian] : vec4(0);
 }
 void store(float t) {
     uint plane = width * height, at = pixel().y * width + pixel().x;
@@ -1750,19 +1852,24 @@ void main() {
     for (uint from = begin, step = 1u; from < end && !dark; from += window, step++) {
         uint entries = min(window, end - from);
         barrier();
+        if (lane() < window) masks[lane()] = lane() < entries ? tile_seen[from + lane()] : 0u;
         if (lane() < entries) {
-            masks[lane()] = tile_seen[from + lane()];
-            if (masks[lane()] != 0u) splats[lane()] = record[tile_list[from + lane()].first];
+            uint gaussian = tile_list[from + lane()].first;
+            splats[lane()] = record[2u * gaussian];
+            spreads[lane()] = record[2u * gaussian + 1u].xy;
         }
         for (uint i = lane(); i < entries * at_once; i += 256u)
             values[i] = value_of(first_layer + i % at_once, tile_list[from + i / at_once].first);
         barrier();
-        for (uint i = 0u; i < entries && t >= stop; i++) {
-            if ((masks[i] & bit) == 0u) continue;
-            bool drawn;
-            float alpha = alpha_of(weight_of(splats[i], at, drawn)), w = alpha * t;
-            for (uint l = 0u; l < at_once; l++) sums[l] += w * values[i * at_once + l];
-            t = fma(-alpha, t, t);
+        for (uint four = 0u; four < entries && t >= stop; four += 4u) {
+            if (!any_of_four(four, bit)) continue;
+            vec4 weights = weights_of(four, bit, at);
+            for (uint i = four; i < four + 4u; i++) {
+                if (!(weights[i - four] > 0) || t < stop) continue;
+                float alpha = alpha_of(weights[i - four]), w = alpha * t;
+                for (uint l = 0u; l < at_once; l++) sums[l] += w * values[i * at_once + l].rgb;
+                t = fma(-alpha, t, t);
+            }
         }
         dark = is_dark(t, step);
     }
@@ -1780,7 +1887,7 @@ static const struct {
     {"seen: list", {gpu_types, gpu_scan, gpu_seen, gpu_seen_list}},
     {"seen: copy", {gpu_types, gpu_seen, gpu_seen_copy}},
     {"transport: nodes", {gpu_transport_in, gpu_transport_nodes}},
-    {"transport: sums", {gpu_transport_in, gpu_scan, gpu_transport}},
+    {"transport: sums", {gpu_transport_in, gpu_transport}},
     {"shade",
      {gpu_rotation, gpu_lit_frame, gpu_lit_functions, gpu_network, gpu_reflect, gpu_colour, gpu_lobe,
       gpu_shade_main}},
@@ -1795,13 +1902,16 @@ static const struct {
     {"bin: scan", {gpu_types, gpu_bin_in, gpu_scan, gpu_bin_scan}},
     {"bin: emit", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_bin_emit}},
     {"bin: end", {gpu_types, gpu_bin_in, gpu_bin_end}},
-    {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_walk_camera}},
+    {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_weights, gpu_walk_camera}},
     {"walk: what is seen", {gpu_types, gpu_gather_camera}},
     {"walk: light", {gpu_types, gpu_walk_in, gpu_alpha, gpu_sums, gpu_walk_light, gpu_walk_light_main}},
-    {"walk: map", {gpu_types, gpu_walk_in, gpu_alpha, gpu_sums, gpu_walk_map, gpu_walk_map_main}},
+    {"walk: map",
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_sums, gpu_walk_map,
+      gpu_walk_map_main}},
     {"walk: visibility", {gpu_types, gpu_gather_light}},
-    {"blend", {gpu_types, gpu_walk_in, gpu_alpha, gpu_one_layer, gpu_blend}},
-    {"blend: layers", {gpu_types, gpu_walk_in, gpu_alpha, gpu_many_layers, gpu_blend}},
+    {"blend", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_one_layer, gpu_blend}},
+    {"blend: layers",
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_many_layers, gpu_blend}},
 };
 
 /* ==== failures ==== */
@@ -1966,9 +2076,14 @@ static void gpu_enter(gpu *g) {
     if (!gpu_enter_context(g)) gpu_fail(g, SSDGS_ERR_ISA, "OpenGL's context is lost, or in use elsewhere");
 }
 
+static void gpu_finish(gpu *g) {
+    if (g->busy) g->gl.Finish();
+    g->busy = 0;
+}
+
 static ssdgs_result gpu_leave(gpu *g, const char *stage) {
     if (!g->result) gpu_check(g, stage);
-    if (!g->result && g->waits) g->gl.Finish();
+    if (g->waits) gpu_finish(g);
     gpu_leave_context(g);
     return g->result;
 }
@@ -1989,9 +2104,11 @@ static void gpu_reserve(gpu *g, gpu_buffer *b, size_t size) {
     b->size = g->result ? 0 : size;
 }
 
-/* From there on in a buffer that has room for it. */
+/* From there on in a buffer that has room for it. Programs that still run are waited for: on NVIDIA's driver
+   580 they could see what was written after they were started. */
 static void gpu_write(gpu *g, const gpu_buffer *b, size_t from, const void *data, size_t size) {
     if (g->result) return;
+    gpu_finish(g);
     g->gl.BindBuffer(GPU_GL_SHADER_STORAGE_BUFFER, b->name);
     g->gl.BufferSubData(GPU_GL_SHADER_STORAGE_BUFFER, (intptr_t)from, (intptr_t)size, data);
 }
@@ -2001,13 +2118,23 @@ static void gpu_upload(gpu *g, gpu_buffer *b, const void *data, size_t size) {
     if (size) gpu_write(g, b, 0, data, size);
 }
 
-/* Waits for the device. */
+/* Waits for the device. By way of memory that is the host's: straight from the device's it is slow. */
 static void gpu_download(gpu *g, const gpu_buffer *b, void *data, size_t size) {
     if (!g->result && b->size < size) gpu_fail(g, SSDGS_ERR_ISA, "a buffer holds less than is read");
     if (g->result || !size) return;
-    g->gl.MemoryBarrier((uint32_t)GPU_GL_ALL_BARRIER_BITS);
-    g->gl.BindBuffer(GPU_GL_SHADER_STORAGE_BUFFER, b->name);
-    g->gl.GetBufferSubData(GPU_GL_SHADER_STORAGE_BUFFER, 0, (intptr_t)size, data);
+    g->gl.MemoryBarrier(GPU_GL_BUFFER_UPDATE_BARRIER_BIT);
+    g->gl.BindBuffer(GPU_GL_COPY_READ_BUFFER, b->name);
+    if (!g->staging.name) g->gl.GenBuffers(1, &g->staging.name);
+    g->gl.BindBuffer(GPU_GL_COPY_WRITE_BUFFER, g->staging.name);
+    if (g->staging.size < size) {
+        g->gl.BufferData(GPU_GL_COPY_WRITE_BUFFER, (intptr_t)size, NULL, GPU_GL_STREAM_READ);
+        gpu_check(g, "a buffer to read from");
+        g->staging.size = g->result ? 0 : size;
+    }
+    if (g->result) return;
+    g->gl.CopyBufferSubData(GPU_GL_COPY_READ_BUFFER, GPU_GL_COPY_WRITE_BUFFER, 0, 0, (intptr_t)size);
+    g->gl.GetBufferSubData(GPU_GL_COPY_WRITE_BUFFER, 0, (intptr_t)size, data);
+    g->busy = 0;
 }
 
 /* ==== programs ==== */
@@ -2059,7 +2186,8 @@ static void gpu_dispatch(gpu *g, size_t groups) {
     const size_t rows = (groups + most - 1) / most;
     if (g->result || !groups) return;
     g->gl.DispatchCompute((uint32_t)((groups + rows - 1) / rows), (uint32_t)rows, 1);
-    g->gl.MemoryBarrier((uint32_t)GPU_GL_ALL_BARRIER_BITS);
+    g->gl.MemoryBarrier(GPU_GL_SHADER_STORAGE_BARRIER_BIT);
+    g->busy = 1;
 }
 
 /* ==== SHADE ==== */
@@ -2076,10 +2204,9 @@ enum {
     GPU_AMBIENT = 2048,
     GPU_MEDIUM = 4096,
     GPU_VISIBILITY_GIVEN = 8192,
-    GPU_LENGTHS = 5,    /* of true dipole transport */
-    GPU_NODE = 64,      /* Gaussians where light enters, taken together */
-    GPU_RECEIVERS = 64, /* of light, of a group */
-    GPU_ROWS = 4096     /* values that a group's networks work on */
+    GPU_LENGTHS = 5, /* of true dipole transport */
+    GPU_NODE = 64,   /* Gaussians where light enters, taken together */
+    GPU_ROWS = 4096  /* values that a group's networks work on */
 };
 #define GPU_SOFT 0.02     /* length units: transport's distances are sqrt(r^2 + soft^2) */
 #define GPU_SHORTEST 0.04 /* of its lengths, each twice the one before */
@@ -2288,6 +2415,34 @@ static void gpu_upload_lamps(gpu *g, const ssdgs_frame *frame) {
     gpu_upload(g, &g->frame.lamps, lamps, lights * sizeof *lamps);
 }
 
+/* A face of a light's maps; the GLSL says what it holds. */
+typedef struct gpu_face {
+    float view[12], lens[4], kind[4];
+    int32_t size[4];
+} gpu_face;
+
+static void gpu_set_face(gpu_face *face, const ssdgs_splat_view *v) {
+    for (int i = 0; i < 12; i++) face->view[i] = (float)v->view[i];
+    face->lens[0] = (float)v->fx;
+    face->lens[1] = (float)v->fy;
+    face->lens[2] = (float)v->cx;
+    face->lens[3] = (float)v->cy;
+    face->kind[0] = (float)v->near_plane;
+    face->kind[1] = (float)v->orthographic;
+    face->kind[2] = (float)v->by_distance;
+    face->size[0] = v->width;
+    face->size[1] = v->height;
+    face->size[2] = (v->width + 15) / 16;
+    face->size[3] = (v->width + 15) / 16 * ((v->height + 15) / 16);
+}
+
+static void gpu_upload_faces(gpu *g, const ssdgs_frame *frame) {
+    const size_t views = (size_t)frame->view_count;
+    gpu_face *const faces = (gpu_face *)gpu_host(g, views * sizeof *faces);
+    for (size_t i = 0; i < views && faces; i++) gpu_set_face(faces + i, frame->views + i);
+    gpu_upload(g, &g->frame.faces, faces, views * sizeof *faces);
+}
+
 static void gpu_seen_program(gpu *g, gpu_program which, uint32_t count, uint32_t layers, size_t groups) {
     const uint32_t parameters[4] = {count, layers, 0, 0};
     gpu_frame *f = &g->frame;
@@ -2298,38 +2453,76 @@ static void gpu_seen_program(gpu *g, gpu_program which, uint32_t count, uint32_t
     gpu_dispatch(g, groups);
 }
 
-/* True dipole transport from where light enters to what is to be shaded. */
-static void gpu_transport_light(gpu *g, const ssdgs_frame *frame, size_t light) {
+static void gpu_reserve_lights(gpu *g, int count) {
+    if (g->result || g->frame.lights >= count) return;
+    gpu_light *more = (gpu_light *)realloc(g->frame.light, (size_t)count * sizeof *more);
+    if (!more) {
+        gpu_fail(g, SSDGS_ERR_MEMORY, "out of memory");
+        return;
+    }
+    memset(more + g->frame.lights, 0, (size_t)(count - g->frame.lights) * sizeof *more);
+    g->frame.light = more;
+    g->frame.lights = count;
+}
+
+/* True dipole transport from where light enters to what is to be shaded and does not have it yet. */
+static void gpu_transport_light(gpu *g, const ssdgs_frame *frame, int light) {
     gpu_frame *f = &g->frame;
     const size_t n = (size_t)frame->count, nodes = (n + GPU_NODE - 1) / GPU_NODE;
     const double unit = (double)frame->settings.length_unit, pi = 3.14159265358979323846;
     const double shortest = GPU_SHORTEST * unit, longest = shortest * (1 << (GPU_LENGTHS - 1));
-    const gpu_buffer *const buffers[5] = {&f->gaussians, &f->flux, &f->nodes, &f->shaded, &f->transport};
-    const struct {
+    const gpu_buffer *const buffers[6] = {&f->gaussians, &f->flux,      &f->nodes,
+                                          &f->seen,      &f->transport, &f->arrived};
+    struct {
         uint32_t count, stride, light, nodes;
         float soft2, longest, far_radii, scale;
-    } p = {(uint32_t)n,
-           (uint32_t)frame->objects->gaussians.stride,
-           (uint32_t)light,
-           (uint32_t)nodes,
-           (float)(GPU_SOFT * unit * GPU_SOFT * unit),
-           (float)(-1 / (log(2) * longest)),
-           (float)(2 * frame->options.transport_detail),
-           (float)(1 / (2 * pi * shortest))};
-    gpu_use(g, GPU_TRANSPORT_NODES, &p, sizeof p);
-    for (uint32_t i = 0; i < 5; i++) gpu_bind(g, i, buffers[i]);
-    gpu_dispatch(g, gpu_groups(nodes));
+        uint32_t revision;
+    } p;
+    p.count = (uint32_t)n;
+    p.stride = (uint32_t)frame->objects->gaussians.stride;
+    p.light = (uint32_t)light;
+    p.nodes = (uint32_t)nodes;
+    p.soft2 = (float)(GPU_SOFT * unit * GPU_SOFT * unit);
+    p.longest = (float)(-1 / (log(2) * longest));
+    p.far_radii = (float)(2 * frame->options.transport_detail);
+    p.scale = (float)(1 / (2 * pi * shortest));
+    p.revision = f->light[light].ready ? f->light[light].revision : ++g->revisions;
+    if (!f->light[light].ready) {
+        gpu_use(g, GPU_TRANSPORT_NODES, &p, sizeof p);
+        for (uint32_t i = 0; i < 3; i++) gpu_bind(g, i, buffers[i]);
+        gpu_dispatch(g, (nodes + GPU_NODE - 1) / GPU_NODE);
+        f->light[light].revision = p.revision;
+        f->light[light].ready = !g->result;
+    }
     gpu_use(g, GPU_TRANSPORT_SUMS, &p, sizeof p);
-    gpu_dispatch(g, (n + GPU_RECEIVERS - 1) / GPU_RECEIVERS);
+    for (uint32_t i = 0; i < 6; i++) gpu_bind(g, i, buffers[i]);
+    gpu_dispatch(g, nodes);
+}
+
+/* Room for transport of all lights; what was there is forgotten where it grows, or is of another detail. */
+static void gpu_reserve_transport(gpu *g, const ssdgs_frame *frame) {
+    gpu_frame *f = &g->frame;
+    const size_t n = (size_t)frame->count, lights = (size_t)frame->light_count,
+                 nodes = (n + GPU_NODE - 1) / GPU_NODE, all = nodes + (nodes + GPU_NODE - 1) / GPU_NODE;
+    const size_t size[3] = {lights * all * 8 * sizeof(float), lights * GPU_LENGTHS * n * sizeof(float),
+                            lights * nodes * sizeof(uint32_t)};
+    const double detail = (double)frame->options.transport_detail;
+    int forget = g->detail < detail || g->detail > detail;
+    gpu_reserve_lights(g, frame->light_count);
+    for (int i = 0; i < 3; i++) {
+        gpu_buffer *const b = i == 0 ? &f->nodes : i == 1 ? &f->transport : &f->arrived;
+        forget |= b->size < size[i];
+        gpu_reserve(g, b, size[i]);
+    }
+    g->detail = detail;
+    for (int i = 0; i < f->lights && forget; i++) f->light[i].ready = 0;
+    if (forget) gpu_upload(g, &f->arrived, gpu_host(g, f->arrived.size), f->arrived.size);
 }
 
 static void gpu_transport_all(gpu *g, const ssdgs_frame *frame) {
-    gpu_frame *f = &g->frame;
-    const size_t n = (size_t)frame->count, lights = (size_t)frame->light_count;
-    const int wanted = frame->flux && (frame->objects->terms & SSDGS_SCATTERING_TERM);
-    gpu_reserve(g, &f->nodes, (n + GPU_NODE - 1) / GPU_NODE * 8 * sizeof(float));
-    gpu_reserve(g, &f->transport, wanted ? lights * GPU_LENGTHS * n * sizeof(float) : 0);
-    for (size_t i = 0; wanted && i < lights; i++)
+    if (!frame->flux || !(frame->objects->terms & SSDGS_SCATTERING_TERM)) return;
+    gpu_reserve_transport(g, frame);
+    for (int i = 0; i < frame->light_count && !g->result; i++)
         if (gpu_casts(frame->lights + i)) gpu_transport_light(g, frame, i);
 }
 
@@ -2347,7 +2540,6 @@ static void gpu_shade(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve(g, &f->tally, 2 * groups * sizeof(uint32_t));
     gpu_reserve(g, &f->color, 4 * n * sizeof(float));
     gpu_reserve(g, &f->layers, 4 * n * (size_t)frame->layer_count * sizeof(float));
-    gpu_upload_lamps(g, frame);
     gpu_seen_program(g, GPU_SEEN_COUNT, count, layers, groups);
     gpu_seen_program(g, GPU_SEEN_SUM, count, layers, 1);
     gpu_seen_program(g, GPU_SEEN_LIST, count, layers, groups);
@@ -2597,18 +2789,6 @@ static void gpu_gather_light_view(gpu *g, const ssdgs_frame *frame, int view, co
     gpu_dispatch(g, gpu_groups(n));
 }
 
-static void gpu_reserve_lights(gpu *g, int count) {
-    if (g->result || g->frame.lights >= count) return;
-    gpu_light *more = (gpu_light *)realloc(g->frame.light, (size_t)count * sizeof *more);
-    if (!more) {
-        gpu_fail(g, SSDGS_ERR_MEMORY, "out of memory");
-        return;
-    }
-    memset(more + g->frame.lights, 0, (size_t)(count - g->frame.lights) * sizeof *more);
-    g->frame.light = more;
-    g->frame.lights = count;
-}
-
 static void gpu_walk_light_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *to) {
     const ssdgs_splat_view *v = frame->views + view;
     gpu_walk_parameters p = gpu_walk_of(frame, view);
@@ -2622,6 +2802,7 @@ static void gpu_walk_light_view(gpu *g, const ssdgs_frame *frame, int view, gpu_
     gpu_reserve(g, &to->tile_sums, g->instance_room * 4 * sizeof(float));
     if (g->result) return;
     gpu_light *light = g->frame.light + v->light;
+    light->ready = 0;
     const size_t tiles = p.map ? (size_t)faces * p.tiles : 1;
     gpu_reserve(g, &light->map_tile, tiles * sizeof(uint32_t));
     gpu_reserve(g, &light->light_map, tiles * 256 * sizeof(ssdgs_light_pixel));
@@ -2670,34 +2851,6 @@ static void gpu_blend_all(gpu *g, const ssdgs_frame *frame) {
 
 /* ==== COMPOSITE's highlights ==== */
 
-/* A face of a light's maps; the GLSL says what it holds. */
-typedef struct gpu_face {
-    float view[12], lens[4], kind[4];
-    int32_t size[4];
-} gpu_face;
-
-static void gpu_set_face(gpu_face *face, const ssdgs_splat_view *v) {
-    for (int i = 0; i < 12; i++) face->view[i] = (float)v->view[i];
-    face->lens[0] = (float)v->fx;
-    face->lens[1] = (float)v->fy;
-    face->lens[2] = (float)v->cx;
-    face->lens[3] = (float)v->cy;
-    face->kind[0] = (float)v->near_plane;
-    face->kind[1] = (float)v->orthographic;
-    face->kind[2] = (float)v->by_distance;
-    face->size[0] = v->width;
-    face->size[1] = v->height;
-    face->size[2] = (v->width + 15) / 16;
-    face->size[3] = (v->width + 15) / 16 * ((v->height + 15) / 16);
-}
-
-static void gpu_upload_faces(gpu *g, const ssdgs_frame *frame) {
-    const size_t views = (size_t)frame->view_count;
-    gpu_face *const faces = (gpu_face *)gpu_host(g, views * sizeof *faces);
-    for (size_t i = 0; i < views && faces; i++) gpu_set_face(faces + i, frame->views + i);
-    gpu_upload(g, &g->frame.faces, faces, views * sizeof *faces);
-}
-
 /* Where light is deferred: lights what the pixels' layers hold, the lights one after the other. */
 static void gpu_highlights(gpu *g, const ssdgs_frame *frame) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height,
@@ -2709,8 +2862,6 @@ static void gpu_highlights(gpu *g, const ssdgs_frame *frame) {
     if (frame->visibility_given) gpu_upload(g, &f->pixel_visibility, frame->pixel_visibility, all);
     else gpu_reserve(g, &f->pixel_visibility, all);
     gpu_reserve_lights(g, frame->light_count); /* those without maps */
-    gpu_upload_lamps(g, frame);
-    gpu_upload_faces(g, frame);
     for (int light = 0, view = 1; light < frame->light_count && !g->result; light++) {
         const gpu_light *map = f->light + light;
         const gpu_buffer *const buffers[9] = {
@@ -2754,6 +2905,8 @@ static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve(g, &f->depth_cue, n * lights * sizeof(float));
     gpu_reserve(g, &f->flux, frame->flux ? n * lights * sizeof(float) : 0);
     gpu_upload_model(g, frame->objects);
+    gpu_upload_lamps(g, frame);
+    gpu_upload_faces(g, frame);
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         v->cached = v->cached && !v->record && g->owner == frame->memory;
