@@ -1478,24 +1478,39 @@ bool is_dark(float t, uint step) {
 }
 );
 
-/* Entries of a tile's list, and the weights of four of them, which do not wait for one another. Masks are 0
-   after the last entry. */
+/* Entries of a tile's list, and which of them each micro-tile has: two lists in depth order, window_words words
+   of bits a micro-tile. */
 static const char gpu_window_64[] = GPU_GLSL(const uint window = 64u;);
 static const char gpu_window_256[] = GPU_GLSL(const uint window = 256u;);
-static const char gpu_weights[] = GPU_GLSL(
+static const char gpu_window[] = GPU_GLSL(
+const uint nothing = 32u;
+/* The lowest bit, which goes; nothing: there is none. */
+uint take(inout uint bits) {
+    uint first = bits == 0u ? nothing : uint(findLSB(bits));
+    bits &= bits - 1u;
+    return first;
+}
+const uint words = window / 32u;
 shared vec4 splats[window];
 shared vec2 spreads[window];
-shared uint masks[window];
-bool any_of_four(uint i, uint bit) {
-    return ((masks[i] | masks[i + 1u] | masks[i + 2u] | masks[i + 3u]) & bit) != 0u;
+shared uint masks[window]; /* 0 where there is no entry */
+shared uint covered[16u * words]; /* a bit an entry, of each micro-tile */
+void load(uint place, uint gaussian, uint mask) {
+    splats[place] = record[2u * gaussian];
+    spreads[place] = record[2u * gaussian + 1u].xy;
+    masks[place] = mask;
 }
-vec4 weights_of(uint i, uint bit, vec2 at) {
-    vec4 weights;
-    for (uint k = 0u; k < 4u; k++) {
-        float weight = weight_of(splats[i + k], spreads[i + k], at);
-        weights[k] = (masks[i + k] & bit) != 0u ? weight : 0;
+void find_covered() {
+    uint word = lane() % words, bits = 0u;
+    barrier();
+    if (lane() < 16u * words) {
+        for (uint i = 0u; i < 32u; i++) bits |= (masks[32u * word + i] >> lane() / words & 1u) << i;
+        covered[lane()] = bits;
     }
-    return weights;
+    barrier();
+}
+float weight_at(uint word, uint which, vec2 at) {
+    return which == nothing ? 0 : weight_of(splats[32u * word + which], spreads[32u * word + which], at);
 }
 );
 
@@ -1505,50 +1520,56 @@ vec4 weights_of(uint i, uint bit, vec2 at) {
 static const char gpu_walk_camera[] = GPU_GLSL(
 layout(std430, binding = 3) writeonly buffer seens { uint tile_seen[]; };
 layout(std430, binding = 4) writeonly buffer neededs { uint tile_needed[]; };
-shared uint blends[16 * 8]; /* a bit an entry, 8 words for each micro-tile */
+shared uint blends[16 * 8]; /* as `covered` */
 shared uint heavy[8];
 shared uint must[8];
+float t, over;
+uint blended, marked; /* bits of 32 entries */
+void see(float weight, uint which, uint round, uint strong) {
+    if (!(weight > 0) || t < stop) return;
+    float alpha = alpha_of(weight), w = alpha * t;
+    uint own = 1u << which;
+    t = fma(-alpha, t, t);
+    blended |= own;
+    if (round == 0u) {
+        if (w > max_error * 0.03125) marked |= own;
+    } else if (max_error > 0 && (strong & own) == 0u) {
+        over += w;
+        if (over > max_error) marked |= own;
+    }
+}
 void main() {
     if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u], bit = 1u << micro(), step = 0u;
-    float t = inside() ? 1 : -1, over = 0, slight = max_error * 0.03125;
+    uint begin = tile_start[group()], end = tile_start[group() + 1u], step = 0u;
     bool dark = false, thrifty = max_error > 0;
     vec2 at = centre();
+    t = inside() ? 1 : -1;
+    over = 0;
     if (lane() == 0u) lit = 0u;
     for (uint from = begin; from < end; from += window) {
         uint entries = min(window, end - from);
         barrier();
-        if (lane() < 128u) blends[lane()] = 0u;
-        if (lane() < 8u) heavy[lane()] = must[lane()] = 0u;
-        masks[lane()] = 0u;
-        if (lane() < entries) {
-            pair entry = tile_list[from + lane()];
-            splats[lane()] = record[2u * entry.first];
-            spreads[lane()] = record[2u * entry.first + 1u].xy;
-            masks[lane()] = entry.second;
-        }
-        barrier();
+        if (lane() < 16u * words) blends[lane()] = 0u;
+        if (lane() < words) heavy[lane()] = must[lane()] = 0u;
+        if (lane() < entries) load(lane(), tile_list[from + lane()].first, tile_list[from + lane()].second);
+        else masks[lane()] = 0u;
+        find_covered();
         float before = t;
         for (uint round = thrifty ? 0u : 1u; round < 2u && !dark; round++) {
             t = before;
-            for (uint word = 0u; 32u * word < entries && t >= stop; word++) {
-                uint blended = 0u, marked = 0u, strong = heavy[word];
-                for (uint i = 32u * word; i < min(32u * word + 32u, entries) && t >= stop; i += 4u) {
-                    if (!any_of_four(i, bit)) continue;
-                    vec4 weights = weights_of(i, bit, at);
-                    for (uint k = 0u; k < 4u; k++) {
-                        if (!(weights[k] > 0) || t < stop) continue;
-                        float alpha = alpha_of(weights[k]), w = alpha * t;
-                        uint own = 1u << (i + k & 31u);
-                        t = fma(-alpha, t, t);
-                        blended |= own;
-                        if (round == 0u && w > slight) marked |= own;
-                        if (round == 0u || !thrifty || (strong & own) != 0u) continue;
-                        over += w;
-                        if (over > max_error) marked |= own;
-                    }
+            for (uint word = 0u; word < words && t >= stop; word++) {
+                uint todo = covered[words * micro() + word], strong = heavy[word];
+                blended = marked = 0u;
+                while (todo != 0u && t >= stop) { /* four weights do not wait for one another */
+                    uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
+                    float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
+                    float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
+                    see(of_a, a, round, strong);
+                    see(of_b, b, round, strong);
+                    see(of_c, c, round, strong);
+                    see(of_d, d, round, strong);
                 }
-                if (round == 1u && blended != 0u) atomicOr(blends[8u * micro() + word], blended);
+                if (round == 1u && blended != 0u) atomicOr(blends[words * micro() + word], blended);
                 if (round == 0u && marked != 0u) atomicOr(heavy[word], marked);
                 if (round == 1u && marked != 0u) atomicOr(must[word], marked);
             }
@@ -1556,7 +1577,7 @@ void main() {
         }
         if (lane() < entries) {
             uint word = lane() >> 5u, place = lane() & 31u, mask = 0u;
-            for (uint m = 0u; m < 16u; m++) mask |= (blends[8u * m + word] >> place & 1u) << m;
+            for (uint m = 0u; m < 16u; m++) mask |= (blends[words * m + word] >> place & 1u) << m;
             tile_seen[from + lane()] = mask;
             if (thrifty) tile_needed[from + lane()] = (heavy[word] | must[word]) >> place & 1u;
         }
@@ -1585,24 +1606,30 @@ void main() {
 }
 );
 
-/* Sums over the pixels of up to three values of each of 8 entries: 32 threads an entry, each of every 32nd
-   pixel; then four a value. */
+/* Sums of up to three values of the pixels of 8 entries, whose micro-tiles alone are looked at: 32 threads an
+   entry, one for each pixel of two micro-tiles, then four a value. */
 static const char gpu_sums[] = GPU_GLSL(
 const uint at_once = 8u;
 shared float part[3][8][256];
-void add_up(uint values) {
+void add_up(uint values, uint mask) { /* mask: entry lane() / 32's */
     uint entry = lane() >> 5u, first = lane() & 31u, which = first >> 2u;
+    uint todo = mask & (first < 16u ? 0x5555u : 0xAAAAu);
+    vec3 sum = vec3(0);
     barrier();
-    for (uint v = 0u; v < values; v++) {
-        float sum = 0;
-        for (uint i = first; i < 256u; i += 32u) sum += part[v][entry][i];
-        part[v][entry][first] = sum;
+    while (todo != 0u) {
+        uint pixel = 16u * take(todo) + (first & 15u);
+        sum.x += part[0][entry][pixel];
+        if (values > 1u) sum.y += part[1][entry][pixel];
+        if (values > 2u) sum.z += part[2][entry][pixel];
     }
+    part[0][entry][first] = sum.x; /* which no other thread of the entry reads before the barrier */
+    if (values > 1u) part[1][entry][first] = sum.y;
+    if (values > 2u) part[2][entry][first] = sum.z;
     barrier();
     if (which < values) {
-        float sum = 0;
-        for (uint i = first & 3u; i < 32u; i += 4u) sum += part[which][entry][i];
-        part[which][entry][first & 3u] = sum;
+        float quarter = 0;
+        for (uint i = first & 3u; i < 32u; i += 4u) quarter += part[which][entry][i];
+        part[which][entry][first & 3u] = quarter;
     }
     barrier();
 }
@@ -1613,92 +1640,120 @@ float added(uint which, uint entry) {
 );
 
 /* Eqs. 6, 7 and the depth cue. Per entry the sums of rho v, rho and rho x cue. It is sampled once all that is
-   nearer than its distance - bias is in the transmittance, so two windows run along the list. Both depend on
-   distances alone: all threads are at the same entries. In the dark nothing is applied any more, and what is in
+   nearer than its distance - bias is in the transmittance, so two windows run along the list; a thread takes of them what its
+   micro-tile has. In the dark nothing is applied any more, and what is in
    no other tile is not sampled, unless for its cue: v = 0 / 1. */
 static const char gpu_walk_light[] = GPU_GLSL(
 layout(std430, binding = 3) readonly buffer depths { float depth[]; };
 layout(std430, binding = 4) readonly buffer of_gaussians { pair of_gaussian[]; };
 layout(std430, binding = 5) writeonly buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
-const uint window = 64u;
-shared vec4 near_splats[64];
+shared float depths_of[window];
+shared uint alone[window];
+shared vec4 near_splats[64]; /* as window's */
 shared vec2 near_spreads[64];
 shared float near_depths[64];
 shared uint near_masks[64];
-shared vec4 far_splats[64];
-shared vec2 far_spreads[64];
-shared float far_depths[64];
-shared uint far_masks[64];
-shared uint far_alone[64];
+shared uint near_covered[32];
 float t, met; /* transmittance; sum of blend weight x distance */
-uint applying;
+uint near_todo, near_word; /* what of the micro-tile's is not applied yet */
 
-/* All that is nearer than this. Some compilers go on with `applying` where a loop ends by return or break. */
-void apply(float reach, uint begin, uint end, float nearest, vec2 at) {
+/* A window of what is to be applied, from this entry on. */
+void load_near(uint from, uint end) {
+    barrier();
+    if (lane() < 64u) {
+        bool there = from + lane() < end;
+        pair entry = tile_list[there ? from + lane() : from];
+        near_splats[lane()] = record[2u * entry.first];
+        near_spreads[lane()] = record[2u * entry.first + 1u].xy;
+        near_depths[lane()] = there ? depth[entry.first] : 1e30;
+        near_masks[lane()] = there ? entry.second : 0u;
+    }
+    barrier();
+    if (lane() < 32u) {
+        uint bits = 0u;
+        for (uint i = 0u; i < 32u; i++) bits |= (near_masks[32u * (lane() & 1u) + i] >> (lane() >> 1u) & 1u) << i;
+        near_covered[lane()] = bits;
+    }
+    barrier();
+    near_word = 0u;
+    near_todo = near_covered[2u * micro()];
+}
+/* All of the window that is nearer than this. */
+void apply(float reach, float nearest, vec2 at) {
     bool nearer = true;
-    while (nearer && applying < end) {
-        uint i = (applying - begin) % window;
-        if (i == 0u) {
-            barrier();
-            if (lane() < window && applying + lane() < end) {
-                pair entry = tile_list[applying + lane()];
-                near_splats[lane()] = record[2u * entry.first];
-                near_spreads[lane()] = record[2u * entry.first + 1u].xy;
-                near_depths[lane()] = depth[entry.first];
-                near_masks[lane()] = entry.second;
-            }
-            barrier();
-        }
-        nearer = near_depths[i] < reach;
-        if (nearer && (near_masks[i] & 1u << micro()) != 0u) {
+    while (nearer) {
+        if (near_todo == 0u && near_word == 0u) near_todo = near_covered[2u * micro() + ++near_word];
+        uint i = 32u * near_word + uint(findLSB(near_todo)) % 32u;
+        nearer = near_todo != 0u && near_depths[i] < reach;
+        if (nearer) {
             float alpha = alpha_of(weight_of(near_splats[i], near_spreads[i], at));
             met += alpha * t * (near_depths[i] - nearest);
             t = max(fma(-alpha, t, t), 1e-20);
+            near_todo &= near_todo - 1u;
         }
-        applying += nearer ? 1u : 0u;
     }
 }
 );
 static const char gpu_walk_light_main[] = GPU_GLSL(
 void main() {
     if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u];
+    uint begin = tile_start[group()], end = tile_start[group() + 1u], next = begin + 64u; /* near window */
     float nearest = facts[view].nearest;
     bool dark = false;
     vec2 at = centre();
     t = 1;
     met = 0;
-    applying = begin;
     if (lane() == 0u) lit = 0u;
+    if (begin < end) load_near(begin, end);
     for (uint from = begin, step = 1u; from < end; from += at_once, step++) {
         uint loaded = (from - begin) % window, entries = min(at_once, end - from), sampled = 0u;
         barrier();
         if (loaded == 0u) {
-            if (lane() < window && from + lane() < end) {
-                pair entry = tile_list[from + lane()];
-                far_splats[lane()] = record[2u * entry.first];
-                far_spreads[lane()] = record[2u * entry.first + 1u].xy;
-                far_depths[lane()] = depth[entry.first];
-                far_masks[lane()] = entry.second;
-                far_alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+            if (lane() < window) {
+                masks[lane()] = 0u;
+                if (from + lane() < end) {
+                    pair entry = tile_list[from + lane()];
+                    load(lane(), entry.first, entry.second);
+                    depths_of[lane()] = depth[entry.first];
+                    alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+                }
             }
-            barrier();
+            find_covered();
         }
-        for (uint i = 0u; i < entries; i++) {
-            if (dark && far_alone[loaded + i] != 0u) continue;
-            bool covers = (far_masks[loaded + i] & 1u << micro()) != 0u;
-            part[1][i][lane()] = covers ? weight_of(far_splats[loaded + i], far_spreads[loaded + i], at) : 0;
-            sampled |= 1u << i;
-        }
-        for (uint i = 0u; i < entries; i++) {
-            float distance = far_depths[loaded + i], rho = part[1][i][lane()];
-            if (!dark) apply(distance - bias, begin, end, nearest, at);
-            part[0][i][lane()] = rho * t;
-            if (cue != 0u) part[2][i][lane()] = rho * ((distance - nearest) - (distance - nearest) * t - met);
+        for (uint i = 0u; i < entries; i++)
+            if (!dark || alone[loaded + i] == 0u) sampled |= 1u << i;
+        uint word = loaded >> 5u, shift = loaded & 31u, todo = covered[words * micro() + word] >> shift & sampled;
+        float last = depths_of[loaded + entries - 1u] - bias;
+        bool more = true;
+        while (more) {
+            float within = near_depths[63]; /* what is nearer is in the window */
+            more = !dark && within < last;
+            bool goes_on = todo != 0u;
+            while (goes_on) {
+                uint i = uint(findLSB(todo));
+                float distance = depths_of[loaded + i];
+                goes_on = !more || distance - bias <= within;
+                if (goes_on) {
+                    if (!dark) apply(distance - bias, nearest, at);
+                    float rho = weight_of(splats[loaded + i], spreads[loaded + i], at);
+                    part[0][i][lane()] = rho * t;
+                    part[1][i][lane()] = rho;
+                    if (cue != 0u)
+                        part[2][i][lane()] = rho * ((distance - nearest) - (distance - nearest) * t - met);
+                    todo &= todo - 1u;
+                    goes_on = todo != 0u;
+                }
+            }
+            if (more) {
+                apply(last, nearest, at);
+                load_near(next, end);
+                next += 64u;
+            }
         }
         if (!dark) dark = is_dark(t, step);
-        if (sampled != 0u) add_up(cue != 0u ? 3u : 2u);
+        uint own = lane() >> 5u;
+        if (sampled != 0u) add_up(cue != 0u ? 3u : 2u, (sampled >> own & 1u) != 0u ? masks[loaded + own] : 0u);
         if (lane() < entries) {
             vec4 sum = vec4(0, 1, 0, 0);
             if ((sampled >> lane() & 1u) != 0u)
@@ -1718,6 +1773,7 @@ layout(std430, binding = 5) buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
 layout(std430, binding = 7) writeonly buffer map_tiles { uint map_tile[]; };
 shared float distances[window];
+float t, omega; /* transmittance; solid angle */
 const float levels[4] = float[4](0.98, 0.5, 0.1, -1);
 uint fallen;
 vec3 falls;
@@ -1739,41 +1795,49 @@ float solid_angle() {
 }
 );
 static const char gpu_walk_map_main[] = GPU_GLSL(
+void pass(float weight, uint word, uint which) {
+    float alpha = alpha_of(weight), past = t;
+    if (which == nothing) return;
+    t = max(fma(-alpha, t, t), 1e-20);
+    if (t < levels[fallen]) note(past, t, distances[32u * word + which]);
+    if (flux != 0u) part[0][which % at_once][lane()] = omega * alpha * past;
+}
 void main() {
     if (group() >= tiles) return;
     uint begin = tile_start[group()], end = tile_start[group() + 1u], number = first_tile + group();
     if (map != 0u && lane() == 0u) map_tile[number] = begin < end ? number : none;
-    float t = 1, omega = solid_angle(), nearest = facts[view].nearest;
+    float nearest = facts[view].nearest;
     bool dark = false;
     vec2 at = centre();
+    t = 1;
+    omega = solid_angle();
     fallen = 0u;
     falls = vec3(1e30);
     left = before = vec2(0);
     if (lane() == 0u) lit = 0u;
     for (uint from = begin, step = 1u; from < end && !dark; from += window, step++) {
-        uint entries = min(window, end - from), bit = 1u << micro();
+        uint entries = min(window, end - from), own = lane() >> 5u;
         barrier();
         if (lane() < window) masks[lane()] = 0u;
         if (lane() < entries) {
             pair entry = tile_list[from + lane()];
-            splats[lane()] = record[2u * entry.first];
-            spreads[lane()] = record[2u * entry.first + 1u].xy;
+            load(lane(), entry.first, entry.second);
             distances[lane()] = depth[entry.first] - nearest;
-            masks[lane()] = entry.second;
         }
-        barrier();
+        find_covered();
         for (uint first = 0u; first < entries; first += at_once) {
-            for (uint four = first; four < first + at_once; four += 4u) {
-                vec4 weights = any_of_four(four, bit) ? weights_of(four, bit, at) : vec4(0);
-                for (uint i = four; i < four + 4u; i++) {
-                    float alpha = alpha_of(weights[i - four]), past = t;
-                    t = max(fma(-alpha, t, t), 1e-20);
-                    if (t < levels[fallen]) note(past, t, distances[i]);
-                    if (flux != 0u) part[0][i - first][lane()] = omega * alpha * past;
-                }
+            uint word = first >> 5u, todo = covered[words * micro() + word] & 0xFFu << (first & 31u);
+            while (todo != 0u) {
+                uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
+                float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
+                float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
+                pass(of_a, word, a);
+                pass(of_b, word, b);
+                pass(of_c, word, c);
+                pass(of_d, word, d);
             }
             if (flux == 0u) continue;
-            add_up(1u);
+            add_up(1u, masks[first + own]);
             if (lane() < at_once && first + lane() < entries)
                 tile_sums[from + first + lane()].w = added(0u, lane());
             barrier();
@@ -1827,11 +1891,18 @@ layout(std430, binding = 7) writeonly buffer all_layer_pixels { float layer_pixe
 layout(std430, binding = 8) writeonly buffer transmittances { float transmittance[]; };
 shared vec4 values[window * at_once];
 vec3 sums[at_once];
+float t;
+void add(float weight, uint word, uint which) {
+    if (!(weight > 0) || t < stop) return;
+    float alpha = alpha_of(weight), w = alpha * t;
+    for (uint l = 0u; l < at_once; l++) sums[l] += w * values[(32u * word + which) * at_once + l].rgb;
+    t = fma(-alpha, t, t);
+}
 vec4 value_of(uint which, uint gaussian) {
     if (which == 0u) return color[gaussian];
     return which < first_layer + layers ? layer[(which - 1u) * gaussians + gaussian] : vec4(0);
 }
-void store(float t) {
+void store() {
     uint plane = width * height, at = pixel().y * width + pixel().x;
     if (first_layer == 0u) {
         transmittance[at] = t;
@@ -1843,37 +1914,35 @@ void store(float t) {
 }
 void main() {
     if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u], bit = 1u << micro();
-    float t = inside() ? 1 : -1;
+    uint begin = tile_start[group()], end = tile_start[group() + 1u];
     bool dark = false;
     vec2 at = centre();
+    t = inside() ? 1 : -1;
     for (uint l = 0u; l < at_once; l++) sums[l] = vec3(0);
     if (lane() == 0u) lit = 0u;
     for (uint from = begin, step = 1u; from < end && !dark; from += window, step++) {
         uint entries = min(window, end - from);
         barrier();
-        if (lane() < window) masks[lane()] = lane() < entries ? tile_seen[from + lane()] : 0u;
-        if (lane() < entries) {
-            uint gaussian = tile_list[from + lane()].first;
-            splats[lane()] = record[2u * gaussian];
-            spreads[lane()] = record[2u * gaussian + 1u].xy;
-        }
+        if (lane() < entries) load(lane(), tile_list[from + lane()].first, tile_seen[from + lane()]);
+        else if (lane() < window) masks[lane()] = 0u;
         for (uint i = lane(); i < entries * at_once; i += 256u)
             values[i] = value_of(first_layer + i % at_once, tile_list[from + i / at_once].first);
-        barrier();
-        for (uint four = 0u; four < entries && t >= stop; four += 4u) {
-            if (!any_of_four(four, bit)) continue;
-            vec4 weights = weights_of(four, bit, at);
-            for (uint i = four; i < four + 4u; i++) {
-                if (!(weights[i - four] > 0) || t < stop) continue;
-                float alpha = alpha_of(weights[i - four]), w = alpha * t;
-                for (uint l = 0u; l < at_once; l++) sums[l] += w * values[i * at_once + l].rgb;
-                t = fma(-alpha, t, t);
+        find_covered();
+        for (uint word = 0u; word < words && t >= stop; word++) {
+            uint todo = covered[words * micro() + word];
+            while (todo != 0u && t >= stop) {
+                uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
+                float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
+                float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
+                add(of_a, word, a);
+                add(of_b, word, b);
+                add(of_c, word, c);
+                add(of_d, word, d);
             }
         }
         dark = is_dark(t, step);
     }
-    if (inside()) store(t);
+    if (inside()) store();
 }
 );
 
@@ -1902,16 +1971,18 @@ static const struct {
     {"bin: scan", {gpu_types, gpu_bin_in, gpu_scan, gpu_bin_scan}},
     {"bin: emit", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_bin_emit}},
     {"bin: end", {gpu_types, gpu_bin_in, gpu_bin_end}},
-    {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_weights, gpu_walk_camera}},
+    {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_window, gpu_walk_camera}},
     {"walk: what is seen", {gpu_types, gpu_gather_camera}},
-    {"walk: light", {gpu_types, gpu_walk_in, gpu_alpha, gpu_sums, gpu_walk_light, gpu_walk_light_main}},
+    {"walk: light",
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_sums, gpu_walk_light,
+      gpu_walk_light_main}},
     {"walk: map",
-     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_sums, gpu_walk_map,
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_sums, gpu_walk_map,
       gpu_walk_map_main}},
     {"walk: visibility", {gpu_types, gpu_gather_light}},
-    {"blend", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_one_layer, gpu_blend}},
+    {"blend", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_one_layer, gpu_blend}},
     {"blend: layers",
-     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_weights, gpu_many_layers, gpu_blend}},
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_many_layers, gpu_blend}},
 };
 
 /* ==== failures ==== */
