@@ -129,7 +129,6 @@ typedef struct gpu_buffer {
 /* The compute programs, compiled when they are first used. */
 typedef enum gpu_program {
     GPU_SEEN_COUNT,
-    GPU_SEEN_SUM,
     GPU_SEEN_LIST,
     GPU_SEEN_COPY,
     GPU_TRANSPORT_NODES,
@@ -137,13 +136,10 @@ typedef enum gpu_program {
     GPU_SHADE,
     GPU_HIGHLIGHT,
     GPU_PROJECT,
-    GPU_SORT_KEYS,
     GPU_SORT_COUNT,
     GPU_SORT_SCAN,
     GPU_SORT_SCATTER,
-    GPU_SORT_END,
     GPU_BIN_COUNT,
-    GPU_BIN_SCAN,
     GPU_BIN_EMIT,
     GPU_BIN_END,
     GPU_WALK_CAMERA,
@@ -177,7 +173,7 @@ typedef struct gpu_light {
 
 /* What only the device counts of a view. */
 typedef struct gpu_fact {
-    uint32_t gaussians, visible, instances; /* instances: as many as there should be room for */
+    uint32_t visible, instances; /* instances: as many as there should be room for */
     float nearest;
 } gpu_fact;
 
@@ -200,7 +196,7 @@ typedef struct gpu_frame {
 typedef struct gpu_scratch {
     gpu_buffer key[2], value[2]; /* what is sorted, from one to the other */
     gpu_buffer digits;           /* (256, blocks) how often a digit is in a block; then (256) in all */
-    gpu_buffer groups;           /* (groups) instances of 256 ranks; then what comes before */
+    gpu_buffer groups;           /* (groups) instances of 256 ranks */
     gpu_buffer owner;            /* (instances) their Gaussians */
     gpu_buffer sums;             /* (n, 4) tile_sums of a light's views so far */
 } gpu_scratch;
@@ -345,7 +341,7 @@ float schlick(float f0, float missing) {
 );
 
 /* The Gaussians to be shaded, ascending, and for each that is skipped the place of its neighbour among them.
-   Groups count theirs, one group adds the counts up, then all write. */
+   Groups count theirs, then all write. */
 static const char gpu_seen[] = GPU_GLSL(
 layout(std140, binding = 0) uniform parameters { uint count; uint layer_count; };
 layout(std430, binding = 0) buffer seen_block { uint seen[]; };
@@ -369,41 +365,26 @@ void main() {
 }
 );
 
-/* One group. Where all are skipped, some colour is needed: the first's. */
-static const char gpu_seen_sum[] = GPU_GLSL(
-shared uint first;
-void main() {
-    uint groups = (count + 255u) / 256u;
-    uint before = 0u;
-    if (lane() == 0u) first = none;
-    for (uint i = 0u; i < groups; i += 256u) {
-        uint at = i + lane();
-        uvec2 of = at < groups ? tally[at] : uvec2(0u, none);
-        uint sum;
-        uint place = before + scan(of.x, sum);
-        if (of.y != none) atomicMin(first, of.y);
-        if (at < groups) tally[at].x = place;
-        before += sum;
-    }
-    barrier();
-    if (lane() > 0u) return;
-    shaded_count = before;
-    if (before > 0u || first == none) return;
-    shaded_count = 1u;
-    shaded[0] = first;
-    seen[first] = is_seen;
-}
-);
-
+/* Where all are skipped, some colour is needed: the first's. */
 static const char gpu_seen_list[] = GPU_GLSL(
 layout(std430, binding = 3) writeonly buffer neighbour_block { uint neighbours[]; };
+shared uint first;
 void main() {
     bool within = item() < count;
-    uint is = within ? seen[item()] : 0u;
-    uint sum;
-    uint place = scan(uint(is == is_seen), sum);
+    uint is = within ? seen[item()] : 0u, before = 0u, all = 0u, own;
+    if (lane() == 0u) first = none;
+    barrier();
+    for (uint at = lane(); 256u * at < count; at += 256u) {
+        all += tally[at].x;
+        if (at < group()) before += tally[at].x;
+        if (tally[at].y != none) atomicMin(first, tally[at].y);
+    }
+    scan(before, before);
+    scan(all, all);
+    if (all == 0u && item() == first) seen[item()] = is = is_seen;
+    uint place = before + scan(uint(is == is_seen), own);
+    if (item() == 0u) shaded_count = all == 0u && first != none ? 1u : all;
     if (!within) return;
-    place += tally[group()].x;
     if (is == is_seen) shaded[place] = item();
     neighbours[item()] = is == is_skipped ? max(place, 1u) - 1u : none;
 }
@@ -1098,7 +1079,7 @@ void main() {
 
 /* What views, records and lists are. */
 static const char gpu_types[] = GPU_GLSL(
-struct fact { uint gaussians, visible, instances; float nearest; };
+struct fact { uint visible, instances; float nearest; };
 struct splat { float x, y, xx, xy, yy, log2_opacity, extent_x, extent_y; };
 struct pair { uint first, second; }; /* instance: place, mask; of a Gaussian: first, count; entry: Gaussian, mask */
 const float log2e = 1.44269504088896341;
@@ -1110,18 +1091,25 @@ uint listed(uint instances, uint room) { return instances > 0x7FFFFFFFu ? 0u : m
 /* The sum of what the threads before this one have, and of all. */
 static const char gpu_scan[] = GPU_GLSL(
 shared uint scanned[256];
+shared uint scanned_16[16]; /* of 16 threads */
 uint scan(uint value, out uint total) {
+    uint before = 0u, own = lane() & ~15u;
     barrier();
     scanned[lane()] = value;
     barrier();
-    for (uint reach = 1u; reach < 256u; reach *= 2u) {
-        uint before = lane() >= reach ? scanned[lane() - reach] : 0u;
-        barrier();
-        scanned[lane()] += before;
-        barrier();
+    if (lane() < 16u) {
+        uint sum = 0u;
+        for (uint i = 0u; i < 16u; i++) sum += scanned[16u * lane() + i];
+        scanned_16[lane()] = sum;
     }
-    total = scanned[255];
-    return scanned[lane()] - value;
+    barrier();
+    total = 0u;
+    for (uint i = 0u; i < 16u; i++) {
+        if (16u * i < own) before += scanned_16[i];
+        total += scanned_16[i];
+        if (own + i < lane()) before += scanned[own + i];
+    }
+    return before;
 }
 );
 
@@ -1205,32 +1193,17 @@ void main() {
 }
 );
 
-/* ---- SORT: least significant digit first, of 8 bits, 2048 keys a group ---- */
+/* ---- SORT: least significant digit first, of 8 bits, some rows of 256 keys a group ---- */
 
+/* Of the first digit the values are 0, 1, 2 .. Depths are keys as they are: those drawn are not negative, so
+   their bits are in their order, and what is not drawn, -1, comes last. */
 static const char gpu_sort_in[] = GPU_GLSL(
-layout(std140, binding = 0) uniform parameters { uint room, shift, blocks, view, instances; };
+layout(std140, binding = 0) uniform parameters { uint room, shift, blocks, rows, view, instances; };
 layout(std430, binding = 0) buffer facts_ { fact facts[]; };
 layout(std430, binding = 1) readonly buffer keys { uint key[]; };
-const uint rows = 8u;
-uint count() { return instances != 0u ? listed(facts[view].instances, room) : facts[view].gaussians; }
+uint count() { return instances != 0u ? listed(facts[view].instances, room) : room; }
 uint at(uint row) { return (group() * rows + row) * 256u + lane(); }
 uint digit(uint which) { return key[which] >> shift & 255u; }
-);
-
-/* Depths are not negative, so their bits are in their order; what is not drawn comes last. */
-static const char gpu_sort_keys[] = GPU_GLSL(
-layout(std140, binding = 0) uniform parameters { uint count, view; };
-layout(std430, binding = 0) buffer facts_ { fact facts[]; };
-layout(std430, binding = 1) readonly buffer depths { float depth[]; };
-layout(std430, binding = 2) writeonly buffer keys { uint key[]; };
-layout(std430, binding = 3) writeonly buffer values { uint value[]; };
-void main() {
-    uint i = item();
-    if (i == 0u) facts[view].gaussians = count;
-    if (i >= count) return;
-    key[i] = depth[i] >= 0 ? floatBitsToUint(depth[i]) : none;
-    value[i] = i;
-}
 );
 
 static const char gpu_sort_count[] = GPU_GLSL(
@@ -1288,7 +1261,7 @@ void main() {
             uint place = next[own] + uint(bitCount(bits[(lane() >> 5u) * 256u + own] & ((1u << bit) - 1u)));
             for (uint word = 0u; word < lane() >> 5u; word++) place += uint(bitCount(bits[word * 256u + own]));
             key_out[place] = key[at(row)];
-            value_out[place] = value[at(row)];
+            value_out[place] = shift == 0u ? at(row) : value[at(row)];
         }
         barrier();
         for (uint word = 0u; word < 8u; word++) {
@@ -1296,17 +1269,6 @@ void main() {
             bits[word * 256u + lane()] = 0u;
         }
     }
-}
-);
-
-/* How many are drawn, and where the nearest is. */
-static const char gpu_sort_end[] = GPU_GLSL(
-void main() {
-    uint i = item();
-    if (i >= count()) return;
-    if (i == 0u) facts[view].nearest = key[0] == none ? 0 : uintBitsToFloat(key[0]);
-    if (i == 0u && key[0] == none) facts[view].visible = 0u;
-    if (key[i] != none && (i + 1u == count() || key[i + 1u] == none)) facts[view].visible = i + 1u;
 }
 );
 
@@ -1351,10 +1313,16 @@ uint touched(splat s, uint tx, uint ty) {
 );
 
 static const char gpu_bin_count[] = GPU_GLSL(
+layout(std430, binding = 5) readonly buffer depths { float depth[]; };
+bool is_drawn(uint rank) { return rank < count && depth[order[rank]] >= 0; }
 void main() {
     uint rank = item(), found = 0u, total;
+    bool drawn = is_drawn(rank);
     if (group() * 256u >= count) return;
-    if (rank < facts[view].visible) {
+    if (rank == 0u) facts[view].nearest = drawn ? depth[order[0]] : 0;
+    if (rank == 0u && !drawn) facts[view].visible = 0u;
+    if (drawn && !is_drawn(rank + 1u)) facts[view].visible = rank + 1u;
+    if (drawn) {
         splat s = record[order[rank]];
         uvec4 tiles = box(s);
         for (uint y = tiles.y; y <= tiles.w; y++)
@@ -1366,44 +1334,27 @@ void main() {
 }
 );
 
-/* One group. */
-static const char gpu_bin_scan[] = GPU_GLSL(
-shared float counted[256];
-layout(std430, binding = 1) buffer groups { uint before[]; };
-void main() {
-    uint groups = (count + 255u) / 256u, each = (groups + 255u) / 256u, begin = min(lane() * each, groups),
-         end = min(begin + each, groups), sum = 0u, total;
-    float own = 0; /* no integer of 32 bits may hold the sum */
-    for (uint i = begin; i < end; i++) {
-        sum += before[i];
-        own += float(before[i]);
-    }
-    sum = scan(sum, total);
-    for (uint i = begin; i < end; i++) {
-        uint here = before[i];
-        before[i] = sum;
-        sum += here;
-    }
-    counted[lane()] = own;
-    barrier();
-    if (lane() != 0u) return;
-    for (uint i = 1u; i < 256u; i++) own += counted[i];
-    facts[view].instances = own > 2e9 ? none : total;
-}
-);
-
 static const char gpu_bin_emit[] = GPU_GLSL(
 layout(std430, binding = 5) writeonly buffer instances { pair instance[]; };
 layout(std430, binding = 6) writeonly buffer owners { uint owner[]; };
 layout(std430, binding = 7) writeonly buffer keys { uint key[]; };
-layout(std430, binding = 8) writeonly buffer values { uint value[]; };
+uint units(uint x) { return (x >> 8u) + 1u; } /* no integer of 32 bits may hold the sum */
 void main() {
-    uint rank = item();
+    uint rank = item(), groups = (count + 255u) / 256u, all = 0u, first = 0u, most = 0u;
+    for (uint i = lane(); i < groups; i += 256u) {
+        all += min(before[i], 0x7FFFFFFFu - all);
+        if (i < group()) first += before[i];
+    }
+    scan(units(all), most);
+    scan(all, all);
+    scan(first, first);
+    if (most > 7812500u) all = none;
+    if (rank == 0u) facts[view].instances = all;
     if (rank >= facts[view].visible) return;
-    uint g = order[rank], at = of_gaussian[g].first + before[group()];
+    uint g = order[rank], at = of_gaussian[g].first + first;
     splat s = record[g];
     uvec4 tiles = box(s);
-    uint end = min(at + of_gaussian[g].second, listed(facts[view].instances, room));
+    uint end = min(at + of_gaussian[g].second, listed(all, room));
     of_gaussian[g] = pair(at, at < end ? end - at : 0u);
     for (uint y = tiles.y; y <= tiles.w && at < end; y++)
         for (uint x = tiles.x; x <= tiles.z && at < end; x++) {
@@ -1412,7 +1363,6 @@ void main() {
             instance[at].second = mask;
             owner[at] = g;
             key[at] = y * tiles_x + x;
-            value[at] = at;
             at++;
         }
 }
@@ -1952,7 +1902,6 @@ static const struct {
     const char *name, *part[GPU_PARTS]; /* after gpu_common */
 } gpu_sources[GPU_PROGRAMS] = {
     {"seen: count", {gpu_types, gpu_scan, gpu_seen, gpu_seen_count}},
-    {"seen: sum", {gpu_types, gpu_scan, gpu_seen, gpu_seen_sum}},
     {"seen: list", {gpu_types, gpu_scan, gpu_seen, gpu_seen_list}},
     {"seen: copy", {gpu_types, gpu_seen, gpu_seen_copy}},
     {"transport: nodes", {gpu_transport_in, gpu_transport_nodes}},
@@ -1962,14 +1911,11 @@ static const struct {
       gpu_shade_main}},
     {"highlight", {gpu_types, gpu_lit_frame, gpu_lit_functions, gpu_light_map, gpu_highlight}},
     {"project", {gpu_types, gpu_rotation, gpu_project_in, gpu_project}},
-    {"sort: keys", {gpu_types, gpu_sort_keys}},
     {"sort: count", {gpu_types, gpu_sort_in, gpu_sort_count}},
     {"sort: scan", {gpu_types, gpu_sort_in, gpu_scan, gpu_sort_scan}},
     {"sort: scatter", {gpu_types, gpu_sort_in, gpu_scan, gpu_sort_scatter}},
-    {"sort: end", {gpu_types, gpu_sort_in, gpu_sort_end}},
     {"bin: count", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_scan, gpu_bin_count}},
-    {"bin: scan", {gpu_types, gpu_bin_in, gpu_scan, gpu_bin_scan}},
-    {"bin: emit", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_bin_emit}},
+    {"bin: emit", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_scan, gpu_bin_emit}},
     {"bin: end", {gpu_types, gpu_bin_in, gpu_bin_end}},
     {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_window, gpu_walk_camera}},
     {"walk: what is seen", {gpu_types, gpu_gather_camera}},
@@ -2612,7 +2558,6 @@ static void gpu_shade(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve(g, &f->color, 4 * n * sizeof(float));
     gpu_reserve(g, &f->layers, 4 * n * (size_t)frame->layer_count * sizeof(float));
     gpu_seen_program(g, GPU_SEEN_COUNT, count, layers, groups);
-    gpu_seen_program(g, GPU_SEEN_SUM, count, layers, 1);
     gpu_seen_program(g, GPU_SEEN_LIST, count, layers, groups);
     gpu_transport_all(g, frame);
     gpu_use(g, GPU_SHADE, &k, sizeof k);
@@ -2660,27 +2605,29 @@ static void gpu_project_view(gpu *g, const ssdgs_frame *frame, int view, gpu_vie
     gpu_dispatch(g, gpu_groups(n));
 }
 
-enum { GPU_SORT_BLOCK = 2048, GPU_FIRST_ROOM = 1 << 16 };
-typedef struct gpu_sort_parameters {
-    uint32_t room, shift, blocks, view, instances;
-} gpu_sort_parameters;
+enum { GPU_SORT_ROWS = 8, GPU_SORT_BLOCKS = 512, GPU_FIRST_ROOM = 1 << 16 };
 
-/* Sorts room keys at most by so many of their low bits, from scratch.key[0], value[0] into key[*end],
-   value[*end]. instances: their number is facts.instances, else facts.gaussians. */
-static void gpu_radix_sort(gpu *g, int view, size_t room, int bits, int instances, int *end) {
+/* Sorts the numbers of room keys at most by so many of their low bits, into key[*end], value[*end].
+   instances: how many there are facts.instances says, else room. */
+static void gpu_radix_sort(gpu *g, int view, const gpu_buffer *keys, size_t room, int bits, int instances,
+                           int *end) {
     gpu_scratch *s = &g->scratch;
-    gpu_sort_parameters p;
-    const size_t blocks = (room + GPU_SORT_BLOCK - 1) / GPU_SORT_BLOCK;
+    struct {
+        uint32_t room, shift, blocks, rows, view, instances;
+    } p;
     p.room = (uint32_t)room;
-    p.blocks = (uint32_t)blocks;
     p.view = (uint32_t)view;
     p.instances = (uint32_t)instances;
+    p.rows = 1;
+    while (p.rows < GPU_SORT_ROWS && room / (GPU_GROUP * p.rows) > GPU_SORT_BLOCKS) p.rows *= 2;
+    const size_t blocks = (room + GPU_GROUP * p.rows - 1) / (GPU_GROUP * p.rows);
+    p.blocks = (uint32_t)blocks;
     gpu_reserve(g, &s->digits, (blocks + 1) * 256 * sizeof(uint32_t));
     *end = 0;
     for (p.shift = 0; p.shift < (uint32_t)bits; p.shift += 8) {
         gpu_use(g, GPU_SORT_COUNT, &p, sizeof p);
         gpu_bind(g, 0, &g->frame.facts);
-        gpu_bind(g, 1, s->key + *end);
+        gpu_bind(g, 1, p.shift ? s->key + *end : keys);
         gpu_bind(g, 2, &s->digits);
         gpu_dispatch(g, blocks);
         gpu_use(g, GPU_SORT_SCAN, &p, sizeof p);
@@ -2703,23 +2650,9 @@ static void gpu_reserve_keys(gpu *g, size_t count) {
 
 static void gpu_sort_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *to) {
     const size_t n = (size_t)frame->count;
-    const struct { uint32_t count, view; } keys = {(uint32_t)n, (uint32_t)view};
-    gpu_sort_parameters p;
     int end;
     gpu_reserve_keys(g, n);
-    gpu_use(g, GPU_SORT_KEYS, &keys, sizeof keys);
-    gpu_bind(g, 0, &g->frame.facts);
-    gpu_bind(g, 1, &to->depth);
-    gpu_bind(g, 2, g->scratch.key);
-    gpu_bind(g, 3, g->scratch.value);
-    gpu_dispatch(g, gpu_groups(n));
-    gpu_radix_sort(g, view, n, 32, 0, &end);
-    memset(&p, 0, sizeof p);
-    p.room = (uint32_t)n;
-    p.view = (uint32_t)view;
-    gpu_use(g, GPU_SORT_END, &p, sizeof p);
-    gpu_bind(g, 1, g->scratch.key + end);
-    gpu_dispatch(g, gpu_groups(n));
+    gpu_radix_sort(g, view, &to->depth, n, 32, 0, &end);
     const gpu_buffer order = g->scratch.value[end]; /* its memory for what order has had */
     g->scratch.value[end] = to->order;
     to->order = order;
@@ -2756,19 +2689,15 @@ static void gpu_bin_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *t
     gpu_bind(g, 2, &to->order);
     gpu_bind(g, 3, &to->of_gaussian);
     gpu_bind(g, 4, &g->scratch.groups);
+    gpu_bind(g, 5, &to->depth);
     gpu_dispatch(g, gpu_groups(n));
-    gpu_use(g, GPU_BIN_SCAN, &p, sizeof p);
-    gpu_bind(g, 1, &g->scratch.groups);
-    gpu_dispatch(g, 1);
     gpu_use(g, GPU_BIN_EMIT, &p, sizeof p);
-    gpu_bind(g, 1, &to->record);
     gpu_bind(g, 5, &to->instance);
     gpu_bind(g, 6, &g->scratch.owner);
     gpu_bind(g, 7, g->scratch.key);
-    gpu_bind(g, 8, g->scratch.value);
     gpu_dispatch(g, gpu_groups(n));
     while (tiles > (size_t)1 << bits) bits++;
-    gpu_radix_sort(g, view, room, bits, 1, &end);
+    gpu_radix_sort(g, view, g->scratch.key, room, bits, 1, &end);
     gpu_use(g, GPU_BIN_END, &p, sizeof p);
     gpu_bind(g, 1, g->scratch.key + end);
     gpu_bind(g, 2, g->scratch.value + end);
@@ -2968,7 +2897,7 @@ static void gpu_upload_model(gpu *g, const ssdgs_placed *o) {
 /* What all stages find on the device. A view whose last frame's results it has stays `cached`; host memory
    has none of theirs, which a record of NULL marks. */
 static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
-    const gpu_fact none = {0, 0, 0, 0};
+    const gpu_fact none = {0, 0, 0};
     const size_t n = (size_t)frame->count, lights = (size_t)frame->light_count;
     gpu_frame *f = &g->frame;
     gpu_reserve(g, &f->facts, (size_t)frame->view_count * sizeof(gpu_fact));
@@ -3022,6 +2951,10 @@ static void gpu_run_stage(gpu *g, ssdgs_frame *frame, ssdgs_stage stage) {
         gpu_blend_all(g, frame);
         if (frame->layer_count) gpu_highlights(g, frame);
     }
+}
+
+static void gpu_run_stages(gpu *g, ssdgs_frame *frame, ssdgs_stage first, ssdgs_stage last) {
+    for (int stage = first; stage <= (int)last; stage++) gpu_run_stage(g, frame, (ssdgs_stage)stage);
 }
 
 /* Reads what the device has counted: 1 where every list had room, else there is more from now on. This and
@@ -3102,15 +3035,16 @@ static ssdgs_result gpu_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage)
             frame->views[i].cached = frame->views[i].cached && frame->views[i].record;
         return ssdgs_stage_cpu(frame, stage);
     }
+    if (!g->waits && stage != SSDGS_STAGE_COMPOSITE) return SSDGS_OK; /* to enter a context takes time */
     gpu_enter(g);
     if (!g->instance_room) g->instance_room = GPU_FIRST_ROOM;
-    if (stage == SSDGS_STAGE_PROJECT && !frame->batch[0]) gpu_begin_frame(g, frame);
-    gpu_run_stage(g, frame, stage);
+    if (!g->waits) frame->batch[0] = 0;
+    if (!g->waits || (stage == SSDGS_STAGE_PROJECT && !frame->batch[0])) gpu_begin_frame(g, frame);
+    gpu_run_stages(g, frame, g->waits ? stage : SSDGS_STAGE_PROJECT, stage);
     if (stage == SSDGS_STAGE_COMPOSITE) {
         frame->batch[0] = 0;         /* of all views, where some lists had no room */
         if (!gpu_had_room(g, frame)) /* what is counted is right even so: once is enough */
-            for (int again = SSDGS_STAGE_PROJECT; again <= SSDGS_STAGE_COMPOSITE; again++)
-                gpu_run_stage(g, frame, (ssdgs_stage)again);
+            gpu_run_stages(g, frame, SSDGS_STAGE_PROJECT, stage);
         g->owner = frame->memory;
     }
     return gpu_answer(g, frame, "a stage");
