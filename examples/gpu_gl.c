@@ -128,7 +128,6 @@ typedef struct gpu_buffer {
 
 /* The compute programs, compiled when they are first used. */
 typedef enum gpu_program {
-    GPU_SEEN_COUNT,
     GPU_SEEN_LIST,
     GPU_SEEN_COPY,
     GPU_TRANSPORT_NODES,
@@ -137,7 +136,6 @@ typedef enum gpu_program {
     GPU_HIGHLIGHT,
     GPU_PROJECT,
     GPU_SORT_COUNT,
-    GPU_SORT_SCAN,
     GPU_SORT_SCATTER,
     GPU_BIN_COUNT,
     GPU_BIN_EMIT,
@@ -195,7 +193,7 @@ typedef struct gpu_frame {
 /* What stages use while they run. */
 typedef struct gpu_scratch {
     gpu_buffer key[2], value[2]; /* what is sorted, from one to the other */
-    gpu_buffer digits;           /* (256, blocks) how often a digit is in a block; then (256) in all */
+    gpu_buffer digits;           /* (blocks, 256) how often a digit is in a block */
     gpu_buffer groups;           /* (groups) instances of 256 ranks */
     gpu_buffer owner;            /* (instances) their Gaussians */
     gpu_buffer sums;             /* (n, 4) tile_sums of a light's views so far */
@@ -231,7 +229,7 @@ struct gpu {
 /* GLSL is written as it is and becomes a string, whose line breaks and comments are gone. A compiler need
    take no string longer than 4095 characters, so a program's text is several, one after the other. */
 #define GPU_GLSL(...) #__VA_ARGS__ "\n"
-enum { GPU_PARTS = 8 };
+enum { GPU_PARTS = 9 };
 /* clang-format off */
 
 /* What all programs begin with. A group is 256 threads, or a tile's pixels. Of more groups than a dimension can
@@ -341,7 +339,7 @@ float schlick(float f0, float missing) {
 );
 
 /* The Gaussians to be shaded, ascending, and for each that is skipped the place of its neighbour among them.
-   Groups count theirs, then all write. */
+   What is drawn is known by the walk, which has counted 256 at a time. */
 static const char gpu_seen[] = GPU_GLSL(
 layout(std140, binding = 0) uniform parameters { uint count; uint layer_count; };
 layout(std430, binding = 0) buffer seen_block { uint seen[]; };
@@ -349,20 +347,6 @@ layout(std430, binding = 1) buffer tally_block { uvec2 tally[]; }; /* seen; the 
 layout(std430, binding = 2) buffer shaded_block { uint shaded_count; uint shaded[]; };
 const uint is_seen = 1u;
 const uint is_skipped = 2u;
-);
-
-static const char gpu_seen_count[] = GPU_GLSL(
-shared uint first;
-void main() {
-    bool within = item() < count;
-    uint is = within ? seen[item()] : 0u;
-    if (lane() == 0u) first = none;
-    uint sum;
-    scan(uint(is == is_seen), sum);
-    if (is == is_skipped) atomicMin(first, item());
-    barrier();
-    if (lane() == 0u && within) tally[group()] = uvec2(sum, first);
-}
 );
 
 /* Where all are skipped, some colour is needed: the first's. */
@@ -1216,29 +1200,13 @@ void main() {
     for (uint row = 0u; row < rows; row++)
         if (at(row) < count()) atomicAdd(found[digit(at(row))], 1u);
     barrier();
-    counted[lane() * blocks + group()] = found[lane()];
+    counted[256u * group() + lane()] = found[lane()];
 }
 );
 
-/* A group a digit: how often it is in the blocks before each. */
-static const char gpu_sort_scan[] = GPU_GLSL(
-layout(std430, binding = 2) buffer digits { uint counted[]; };
-void main() {
-    uint each = (blocks + 255u) / 256u, begin = min(lane() * each, blocks), end = min(begin + each, blocks);
-    uint first = group() * blocks, sum = 0u, total;
-    for (uint i = begin; i < end; i++) sum += counted[first + i];
-    sum = scan(sum, total);
-    for (uint i = begin; i < end; i++) {
-        uint here = counted[first + i];
-        counted[first + i] = sum;
-        sum += here;
-    }
-    if (lane() == 0u) counted[256u * blocks + group()] = total;
-}
-);
-
-/* Row after row of 256 keys. Each digit has a word of bits for each 32 of them: a key's place among its like
-   is the number of bits before its own. */
+/* A digit begins after what is smaller, and after its like in the blocks before. Row after row of 256 keys: each
+   digit has a word of bits for each 32 of them, and a key's place among its like is the number of bits before
+   its own. */
 static const char gpu_sort_scatter[] = GPU_GLSL(
 layout(std430, binding = 2) readonly buffer digits { uint counted[]; };
 layout(std430, binding = 3) readonly buffer values { uint value[]; };
@@ -1248,8 +1216,16 @@ shared uint bits[8 * 256];
 shared uint next[256];
 void main() {
     if (group() >= blocks) return;
-    uint total, before = scan(counted[256u * blocks + lane()], total);
-    next[lane()] = before + counted[lane() * blocks + group()];
+    uint before = 0u, like = 0u, all;
+    for (uint block = 0u; block < blocks; block += 8u) {
+        uint here[8]; /* loads that do not wait for one another */
+        for (uint i = 0u; i < 8u; i++) here[i] = counted[256u * min(block + i, blocks - 1u) + lane()];
+        for (uint i = 0u; i < 8u; i++) {
+            before += block + i < group() ? here[i] : 0u;
+            like += block + i < blocks ? here[i] : 0u;
+        }
+    }
+    next[lane()] = before + scan(like, all);
     for (uint word = 0u; word < 8u; word++) bits[word * 256u + lane()] = 0u;
     for (uint row = 0u; row < rows; row++) {
         bool there = at(row) < count();
@@ -1428,15 +1404,15 @@ bool is_dark(float t, uint step) {
 }
 );
 
-/* Entries of a tile's list, and which of them each micro-tile has: two lists in depth order, window_words words
-   of bits a micro-tile. */
+/* A window of entries of a tile's list, and which of them each micro-tile has: a bit an entry, in depth order. */
 static const char gpu_window_64[] = GPU_GLSL(const uint window = 64u;);
+static const char gpu_window_128[] = GPU_GLSL(const uint window = 128u;);
 static const char gpu_window_256[] = GPU_GLSL(const uint window = 256u;);
 static const char gpu_window[] = GPU_GLSL(
-const uint nothing = 32u;
-/* The lowest bit, which goes; nothing: there is none. */
-uint take(inout uint bits) {
-    uint first = bits == 0u ? nothing : uint(findLSB(bits));
+const uint nothing = 0xFFFFFFFFu;
+/* The entry of the lowest bit, which goes; nothing: there is none. */
+uint take(inout uint bits, uint word) {
+    uint first = bits == 0u ? nothing : 32u * word + uint(findLSB(bits));
     bits &= bits - 1u;
     return first;
 }
@@ -1459,8 +1435,25 @@ void find_covered() {
     }
     barrier();
 }
-float weight_at(uint word, uint which, vec2 at) {
-    return which == nothing ? 0 : weight_of(splats[32u * word + which], spreads[32u * word + which], at);
+);
+
+/* A micro-tile's list, four entries after four, whose weights do not wait for one another. */
+static const char gpu_fours[] = GPU_GLSL(
+/* What a program does with an entry of the window, or with `nothing`, whose weight is 0. */
+void meet(float weight, uint i);
+float weight_at(uint i, vec2 at) {
+    uint some = i % window;
+    float weight = weight_of(splats[some], spreads[some], at);
+    return i == nothing ? 0 : weight;
+}
+/* The next four of these bits, which are a word of the list. */
+void meet_four(inout uint todo, uint word, vec2 at) {
+    uint a = take(todo, word), b = take(todo, word), c = take(todo, word), d = take(todo, word);
+    float of_a = weight_at(a, at), of_b = weight_at(b, at), of_c = weight_at(c, at), of_d = weight_at(d, at);
+    meet(of_a, a);
+    meet(of_b, b);
+    meet(of_c, c);
+    meet(of_d, d);
 }
 );
 
@@ -1475,18 +1468,17 @@ shared uint heavy[8];
 shared uint must[8];
 float t, over;
 uint blended, marked; /* bits of 32 entries */
-void see(float weight, uint which, uint round, uint strong) {
-    if (!(weight > 0) || t < stop) return;
-    float alpha = alpha_of(weight), w = alpha * t;
-    uint own = 1u << which;
+float slight;
+uint strong;
+/* Marked is what weighs more than `slight`, and beyond max_error what is not in `strong`. */
+void meet(float weight, uint i) {
+    bool drawn = weight > 0 && t >= stop;
+    float alpha = drawn ? alpha_of(weight) : 0, w = alpha * t;
+    uint own = drawn ? 1u << (i & 31u) : 0u, passed_over = own & ~strong;
     t = fma(-alpha, t, t);
+    over += passed_over != 0u ? w : 0;
     blended |= own;
-    if (round == 0u) {
-        if (w > max_error * 0.03125) marked |= own;
-    } else if (max_error > 0 && (strong & own) == 0u) {
-        over += w;
-        if (over > max_error) marked |= own;
-    }
+    marked |= w > slight ? own : over > max_error ? passed_over : 0u;
 }
 void main() {
     if (group() >= tiles) return;
@@ -1508,17 +1500,11 @@ void main() {
         for (uint round = thrifty ? 0u : 1u; round < 2u && !dark; round++) {
             t = before;
             for (uint word = 0u; word < words && t >= stop; word++) {
-                uint todo = covered[words * micro() + word], strong = heavy[word];
+                uint todo = covered[words * micro() + word];
+                strong = round == 0u || !thrifty ? ~0u : heavy[word];
+                slight = round == 0u ? max_error * 0.03125 : 1e30;
                 blended = marked = 0u;
-                while (todo != 0u && t >= stop) { /* four weights do not wait for one another */
-                    uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
-                    float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
-                    float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
-                    see(of_a, a, round, strong);
-                    see(of_b, b, round, strong);
-                    see(of_c, c, round, strong);
-                    see(of_d, d, round, strong);
-                }
+                while (todo != 0u && t >= stop) meet_four(todo, word, at);
                 if (round == 1u && blended != 0u) atomicOr(blends[words * micro() + word], blended);
                 if (round == 0u && marked != 0u) atomicOr(heavy[word], marked);
                 if (round == 1u && marked != 0u) atomicOr(must[word], marked);
@@ -1543,16 +1529,23 @@ layout(std430, binding = 1) readonly buffer instances { pair instance[]; };
 layout(std430, binding = 2) readonly buffer seens { uint tile_seen[]; };
 layout(std430, binding = 3) readonly buffer neededs { uint tile_needed[]; };
 layout(std430, binding = 4) writeonly buffer all_seen { uint seen[]; };
+layout(std430, binding = 5) writeonly buffer tallies { uvec2 tally[]; }; /* seen; the first skipped */
+shared uint first;
 void main() {
-    if (item() >= count) return;
-    pair of = of_gaussian[item()];
-    uint blended = 0u, needed = 0u;
+    uint blended = 0u, needed = 0u, sum;
+    if (256u * group() >= count) return;
+    pair of = item() < count ? of_gaussian[item()] : pair(0u, 0u);
     for (uint i = of.first; i < of.first + of.second; i++) {
         uint at = instance[i].first;
         blended |= tile_seen[at];
         needed |= thrifty != 0u ? tile_needed[at] : tile_seen[at];
     }
-    seen[item()] = needed != 0u ? 1u : blended != 0u ? 2u : 0u;
+    if (item() < count) seen[item()] = needed != 0u ? 1u : blended != 0u ? 2u : 0u;
+    if (lane() == 0u) first = none;
+    scan(needed != 0u ? 1u : 0u, sum);
+    if (needed == 0u && blended != 0u) atomicMin(first, item());
+    barrier();
+    if (lane() == 0u) tally[group()] = uvec2(sum, first);
 }
 );
 
@@ -1567,7 +1560,7 @@ void add_up(uint values, uint mask) { /* mask: entry lane() / 32's */
     vec3 sum = vec3(0);
     barrier();
     while (todo != 0u) {
-        uint pixel = 16u * take(todo) + (first & 15u);
+        uint pixel = 16u * take(todo, 0u) + (first & 15u);
         sum.x += part[0][entry][pixel];
         if (values > 1u) sum.y += part[1][entry][pixel];
         if (values > 2u) sum.z += part[2][entry][pixel];
@@ -1745,12 +1738,12 @@ float solid_angle() {
 }
 );
 static const char gpu_walk_map_main[] = GPU_GLSL(
-void pass(float weight, uint word, uint which) {
+void meet(float weight, uint i) {
     float alpha = alpha_of(weight), past = t;
-    if (which == nothing) return;
+    if (i == nothing) return;
     t = max(fma(-alpha, t, t), 1e-20);
-    if (t < levels[fallen]) note(past, t, distances[32u * word + which]);
-    if (flux != 0u) part[0][which % at_once][lane()] = omega * alpha * past;
+    if (t < levels[fallen]) note(past, t, distances[i]);
+    if (flux != 0u) part[0][i % at_once][lane()] = omega * alpha * past;
 }
 void main() {
     if (group() >= tiles) return;
@@ -1777,15 +1770,7 @@ void main() {
         find_covered();
         for (uint first = 0u; first < entries; first += at_once) {
             uint word = first >> 5u, todo = covered[words * micro() + word] & 0xFFu << (first & 31u);
-            while (todo != 0u) {
-                uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
-                float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
-                float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
-                pass(of_a, word, a);
-                pass(of_b, word, b);
-                pass(of_c, word, c);
-                pass(of_d, word, d);
-            }
+            while (todo != 0u) meet_four(todo, word, at);
             if (flux == 0u) continue;
             add_up(1u, masks[first + own]);
             if (lane() < at_once && first + lane() < entries)
@@ -1842,10 +1827,10 @@ layout(std430, binding = 8) writeonly buffer transmittances { float transmittanc
 shared vec4 values[window * at_once];
 vec3 sums[at_once];
 float t;
-void add(float weight, uint word, uint which) {
+void meet(float weight, uint i) {
     if (!(weight > 0) || t < stop) return;
     float alpha = alpha_of(weight), w = alpha * t;
-    for (uint l = 0u; l < at_once; l++) sums[l] += w * values[(32u * word + which) * at_once + l].rgb;
+    for (uint l = 0u; l < at_once; l++) sums[l] += w * values[i * at_once + l].rgb;
     t = fma(-alpha, t, t);
 }
 vec4 value_of(uint which, uint gaussian) {
@@ -1880,15 +1865,7 @@ void main() {
         find_covered();
         for (uint word = 0u; word < words && t >= stop; word++) {
             uint todo = covered[words * micro() + word];
-            while (todo != 0u && t >= stop) {
-                uint a = take(todo), b = take(todo), c = take(todo), d = take(todo);
-                float of_a = weight_at(word, a, at), of_b = weight_at(word, b, at);
-                float of_c = weight_at(word, c, at), of_d = weight_at(word, d, at);
-                add(of_a, word, a);
-                add(of_b, word, b);
-                add(of_c, word, c);
-                add(of_d, word, d);
-            }
+            while (todo != 0u && t >= stop) meet_four(todo, word, at);
         }
         dark = is_dark(t, step);
     }
@@ -1901,7 +1878,6 @@ void main() {
 static const struct {
     const char *name, *part[GPU_PARTS]; /* after gpu_common */
 } gpu_sources[GPU_PROGRAMS] = {
-    {"seen: count", {gpu_types, gpu_scan, gpu_seen, gpu_seen_count}},
     {"seen: list", {gpu_types, gpu_scan, gpu_seen, gpu_seen_list}},
     {"seen: copy", {gpu_types, gpu_seen, gpu_seen_copy}},
     {"transport: nodes", {gpu_transport_in, gpu_transport_nodes}},
@@ -1912,23 +1888,24 @@ static const struct {
     {"highlight", {gpu_types, gpu_lit_frame, gpu_lit_functions, gpu_light_map, gpu_highlight}},
     {"project", {gpu_types, gpu_rotation, gpu_project_in, gpu_project}},
     {"sort: count", {gpu_types, gpu_sort_in, gpu_sort_count}},
-    {"sort: scan", {gpu_types, gpu_sort_in, gpu_scan, gpu_sort_scan}},
     {"sort: scatter", {gpu_types, gpu_sort_in, gpu_scan, gpu_sort_scatter}},
     {"bin: count", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_scan, gpu_bin_count}},
     {"bin: emit", {gpu_types, gpu_bin_in, gpu_bin_mask, gpu_scan, gpu_bin_emit}},
     {"bin: end", {gpu_types, gpu_bin_in, gpu_bin_end}},
-    {"walk: camera", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_window, gpu_walk_camera}},
-    {"walk: what is seen", {gpu_types, gpu_gather_camera}},
+    {"walk: camera",
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_256, gpu_window, gpu_fours, gpu_walk_camera}},
+    {"walk: what is seen", {gpu_types, gpu_scan, gpu_gather_camera}},
     {"walk: light",
      {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_sums, gpu_walk_light,
       gpu_walk_light_main}},
     {"walk: map",
-     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_sums, gpu_walk_map,
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_fours, gpu_sums, gpu_walk_map,
       gpu_walk_map_main}},
     {"walk: visibility", {gpu_types, gpu_gather_light}},
-    {"blend", {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_one_layer, gpu_blend}},
+    {"blend",
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_128, gpu_window, gpu_fours, gpu_one_layer, gpu_blend}},
     {"blend: layers",
-     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_64, gpu_window, gpu_many_layers, gpu_blend}},
+     {gpu_types, gpu_walk_in, gpu_alpha, gpu_window_128, gpu_window, gpu_fours, gpu_many_layers, gpu_blend}},
 };
 
 /* ==== failures ==== */
@@ -2554,10 +2531,8 @@ static void gpu_shade(gpu *g, const ssdgs_frame *frame) {
                                            &f->camera.depth, &f->color,     &f->layers};
     gpu_reserve(g, &f->shaded, (n + 1) * sizeof(uint32_t));
     gpu_reserve(g, &f->neighbours, n * sizeof(uint32_t));
-    gpu_reserve(g, &f->tally, 2 * groups * sizeof(uint32_t));
     gpu_reserve(g, &f->color, 4 * n * sizeof(float));
     gpu_reserve(g, &f->layers, 4 * n * (size_t)frame->layer_count * sizeof(float));
-    gpu_seen_program(g, GPU_SEEN_COUNT, count, layers, groups);
     gpu_seen_program(g, GPU_SEEN_LIST, count, layers, groups);
     gpu_transport_all(g, frame);
     gpu_use(g, GPU_SHADE, &k, sizeof k);
@@ -2605,7 +2580,7 @@ static void gpu_project_view(gpu *g, const ssdgs_frame *frame, int view, gpu_vie
     gpu_dispatch(g, gpu_groups(n));
 }
 
-enum { GPU_SORT_ROWS = 8, GPU_SORT_BLOCKS = 512, GPU_FIRST_ROOM = 1 << 16 };
+enum { GPU_SORT_BLOCKS = 256, GPU_FIRST_ROOM = 1 << 16 };
 
 /* Sorts the numbers of room keys at most by so many of their low bits, into key[*end], value[*end].
    instances: how many there are facts.instances says, else room. */
@@ -2618,11 +2593,10 @@ static void gpu_radix_sort(gpu *g, int view, const gpu_buffer *keys, size_t room
     p.room = (uint32_t)room;
     p.view = (uint32_t)view;
     p.instances = (uint32_t)instances;
-    p.rows = 1;
-    while (p.rows < GPU_SORT_ROWS && room / (GPU_GROUP * p.rows) > GPU_SORT_BLOCKS) p.rows *= 2;
+    p.rows = (uint32_t)(2 + gpu_groups(room) / GPU_SORT_BLOCKS); /* blocks read what all have counted */
     const size_t blocks = (room + GPU_GROUP * p.rows - 1) / (GPU_GROUP * p.rows);
     p.blocks = (uint32_t)blocks;
-    gpu_reserve(g, &s->digits, (blocks + 1) * 256 * sizeof(uint32_t));
+    gpu_reserve(g, &s->digits, blocks * 256 * sizeof(uint32_t));
     *end = 0;
     for (p.shift = 0; p.shift < (uint32_t)bits; p.shift += 8) {
         gpu_use(g, GPU_SORT_COUNT, &p, sizeof p);
@@ -2630,8 +2604,6 @@ static void gpu_radix_sort(gpu *g, int view, const gpu_buffer *keys, size_t room
         gpu_bind(g, 1, p.shift ? s->key + *end : keys);
         gpu_bind(g, 2, &s->digits);
         gpu_dispatch(g, blocks);
-        gpu_use(g, GPU_SORT_SCAN, &p, sizeof p);
-        gpu_dispatch(g, 256);
         gpu_use(g, GPU_SORT_SCATTER, &p, sizeof p);
         gpu_bind(g, 3, s->value + *end);
         *end = !*end;
@@ -2741,6 +2713,7 @@ static void gpu_walk_camera_view(gpu *g, const ssdgs_frame *frame, gpu_view *to)
     gpu_reserve(g, &to->tile_seen, g->instance_room * sizeof(uint32_t));
     gpu_reserve(g, &to->tile_needed, g->instance_room * sizeof(uint32_t));
     gpu_reserve(g, &g->frame.seen, (size_t)frame->count * sizeof(uint32_t));
+    gpu_reserve(g, &g->frame.tally, 2 * gpu_groups((size_t)frame->count) * sizeof(uint32_t));
     gpu_use(g, GPU_WALK_CAMERA, &p, sizeof p);
     gpu_bind(g, 0, &to->record);
     gpu_bind(g, 1, &to->tile_list);
@@ -2754,6 +2727,7 @@ static void gpu_walk_camera_view(gpu *g, const ssdgs_frame *frame, gpu_view *to)
     gpu_bind(g, 2, &to->tile_seen);
     gpu_bind(g, 3, &to->tile_needed);
     gpu_bind(g, 4, &g->frame.seen);
+    gpu_bind(g, 5, &g->frame.tally);
     gpu_dispatch(g, gpu_groups((size_t)frame->count));
 }
 

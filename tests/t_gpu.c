@@ -25,6 +25,20 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lig
     }
 }
 
+/* What SHADE finds: seen, and of 256 at a time how many are and the first that is skipped. */
+static void upload_seen(const uint32_t *seen, size_t n) {
+    const size_t groups = gpu_groups(n);
+    uint32_t(*tally)[2] = (uint32_t(*)[2])malloc(groups * sizeof *tally);
+    for (size_t i = 0; i < groups; i++) tally[i][0] = 0, tally[i][1] = UINT32_MAX;
+    for (size_t i = n; i--;) {
+        tally[i / 256][0] += seen[i] == SSDGS_SEEN;
+        if (seen[i] == SSDGS_SKIPPED) tally[i / 256][1] = (uint32_t)i;
+    }
+    gpu_upload(device, &device->frame.seen, seen, n * sizeof *seen);
+    gpu_upload(device, &device->frame.tally, tally, groups * sizeof *tally);
+    free(tally);
+}
+
 /* What SHADE reads, from the CPU. */
 static void upload_walk(const ssdgs_frame *frame) {
     const size_t n = (size_t)frame->count, all = n * (size_t)frame->light_count * sizeof(float);
@@ -34,7 +48,7 @@ static void upload_walk(const ssdgs_frame *frame) {
     gpu_frame *f = &device->frame;
     uint32_t *seen = (uint32_t *)malloc(n * sizeof *seen);
     for (size_t i = 0; i < n; i++) seen[i] = frame->seen[i];
-    gpu_upload(device, &f->seen, seen, n * sizeof *seen);
+    upload_seen(seen, n);
     gpu_upload(device, &f->gaussians, v->gaussians, SSDGS_CHANNELS * v->stride * sizeof(float));
     gpu_upload_networks(device, frame->objects);
     gpu_upload_exposures(device, frame->objects);
@@ -186,11 +200,9 @@ static void seen_list(void) {
     gpu_frame *f = &device->frame;
     for (uint32_t i = 0; i < MANY; i++) seen[i] = i < 500 ? i & 2 : (uint32_t)(3 * draw(i));
     gpu_enter(device);
-    gpu_upload(device, &f->seen, seen, sizeof seen);
-    gpu_reserve(device, &f->tally, 2 * groups * sizeof(uint32_t));
+    upload_seen(seen, MANY);
     gpu_reserve(device, &f->shaded, sizeof shaded);
     gpu_reserve(device, &f->neighbours, sizeof neighbours);
-    gpu_seen_program(device, GPU_SEEN_COUNT, MANY, 0, groups);
     gpu_seen_program(device, GPU_SEEN_LIST, MANY, 0, groups);
     gpu_download(device, &f->shaded, shaded, sizeof shaded);
     gpu_download(device, &f->neighbours, neighbours, sizeof neighbours);
@@ -724,11 +736,13 @@ static void walk_camera(int which, int count) {
     uint32_t *blends = (uint32_t *)downloaded(&to->tile_seen, v->instances * sizeof *blends);
     uint32_t *needed = (uint32_t *)downloaded(&to->tile_needed, v->instances * sizeof *needed);
     uint32_t *seen = (uint32_t *)downloaded(&device->frame.seen, n * sizeof *seen);
+    uint32_t(*tally)[2] = (uint32_t(*)[2])downloaded(&device->frame.tally, gpu_groups(n) * sizeof *tally);
     size_t other = 0, mine = 0, theirs = 0, differ = 0, wrong = 0, all = 0;
     for (size_t i = 0; i < v->instances; i++) {
         all += v->tile_seen[i] != 0;
         other += blends[i] != v->tile_seen[i];
     }
+    uint32_t before = 0, skipped = UINT32_MAX;
     for (size_t g = 0; g < n; g++) {
         uint32_t is_seen = 0, is_needed = 0;
         for (uint32_t i = v->of_gaussian[g].first; i < v->of_gaussian[g].first + v->of_gaussian[g].count;
@@ -738,6 +752,11 @@ static void walk_camera(int which, int count) {
         }
         wrong += seen[g] != (uint32_t)(is_needed ? SSDGS_SEEN : is_seen ? SSDGS_SKIPPED : 0);
         mine += seen[g] == SSDGS_SEEN;
+        skipped = skipped != UINT32_MAX || seen[g] != SSDGS_SKIPPED ? skipped : (uint32_t)g;
+        if (g % 256 == 255 || g == n - 1) {
+            wrong += tally[g / 256][0] != (uint32_t)mine - before || tally[g / 256][1] != skipped;
+            before = (uint32_t)mine, skipped = UINT32_MAX;
+        }
         theirs += s.frame.seen[g] == SSDGS_SEEN;
         differ += seen[g] != s.frame.seen[g];
     }
@@ -754,6 +773,7 @@ static void walk_camera(int which, int count) {
     free(blends);
     free(needed);
     free(seen);
+    free(tally);
     end_shooting(&s, "walk: camera");
 }
 
