@@ -2493,24 +2493,20 @@ static void gpu_transport_light(gpu *g, const ssdgs_frame *frame, int light) {
     gpu_dispatch(g, nodes);
 }
 
-/* Room for transport of all lights; what was there is forgotten where it grows, or is of another detail. */
+/* Room for transport of all lights. What another transport_detail has left is made anew; other numbers of
+   lights or of Gaussians come with walks. No revision is 0. */
 static void gpu_reserve_transport(gpu *g, const ssdgs_frame *frame) {
     gpu_frame *f = &g->frame;
     const size_t n = (size_t)frame->count, lights = (size_t)frame->light_count,
-                 nodes = (n + GPU_NODE - 1) / GPU_NODE, all = nodes + (nodes + GPU_NODE - 1) / GPU_NODE;
-    const size_t size[3] = {lights * all * 8 * sizeof(float), lights * GPU_LENGTHS * n * sizeof(float),
-                            lights * nodes * sizeof(uint32_t)};
+                 nodes = (n + GPU_NODE - 1) / GPU_NODE, all = nodes + (nodes + GPU_NODE - 1) / GPU_NODE,
+                 arrived = lights * nodes * sizeof(uint32_t);
     const double detail = (double)frame->options.transport_detail;
-    int forget = g->detail < detail || g->detail > detail;
     gpu_reserve_lights(g, frame->light_count);
-    for (int i = 0; i < 3; i++) {
-        gpu_buffer *const b = i == 0 ? &f->nodes : i == 1 ? &f->transport : &f->arrived;
-        forget |= b->size < size[i];
-        gpu_reserve(g, b, size[i]);
-    }
+    gpu_reserve(g, &f->nodes, lights * all * 8 * sizeof(float));
+    gpu_reserve(g, &f->transport, lights * GPU_LENGTHS * n * sizeof(float));
+    if (f->arrived.size < arrived) gpu_upload(g, &f->arrived, gpu_host(g, arrived), arrived);
+    for (int i = 0; i < f->lights && (g->detail < detail || g->detail > detail); i++) f->light[i].ready = 0;
     g->detail = detail;
-    for (int i = 0; i < f->lights && forget; i++) f->light[i].ready = 0;
-    if (forget) gpu_upload(g, &f->arrived, gpu_host(g, f->arrived.size), f->arrived.size);
 }
 
 static void gpu_transport_all(gpu *g, const ssdgs_frame *frame) {

@@ -1126,6 +1126,41 @@ static void kept(void) {
     CHECK(memcmp(pictures[1][3].value, pictures[1][4].value, 3 * PIXELS * sizeof(ssdgs_real)) != 0);
 }
 
+/* With another transport_detail, from where other Gaussians are seen, what is kept of transport is to the bit
+   what a device has that has drawn nothing before. */
+static void kept_transport(void) {
+    static picture pictures[2];
+    ssdgs_context *const own = context;
+    const ssdgs_settings settings = small_settings();
+    const ssdgs_light light = point_light(2, 3, 4);
+    ssdgs_render_options options = ssdgs_render_options_default();
+    for (int i = 0; i < 2; i++) {
+        ssdgs_context_desc desc;
+        ssdgs_image image;
+        char message[256] = "";
+        gpu *const g = gpu_create(message, sizeof message);
+        if (!CHECK(g != NULL)) return;
+        const ssdgs_gpu_hook hook = gpu_hook(g);
+        memset(&desc, 0, sizeof desc);
+        memset(&image, 0, sizeof image);
+        desc.gpu = &hook;
+        image.color = pictures[i].value;
+        if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+        ssdgs_model *model = cloud(&settings, 0, 3000, 1);
+        CHECK(!ssdgs_model_sort(model));
+        for (int f = i ? 3 : 0; f < 4; f++) { /* two details, two cameras */
+            const ssdgs_camera camera = camera_from(2, f / 2 * 0.3, 1);
+            options.transport_detail = (ssdgs_real)(f ? 8 : 0.1);
+            CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &image, NULL));
+        }
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+        gpu_destroy(g);
+    }
+    context = own;
+    CHECK(!memcmp(pictures[0].value, pictures[1].value, 3 * PIXELS * sizeof(ssdgs_real)));
+}
+
 /* ---- failures ---- */
 
 static uint32_t full(void) { return GPU_GL_OUT_OF_MEMORY; }
@@ -1202,6 +1237,7 @@ int main(void) {
         sort_nothing();
         left_to_the_cpu();
         kept();
+        kept_transport();
         failures();
         for (int which = 0; which < 3; which++) {
             project(which, which ? 500 : 3000);
