@@ -366,7 +366,7 @@ void main() {
         if (at < group()) before += tally[at].x;
         if (tally[at].y != none) atomicMin(first, tally[at].y);
     }
-    scan(before, before);
+    scan(before, before); /* of each the total alone */
     scan(all, all);
     if (all == 0u && item() == first) seen[item()] = is = is_seen;
     uint place = before + scan(uint(is == is_seen), own);
@@ -540,7 +540,7 @@ void main() {
     }
     for (uint k = 0u; k < lengths; k++) parts[256u * k + lane()] = sum[k];
     barrier();
-    for (uint k = 0u, at = lane(); k < lengths && first + lane() < min(first + 64u, count); k++, at += 256u)
+    for (uint k = 0u, at = lane(); k < lengths && lane() < 64u && first + lane() < count; k++, at += 256u)
         transported[(light * lengths + k) * count + me] =
             scale / float(1u << k) * (parts[at] + parts[at + 64u] + parts[at + 128u] + parts[at + 192u]);
     if (lane() == 0u) arrived[light * nodes + group()] = revision;
@@ -1317,17 +1317,17 @@ static const char gpu_bin_emit[] = GPU_GLSL(
 layout(std430, binding = 5) writeonly buffer instances { pair instance[]; };
 layout(std430, binding = 6) writeonly buffer owners { uint owner[]; };
 layout(std430, binding = 7) writeonly buffer keys { uint key[]; };
-uint units(uint x) { return (x >> 8u) + 1u; } /* no integer of 32 bits may hold the sum */
+uint in_256s(uint x) { return (x >> 8u) + 1u; } /* sums of these fit 32 bits where sums of x may not */
 void main() {
     uint rank = item(), groups = (count + 255u) / 256u, all = 0u, first = 0u, most = 0u;
     for (uint i = lane(); i < groups; i += 256u) {
         all += min(before[i], 0x7FFFFFFFu - all);
         if (i < group()) first += before[i];
     }
-    scan(units(all), most);
+    scan(in_256s(all), most); /* of each the total alone */
     scan(all, all);
     scan(first, first);
-    if (most > 7812500u) all = none;
+    if (most > 7812500u) all = none; /* 2e9 */
     if (rank == 0u) facts[view].instances = all;
     if (rank >= facts[view].visible) return;
     uint g = order[rank], at = of_gaussian[g].first + first;
@@ -1450,8 +1450,8 @@ float weight_at(uint i, vec2 at) {
     return i == nothing ? 0 : weight;
 }
 /* The next four of these bits, which are a word of the list. */
-void meet_four(inout uint todo, uint word, vec2 at) {
-    uint a = take(todo, word), b = take(todo, word), c = take(todo, word), d = take(todo, word);
+void meet_four(inout uint rest, uint word, vec2 at) {
+    uint a = take(rest, word), b = take(rest, word), c = take(rest, word), d = take(rest, word);
     float of_a = weight_at(a, at), of_b = weight_at(b, at), of_c = weight_at(c, at), of_d = weight_at(d, at);
     meet(of_a, a);
     meet(of_b, b);
@@ -1503,11 +1503,11 @@ void main() {
         for (uint round = thrifty ? 0u : 1u; round < 2u && !dark; round++) {
             t = before;
             for (uint word = 0u; word < words && t >= stop; word++) {
-                uint todo = covered[words * micro() + word];
+                uint rest = covered[words * micro() + word];
                 strong = round == 0u || !thrifty ? ~0u : heavy[word];
                 slight = round == 0u ? max_error * 0.03125 : 1e30;
                 blended = marked = 0u;
-                while (todo != 0u && t >= stop) meet_four(todo, word, at);
+                while (rest != 0u && t >= stop) meet_four(rest, word, at);
                 if (round == 1u && blended != 0u) atomicOr(blends[words * micro() + word], blended);
                 if (round == 0u && marked != 0u) atomicOr(heavy[word], marked);
                 if (round == 1u && marked != 0u) atomicOr(must[word], marked);
@@ -1559,11 +1559,11 @@ const uint at_once = 8u;
 shared float part[3][8][256];
 void add_up(uint values, uint mask) { /* mask: entry lane() / 32's */
     uint entry = lane() >> 5u, first = lane() & 31u, which = first >> 2u;
-    uint todo = mask & (first < 16u ? 0x5555u : 0xAAAAu);
+    uint rest = mask & (first < 16u ? 0x5555u : 0xAAAAu);
     vec3 sum = vec3(0);
     barrier();
-    while (todo != 0u) {
-        uint pixel = 16u * take(todo, 0u) + (first & 15u);
+    while (rest != 0u) {
+        uint pixel = 16u * take(rest, 0u) + (first & 15u);
         sum.x += part[0][entry][pixel];
         if (values > 1u) sum.y += part[1][entry][pixel];
         if (values > 2u) sum.z += part[2][entry][pixel];
@@ -1602,7 +1602,7 @@ shared float near_depths[64];
 shared uint near_masks[64];
 shared uint near_covered[32];
 float t, met; /* transmittance; sum of blend weight x distance */
-uint near_todo, near_word; /* what of the micro-tile's is not applied yet */
+uint near_rest, near_word; /* what of the micro-tile's is not applied yet */
 
 /* A window of what is to be applied, from this entry on. */
 void load_near(uint from, uint end) {
@@ -1623,20 +1623,20 @@ void load_near(uint from, uint end) {
     }
     barrier();
     near_word = 0u;
-    near_todo = near_covered[2u * micro()];
+    near_rest = near_covered[2u * micro()];
 }
 /* All of the window that is nearer than this. */
 void apply(float reach, float nearest, vec2 at) {
     bool nearer = true;
     while (nearer) {
-        if (near_todo == 0u && near_word == 0u) near_todo = near_covered[2u * micro() + ++near_word];
-        uint i = 32u * near_word + uint(findLSB(near_todo)) % 32u;
-        nearer = near_todo != 0u && near_depths[i] < reach;
+        if (near_rest == 0u && near_word == 0u) near_rest = near_covered[2u * micro() + ++near_word];
+        uint i = 32u * near_word + uint(findLSB(near_rest)) % 32u;
+        nearer = near_rest != 0u && near_depths[i] < reach;
         if (nearer) {
             float alpha = alpha_of(weight_of(near_splats[i], near_spreads[i], at));
             met += alpha * t * (near_depths[i] - nearest);
             t = max(fma(-alpha, t, t), 1e-20);
-            near_todo &= near_todo - 1u;
+            near_rest &= near_rest - 1u;
         }
     }
 }
@@ -1669,15 +1669,15 @@ void main() {
         }
         for (uint i = 0u; i < entries; i++)
             if (!dark || alone[loaded + i] == 0u) sampled |= 1u << i;
-        uint word = loaded >> 5u, shift = loaded & 31u, todo = covered[words * micro() + word] >> shift & sampled;
+        uint word = loaded >> 5u, shift = loaded & 31u, rest = covered[words * micro() + word] >> shift & sampled;
         float last = depths_of[loaded + entries - 1u] - bias;
         bool more = true;
         while (more) {
             float within = near_depths[63]; /* what is nearer is in the window */
             more = !dark && within < last;
-            bool goes_on = todo != 0u;
+            bool goes_on = rest != 0u;
             while (goes_on) {
-                uint i = uint(findLSB(todo));
+                uint i = uint(findLSB(rest));
                 float distance = depths_of[loaded + i];
                 goes_on = !more || distance - bias <= within;
                 if (goes_on) {
@@ -1687,8 +1687,8 @@ void main() {
                     part[1][i][lane()] = rho;
                     if (cue != 0u)
                         part[2][i][lane()] = rho * ((distance - nearest) - (distance - nearest) * t - met);
-                    todo &= todo - 1u;
-                    goes_on = todo != 0u;
+                    rest &= rest - 1u;
+                    goes_on = rest != 0u;
                 }
             }
             if (more) {
@@ -1772,8 +1772,8 @@ void main() {
         }
         find_covered();
         for (uint first = 0u; first < entries; first += at_once) {
-            uint word = first >> 5u, todo = covered[words * micro() + word] & 0xFFu << (first & 31u);
-            while (todo != 0u) meet_four(todo, word, at);
+            uint word = first >> 5u, rest = covered[words * micro() + word] & 0xFFu << (first & 31u);
+            while (rest != 0u) meet_four(rest, word, at);
             if (flux == 0u) continue;
             add_up(1u, masks[first + own]);
             if (lane() < at_once && first + lane() < entries)
@@ -1867,8 +1867,8 @@ void main() {
             values[i] = value_of(first_layer + i % at_once, tile_list[from + i / at_once].first);
         find_covered();
         for (uint word = 0u; word < words && t >= stop; word++) {
-            uint todo = covered[words * micro() + word];
-            while (todo != 0u && t >= stop) meet_four(todo, word, at);
+            uint rest = covered[words * micro() + word];
+            while (rest != 0u && t >= stop) meet_four(rest, word, at);
         }
         dark = is_dark(t, step);
     }

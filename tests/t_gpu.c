@@ -216,8 +216,8 @@ static void seen_list(void) {
     CHECK(shaded[0] == found && !wrong);
 }
 
-/* Transport against its sum in double: exact where all nodes are opened, else within the 1 % that the manual
-   says of transport_detail 1, and half of it at 0.7. */
+/* Transport against its sum in double: exact where all nodes are opened, else, relative to the largest sum,
+   within the 1 % that the manual says of transport_detail 1, and half of it at 0.7. */
 static void transport(double detail, double bound) {
     enum { MANY = 20000 };
     ssdgs_render_options options = ssdgs_render_options_default();
@@ -241,7 +241,7 @@ static void transport(double detail, double bound) {
     CHECK(!gpu_leave(device, "transport"));
     const ssdgs_model_view *v = &frame.gaussians;
     const double unit = (double)settings.length_unit, soft = 0.02 * unit;
-    double worst[GPU_LENGTHS] = {0}, most[GPU_LENGTHS] = {0}, all = 0;
+    double worst[GPU_LENGTHS] = {0}, most[GPU_LENGTHS] = {0}, all = 0, own = 0;
     for (size_t i = 0; i < MANY; i += 97) {
         if (frame.seen[i] != SSDGS_SEEN) continue;
         for (int k = 0; k < GPU_LENGTHS; k++) {
@@ -259,11 +259,12 @@ static void transport(double detail, double bound) {
             }
             worst[k] = fmax(worst[k], fabs((double)got[(size_t)k * MANY + i] - sum));
             most[k] = fmax(most[k], sum);
+            own = fmax(own, test_error((double)got[(size_t)k * MANY + i], sum, 1e-9, 1));
         }
     }
     for (int k = 0; k < GPU_LENGTHS; k++) all = fmax(all, worst[k] / most[k]);
     printf("transport at detail %g: off by %.2g of the largest sum\n", detail, all);
-    CHECK(all > 0 && all <= bound);
+    CHECK(all > 0 && all <= bound && (detail < 8 || own <= bound));
     free(got);
     ssdgs_model_destroy(model);
 }
