@@ -42,13 +42,13 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 view: $(BUILD)/view ## a trained model in the browser: prints the address to open
 	$(BUILD)/view examples/data/waxcow.ply
 
-web: $(BUILD)/view.html ## the same as one page that needs no server (MODEL=file.ply); needs emscripten
-$(BUILD)/view.html: examples/view.html examples/web.c $(HEADERS) $(MODEL) | $(BUILD)
-	emcc -O2 -msimd128 -matomics -mbulk-memory --no-entry -sALLOW_MEMORY_GROWTH=1 examples/web.c -o $(BUILD)/web.wasm \
-	  -Wl,--shared-memory,--max-memory=2147483648,--import-memory,--no-check-features
+web: $(BUILD)/web.wasm ## one page that needs no server: build/view.html (MODEL=file.ply); needs emscripten
 	{ echo '<script type="text/plain" id="code">'; base64 <$(BUILD)/web.wasm; echo '</script>'; \
 	  echo '<script type="text/plain" id="model" data-name="$(notdir $(MODEL))">'; base64 <$(MODEL); echo '</script>'; } >$(BUILD)/web.txt
-	sed -e '/<!-- make web/{r $(BUILD)/web.txt' -e 'd;}' examples/view.html >$@
+	sed -e '/<!-- make web/{r $(BUILD)/web.txt' -e 'd;}' examples/view.html >$(BUILD)/view.html
+$(BUILD)/web.wasm: examples/web.c $(HEADERS) | $(BUILD)
+	emcc -O2 -msimd128 -matomics -mbulk-memory --no-entry -sALLOW_MEMORY_GROWTH=1 $< -o $@ \
+	  -Wl,--shared-memory,--max-memory=2147483648,--import-memory,--no-check-features
 
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts
 	$(BUILD)/bench --models $(DEMO) $(BENCH)
@@ -86,7 +86,7 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/show
+$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.html in headless Chromium, and make web's page where emscripten is; needs node and chromium

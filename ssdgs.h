@@ -71,12 +71,12 @@ CONVENTIONS
   camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens
           distortion.
   world   right-handed (scenes: either), any unit, the same for cameras, lights and Gaussians. Floats hold
-          seven digits: of a scene 1,000 times its size away from 0 give all positions less a nearby point,
-          and that as settings.origin.
-  light   a point's E is intensity / distance^2, less what its cone, range and focus take; a directional
-          light's and ambient light's is its intensity.
+          seven digits: 1,000 times the scene's size away from 0 subtract a near point from all positions,
+          and give it as settings.origin.
+  light   cone, range and focus lessen a point's E; directional and ambient light's is light_scale x
+          intensity.
           Intensities have the unit of the photographs': training sets light_scale such that E is 1 at the
-          centre of the bounds on average.
+          centre of the bounds, in the geometric mean.
   colour  renders are linear light, never encoded or clamped, and multiplied by alpha ("premultiplied");
           ssdgs_to_pixels(), ssdgs_blend_pixels() and ssdgs_to_bytes() encode them. Photographs,
           options.background and ssdgs_evaluate() deal in stored values, which settings.transfer relates to
@@ -97,13 +97,14 @@ THREADS
 
 DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
-  training (options.sum). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, WebAssembly's SIMD128 and
-  scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm does.
+  training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2,
+WebAssembly's SIMD128 and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their
+libm does.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
   parameter. Nothing exits or prints. Cameras, lights, networks and ASG that are not finite are refused.
-  Gaussians that are not finite are not drawn, or are black where the colour is not. A training step with a
+  Gaussians that are not finite are not drawn, or black; sizes and opacities clamp. A training step with a
   gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
@@ -116,10 +117,10 @@ FILES
   complete.
 
 OUTLINES
-  Photographs should be transparent where the object is not. Where a hundredth of one, but not all, is wholly
-  transparent it shows an outline; of eight or more those that contradict the others are left out. Where too
-  few are transparent, borders decide: of the colour of options.background they are empty, and Gaussians of
-  that colour fade; else all that is shown is opaque. A note says which.
+  Photographs should be transparent where the object is not. One of which a hundredth, but not all, is
+  wholly transparent shows an outline; of eight outlines or more those that contradict the others are left
+  out. With too few outlines borders decide: if they have options.background's colour, that colour is empty
+  and Gaussians of it fade; else all is opaque. A note says which.
 
 SCENES, as engines have them: examples/engine.c is one
   ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
@@ -132,13 +133,13 @@ SCENES, as engines have them: examples/engine.c is one
       ssdgs_scene_render()           with the meshes' depth as image.scene_depth, their shadows on splats
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
-  A light's map covers what it reaches, with at most 1024 pixels a side. So give lights a range: they cost
-  what they reach, and keep their maps while nothing there moves. Lights without shadow have no map.
+  A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range: they
+cost what they reach, and keep their maps while nothing there moves. Lights without shadow have no map.
   options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
   An object says how rough, bright and translucent its model is here. In models made in code
-  settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: a ball of wax was
-  28 dB from path tracing, lit from the side 22, balls of metal of roughness 0.15, 0.3 and 0.6 were 37,
-  30 and 17.
+  settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: beside path
+  tracing a ball of wax had 28 dB, 22 lit from the side, balls of metal of roughness 0.15, 0.3 and 0.6 had
+  37, 30 and 17.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
@@ -150,7 +151,7 @@ SPEED
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
   SSDGS_STATIC          every function is static, in a file that has the implementation
-  SSDGS_API *           what stands before every function: __declspec(dllexport), else extern
+  SSDGS_API *           stands before every function: extern, or your __declspec(dllexport)
   SSDGS_STAGES          shows a frame's stages, for GPU hooks
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
@@ -179,7 +180,7 @@ CONTENTS, search for the tag
   >>scene >>loss >>ply               placed models; loss and metrics; model files
   >>trainer >>density >>reduce       one photograph and Adam; clone, split, prune; merge: levels of detail
   >>steps >>checkpoint               the trainer's public functions; a run's whole state
-  >>kernels >>vmath >>*_kernel       vector macros, functions, and the kernels in the same order */
+  >>kernels >>vmath >>*_kernel       vector macros, elementary functions, the kernels */
 
 /* ==== the interface ==== */
 
@@ -272,8 +273,8 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_parallel parallel;          /* threads of the context's own */
     ssdgs_tracer tracer;              /* none */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
-    int threads;   /* how many of its own, the caller counted; 0 = one per CPU. With `parallel`: how many that
-                      has; 0 = 4. It is given thrice as many tasks at once */
+    int threads;   /* how many of its own, the caller counted; 0 = one per CPU, at most 1024. With `parallel`:
+                      how many that   has; 0 = 4. It is given thrice as many tasks at once */
     ssdgs_isa isa; /* the best this CPU has; ERR_ISA where one is missing */
 } ssdgs_context_desc;
 
@@ -327,16 +328,16 @@ typedef struct ssdgs_settings {
     int residual_shadow;      /* 1: the shadow network corrects the logit of eq. 7; 0: its output is S */
     int shadow_on_scattering; /* 1: eq. 14, the paper's ablation: S darkens scattering too */
     struct {
-        int layers; /* linear ones, 2 .. SSDGS_MAX_LAYERS; 0 = none: light scatters by `medium`, S is eq. 7's
-                       transmittance */
-        int width;  /* neurons of the hidden layers, up to SSDGS_MAX_WIDTH */
+        int layers;       /* linear ones, up to SSDGS_MAX_LAYERS, not 1 of scattering; 0: light scatters by
+                             `medium`, S is eq. 7's transmittance */
+        int width;        /* neurons of the hidden layers, up to SSDGS_MAX_WIDTH */
     } scattering, shadow; /* the two networks */
     struct {
         int view, light;
     } octaves; /* 0 .. 8: of the sines of wo and wi that the scattering network sees; many overfit */
     struct {
         int blur;        /* ssdgs_blur: 0.3 px^2 added, or a floor of 0.2 px^2 */
-        int size;        /* px a side; 0 = such that a typical Gaussian is one pixel wide */
+        int size;        /* px a side, up to 8192; 0 = a typical Gaussian is about a pixel wide */
         ssdgs_real bias; /* length units: what is nearer to the light by less casts no shadow. Models made in
                             code: three standard deviations of their Gaussians */
     } light_map;
@@ -370,7 +371,7 @@ SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to);
 /* One Gaussian in physical units. */
 typedef struct ssdgs_gaussian {
     ssdgs_real position[3];   /* world */
-    ssdgs_real rotation[4];   /* quaternion w x y z, of any length: its axes in the world */
+    ssdgs_real rotation[4];   /* quaternion w x y z, of any length; 0: the third axis is the normal */
     ssdgs_real scale[3];      /* standard deviations along them, world units */
     ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
@@ -399,7 +400,9 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 /* The box, in the model's space, that holds its Gaussians to three standard deviations, but for a few strays.
    0 0 0 where it has none. ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]);
-/* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor. */
+/* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor.
+   Positions move by the difference of the origins. ERR_ARGUMENT: one is baked, or a trainer has the model.
+   ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
@@ -430,7 +433,7 @@ typedef struct ssdgs_camera {  /* a pinhole */
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major, world to camera: x right, y down, z forward */
-    ssdgs_real near_plane;     /* world units: nearer Gaussians are not drawn; 0 = 0.02 length units */
+    ssdgs_real near_plane;     /* nearer is not drawn; 0 = 0.02 length units (published: 0.01) */
 } ssdgs_camera;
 
 /* clang-format off */
@@ -584,8 +587,8 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options);
 /* What of a light passes the scene's objects on the way to points (count,3), world: fraction (count), 0 .. 1.
-   By the maps of the last ssdgs_scene_light(), which take note once a tenth is gone. ERR_ARGUMENT: there is
-   none of that light. */
+   By the maps of the last ssdgs_scene_light(), which note the first 2 % lost. ERR_ARGUMENT: they are of
+   fewer lights. */
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
 
@@ -660,13 +663,13 @@ typedef struct ssdgs_rates {
     ssdgs_rate opacity, scale, rotation, color;
     ssdgs_rate asg, frame;                   /* start up to iteration 40,000*, end at 90,000* */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
-    ssdgs_rate camera, light; /* of the bounds' longest side, directions of a radian; end at 60,000*. For 300
-                                 shows of each photograph; with fewer, times the root of 300 / shows */
+    ssdgs_rate camera, light; /* of the bounds' longest side, directions in radians; end at 60,000*. Times
+                                 sqrt(300 / shows) where a photograph has fewer than 300 shows */
 } ssdgs_rates;
 
 /* Processes that share each batch. All hold the same photographs and options; each draws its part, and the
-   gradients are added. For the same bits on any number of processes add the ranks in pairs, then the pairs in
-   pairs (examples/train_mpi.c). */
+   gradients are added. Where batch / processes is a power of two, adding the ranks in pairs, then the pairs
+   in pairs, keeps the bits (examples/train_mpi.c). */
 typedef struct ssdgs_sum {
     /* Makes of `count` values their sums over all processes, the same everywhere. Any result but SSDGS_OK
        ends the step, which changes nothing. */
@@ -688,7 +691,7 @@ typedef struct ssdgs_train_options {
                               control makes; 10000 */
     int max_gaussians;     /* density control stops here; 0: at three quarters of the pixels that a photograph
                               shows, on average, but from 2,000 to 100,000; 0 */
-    int densify_every;     /* iterations between two rounds of density control; 100 */
+    int densify_every;     /* 1 and up: iterations between two rounds of density control; 100 */
     int densify_from;      /* first round; 200 */
     int densify_until;     /* last round; 50000* */
     int opacity_reset_every; /* iterations; fades what is not needed; 3000 */
@@ -700,7 +703,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real normal_weight;    /* deferred: weight of blended normals' distance to the depth's; 0.05 */
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
-    ssdgs_real densify_gradient; /* a Gaussian pulled harder is cloned or split, in half images; 4e-4 */
+    ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
     ssdgs_real densify_shadow; /* px: one half in shadow on more of a photograph, on average, is split; 0.5 */
     ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
     ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
@@ -734,8 +737,8 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer); /* NULL is fine */
-/* A step: `batch` iterations. ERR_NONFINITE and ERR_MEMORY: nothing has changed, but where density control
-   alone lacks memory the step is done without, as stats->iteration says. ERR_CANCELLED: another process
+/* A step: `batch` iterations. ERR_NONFINITE: its photographs are passed over. ERR_MEMORY: nothing has
+   changed, or, as stats->iteration says, density control alone is left out. ERR_CANCELLED: another process
    failed. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
 /* Steps until `iterations` are done, and calls progress (may be NULL) after each. Ten refused steps in a row
@@ -878,11 +881,11 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    (3), v and the material; the scattering network position (4), wo and wi (settings.octaves), normal,
    material and then, if settings ask for them, depth_cue (4) and what true transport brings in each length,
    over 1 / distance^2. x of n octaves is x, sin 2^i x of all coordinates and i, cos 2^i x alike; positions
-   are relative to settings.centre, in length_units where residual_shadow, depth_cue or transport is set, cues
-   always. Layers are out x in weights, then biases, with max(0, x) but behind the last. S is sigmoid(answer),
-   with residual_shadow sigmoid(answer + logit v), v within 0.01 .. 0.99. Of sigmoids u the optics are
-   sigma_s, sigma_a = 2 u + 0.05 and r = 3 u + 0.1. A light out of whose reach are all 64 neighbours of a
-   block leaves it out.
+   are relative to settings.centre: the shadow network's in length_units with residual_shadow, the scattering
+   network's with depth_cue or transport. Cues always are. Layers are out x in weights, then biases, with
+   max(0, x) but behind the last. S is sigmoid(answer), with residual_shadow sigmoid(answer + logit v), v
+   within 0.01 .. 0.99. Of sigmoids u the optics are sigma_s, sigma_a = 2 u + 0.05 and r = 3 u + 0.1. A light
+   out of whose reach are all 64 neighbours of a block leaves it out.
 
    What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was shaded
    before them or, without one, after. A Gaussian whose colour is not finite is black.
@@ -929,7 +932,7 @@ typedef struct ssdgs_tile_entry {
 /* One Gaussian in one tile. A Gaussian's instances are neighbours, from number `first` on. */
 typedef struct ssdgs_instance {
     uint32_t place, mask;
-} ssdgs_instance; /* in tile_list; as there */
+} ssdgs_instance; /* index in tile_list; mask as there */
 typedef struct ssdgs_instances {
     uint32_t first, count;
 } ssdgs_instances;
@@ -1005,7 +1008,7 @@ typedef struct ssdgs_placed {
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
     int moved;                                /* since the last frame */
-    double middle[3], radius; /* world: a ball that holds all that it draws; of several objects alone */
+    double middle[3], radius; /* world: a ball around what it draws; set only with several objects */
     ssdgs_real tint[3], roughness, specular, translucency;
     ssdgs_real medium[15];      /* RGB weights of true transport's lengths, where a medium scatters */
     const unsigned char *mask;  /* as in ssdgs_object */
@@ -1038,9 +1041,9 @@ typedef struct ssdgs_frame {
     ssdgs_splat_view *views;
     int view_count;
     int batch[2];               /* views at work in the stages up to WALK: from, to before */
-    ssdgs_stage last;           /* of those that run now */
+    ssdgs_stage last;           /* stage of this run */
     const ssdgs_image *image;   /* what is asked for; NULL: planes of the frame */
-    int statistics;             /* 1: asked for, of seen, color and views[0] */
+    int statistics;             /* 1: asked for; read from seen, color, views[0] */
     const unsigned char *reach; /* (1 + lights, objects) 0: out of reach of the camera, of a light: what
                                    stages find of its Gaussians there is not read; NULL: all are within */
     /* SSDGS_STAGE_WALK */
@@ -1063,7 +1066,7 @@ typedef struct ssdgs_frame {
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;            /* (3, h, w) without background */
     ssdgs_real *layer_pixels;      /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
-                                      nothing is; for  components and training */
+                                      nothing is; for components and training */
     ssdgs_real *transmittance;     /* (h, w) */
     ssdgs_real *median_depth;      /* (h, w) as in ssdgs_image; NULL: not asked for */
     const ssdgs_real *scene_depth; /* (h, stride) as in ssdgs_image; for WALK and COMPOSITE */
@@ -1285,21 +1288,23 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #endif
 
 #define SSDGS__BLOCK 64 /* Gaussians shaded together */
-#define SSDGS__AHEAD 12 /* ranks; what is theirs lies anywhere in memory */
+#define SSDGS__AHEAD 12 /* how far ahead loops prefetch, in ranks or tile entries */
 #define SSDGS__BATCH 64 /* tile entries walked together: bits of a word */
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS \
     16 /* partial sums of shared gradients: fixed, so that threads cannot change the result */
-#define SSDGS__GLANCES 2000 /* about 0.1 ms */
-#define SSDGS__BAND 16      /* image rows of a task */
-#define SSDGS__CHUNK 1024   /* Gaussians projected by one task */
+#define SSDGS__GLANCES 2000  /* of a thread before it sleeps: about 0.1 ms */
+#define SSDGS__BAND 16       /* image rows of a task */
+#define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
+#define SSDGS__BIN_CHUNKS 64 /* tasks that make a view's tile lists */
 #ifndef SSDGS__BATCH_BYTES
 #define SSDGS__BATCH_BYTES ((size_t)1 << 28) /* of views walked together, 80 a Gaussian */
 #endif
-#define SSDGS__SOFT 0.02   /* true dipole transport, length units: distances are sqrt(r^2 + soft^2) */
-#define SSDGS__LENGTHS 5   /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
-#define SSDGS__SERIES 10   /* coefficients of a series to second order in x, y, z */
-#define SSDGS__SOURCES 512 /* of light, gathered for a kernel */
+#define SSDGS__SOFT 0.02     /* true dipole transport, length units: distances are sqrt(r^2 + soft^2) */
+#define SSDGS__LENGTHS 5     /* of true dipole transport: 0.04, 0.08 .. 0.64 length units */
+#define SSDGS__SHORTEST 0.04 /* the first of them */
+#define SSDGS__SERIES 10     /* coefficients of a series to second order in x, y, z */
+#define SSDGS__SOURCES 512   /* of light, gathered for a kernel */
 #define SSDGS__ALPHA_MAX 0.999
 #define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
 #define SSDGS__SHARE \
@@ -1322,7 +1327,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__PER_LIGHT 3
 #define SSDGS__DEPTH_LAYER 3
 #define SSDGS__TILE_FOURTH \
-    48 /* in a micro-tile's 64 values, after three of 16 lanes: transmittance, or the gradients' product */
+    48 /* where in a micro-tile's 64 values the last 16 are: transmittance, or the gradients' product */
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
 #define SSDGS__LOBE 11         /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS \
@@ -1360,8 +1365,8 @@ typedef struct ssdgs__tile {
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
-    int cue, flux, orthographic;        /* whether the light pass finds them */
-    ssdgs_light_pixel *light_map;       /* of the tile, or NULL */
+    int cue, flux, orthographic;  /* 1: a light's walk finds depth_cue, flux; the view is orthographic */
+    ssdgs_light_pixel *light_map; /* of the tile, or NULL */
     const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
     const ssdgs_real *scene_depth;      /* [micro-tile][16 lanes] entries must be nearer, or NULL */
     ssdgs_real *median;          /* [micro-tile][16 lanes] where transmittance falls below 1/2, or NULL */
@@ -1378,12 +1383,17 @@ typedef struct ssdgs__product {
     int rows, columns, depth, accumulate, relu;
 } ssdgs__product;
 
+/* Of a depth, multiplied out before the inner loop. */
+typedef struct ssdgs__offsets {
+    uint32_t a, b;
+} ssdgs__offsets;
+
 typedef struct ssdgs__lighting {
-    ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, basis[12 * SSDGS_ASG_COUNT];
+    ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth;
+    ssdgs_real basis[12 * SSDGS_ASG_COUNT]; /* deferred: t, s, a, da/d(raw a) at 8 .. 11 of each 12 */
     int directional, printed_dipole, diffuse, specular, shadow, scattering;
     int residual_shadow, refined_shadow, per_channel_optics, shadow_on_scattering, deferred;
-    ssdgs_real view[12], inverse_fx, inverse_fy, cx,
-        cy; /* of the camera; deferred, basis holds t, s, a, da/d(raw a) at 8 .. 11 */
+    ssdgs_real view[12], inverse_fx, inverse_fy, cx, cy; /* of the camera */
 } ssdgs__lighting;
 
 /* Gradients of a projection: dL/d(splat) (n, SSDGS__SPLAT) in, those of the planes added to, of the view (12)
@@ -1728,6 +1738,11 @@ static int ssdgs__finite(ssdgs_real x) {
 #else
 #define SSDGS__PAUSE() ((void)0)
 #endif
+#elif defined(_MSC_VER)
+#define SSDGS__GLANCE(p) (*(p))
+#define SSDGS__PUBLISH(p, value) ((void)InterlockedExchange((volatile LONG *)(p), (LONG)(value)))
+#define SSDGS__EXCHANGE(p, value) ((int)InterlockedExchange((volatile LONG *)(p), (LONG)(value)))
+#define SSDGS__PAUSE() YieldProcessor()
 #else
 #define SSDGS__GLANCE(p) (*(p))
 #define SSDGS__PUBLISH(p, value) (*(p) = (value))
@@ -1737,9 +1752,6 @@ static int ssdgs__exchange(volatile int *p, int value) {
     return old;
 }
 #define SSDGS__EXCHANGE(p, value) ssdgs__exchange(p, value)
-#if defined(_MSC_VER)
-#define SSDGS__PAUSE() YieldProcessor()
-#endif
 #endif
 
 struct ssdgs_context {
@@ -1752,12 +1764,11 @@ struct ssdgs_context {
     struct ssdgs__pool *pool;
     struct ssdgs__scratch *scratch; /* reused by every frame on this context */
     int isa, threads, groups;       /* groups: of tasks for a job system; 0: there is none */
-    int references;    /* its owner's, of its models and trainers, of a call that destroys: the last that goes
-                          frees it */
-    volatile int busy; /* 1 while a call is at work */
-    int telling;       /* 1 while the log hears a message */
-    long process;      /* the one that made the threads: a fork has none of them */
-    uint64_t revisions;  /* handed out to models */
+    int references;     /* the owner, models, scenes, trainers, calls that destroy: the last to go frees it */
+    volatile int busy;  /* 1 while a call is at work */
+    int telling;        /* 1 while the log hears a message */
+    long process;       /* id of the process that has the threads: a fork has none */
+    uint64_t revisions; /* handed out to models */
     const char *subject; /* what is being checked, for messages: a file's name, or the one of several things
                             with its number */
     int subject_number;  /* -1: it has none */
@@ -1777,23 +1788,22 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
         ssdgs__append(text, at, "-");
         value = -value;
     }
-    uint64_t whole;
-    memcpy(&whole, &value, sizeof whole);
-    uint64_t rest = whole & UINT64_C(0x7FFFFFFFFFFFFFFF);
-    whole = UINT64_C(0x7FF0000000000000);
-    if (rest >= whole) {
-        ssdgs__append(text, at, rest > whole ? "NaN" : "infinite");
+    uint64_t bits; /* -ffast-math folds isnan() and isinf() away */
+    memcpy(&bits, &value, sizeof bits);
+    bits &= UINT64_C(0x7FFFFFFFFFFFFFFF);
+    const uint64_t infinite = UINT64_C(0x7FF0000000000000);
+    if (bits >= infinite) {
+        ssdgs__append(text, at, bits > infinite ? "NaN" : "infinite");
         return;
     }
-    if (rest && (value < 1e-6 || value >= 1e15)) {
+    if (bits && (value < 1e-6 || value >= 1e15)) {
         const double exponent = floor(log10(value));
         ssdgs__append_number(text, at, value / pow(10, exponent));
         ssdgs__append(text, at, "e");
         ssdgs__append_number(text, at, exponent);
         return;
     }
-    whole = (uint64_t)value;
-    rest = (uint64_t)((value - (double)whole) * 1e6 + 0.5);
+    uint64_t whole = (uint64_t)value, rest = (uint64_t)((value - (double)whole) * 1e6 + 0.5);
     if (rest >= 1000000) {
         whole++;
         rest = 0;
@@ -1844,9 +1854,10 @@ static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const
     context->message[0] = 0;
     if (context->subject) {
         ssdgs__append(context->message, &at, context->subject);
-        if (context->subject_number >= 0) ssdgs__append(context->message, &at, " ");
-        if (context->subject_number >= 0)
+        if (context->subject_number >= 0) {
+            ssdgs__append(context->message, &at, " ");
             ssdgs__append_number(context->message, &at, context->subject_number);
+        }
         ssdgs__append(context->message, &at, ": ");
     }
     va_list arguments;
@@ -1896,7 +1907,7 @@ static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
 
 static void ssdgs__context_drop(ssdgs_context *context);
 
-/* Ends one that took a reference first, as it may free all others; the context is busy until it is gone. */
+/* Ends a call and drops a reference. Where it was the last, the context stays busy until freed. */
 static void ssdgs__leave_and_drop(ssdgs_context *context) {
     if (context->references == 1) {
         ssdgs__context_drop(context);
@@ -1957,8 +1968,9 @@ typedef struct ssdgs__buffer {
 
 static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
     size_t bytes;
-    if (!ssdgs__product_fits(count, size, &bytes))
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes", count, size);
+    if (!ssdgs__product_fits(count, size, &bytes) || bytes > SIZE_MAX - bytes / 8)
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes does not fit in memory",
+                           count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
     ssdgs__release(context, buffer->memory);
     buffer->bytes = 0;
@@ -2121,13 +2133,11 @@ static ssdgs__pool *ssdgs__pool_create(const ssdgs_allocator *allocator, int thr
     ssdgs__pool *pool = (ssdgs__pool *)ssdgs__allocate_from(allocator, sizeof *pool);
     if (!pool) return NULL;
     pool->threads = (ssdgs__thread *)ssdgs__allocate_from(allocator, sizeof(ssdgs__thread) * (size_t)threads);
-    if (!pool->threads || !ssdgs__mutex_create(&pool->mutex)) {
-        ssdgs__release_to(allocator, pool->threads);
-        ssdgs__release_to(allocator, pool);
-        return NULL;
-    }
-    if (!ssdgs__condition_create(&pool->start) || !ssdgs__condition_create(&pool->done)) {
-        ssdgs__mutex_destroy(&pool->mutex);
+    const int locks = pool->threads && ssdgs__mutex_create(&pool->mutex),
+              starts = locks && ssdgs__condition_create(&pool->start);
+    if (!starts || !ssdgs__condition_create(&pool->done)) {
+        if (starts) ssdgs__condition_destroy(&pool->start);
+        if (locks) ssdgs__mutex_destroy(&pool->mutex);
         ssdgs__release_to(allocator, pool->threads);
         ssdgs__release_to(allocator, pool);
         return NULL;
@@ -2166,7 +2176,7 @@ static void ssdgs__pool_forked(ssdgs_context *context) {
 #endif
 }
 
-/* Of `count` tasks every groups-th: in images the dear ones are neighbours. */
+/* Runs every groups-th of `count` tasks, as costly ones are neighbours in images. */
 typedef struct ssdgs__group_job {
     ssdgs__task task;
     void *data;
@@ -2178,7 +2188,7 @@ static void ssdgs__group_task(void *data, int index) {
     for (int i = index; i < job->count; i += job->groups) job->task(job->data, i);
 }
 
-/* For a job system, where a task costs more than on threads of our own, in groups. */
+/* Runs tasks: in groups on a job system, where each costs more than on our threads. */
 static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
     ssdgs__group_job job;
     job.task = task;
@@ -2296,43 +2306,44 @@ static void ssdgs__scratch_destroy(ssdgs_context *context, struct ssdgs__scratch
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out) {
     if (!out) return SSDGS_ERR_ARGUMENT;
     *out = NULL;
-    ssdgs_context_desc zero;
-    memset(&zero, 0, sizeof zero);
-    if (desc) zero = *desc;
-    if (!zero.allocator.allocate != !zero.allocator.release || zero.threads < 0 || zero.threads > 1024)
+    ssdgs_context_desc asked;
+    memset(&asked, 0, sizeof asked);
+    if (desc) asked = *desc;
+    if (!asked.allocator.allocate != !asked.allocator.release || asked.threads < 0 || asked.threads > 1024)
         return SSDGS_ERR_ARGUMENT;
-    if (!zero.allocator.allocate) {
-        zero.allocator.allocate = ssdgs__default_allocate;
-        zero.allocator.release = ssdgs__default_release;
+    if (!asked.allocator.allocate) {
+        asked.allocator.allocate = ssdgs__default_allocate;
+        asked.allocator.release = ssdgs__default_release;
     }
-    if ((int)zero.isa < 0 || zero.isa >= SSDGS_ISA_COUNT ||
-        (zero.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)zero.isa)))
+    if ((int)asked.isa < 0 || asked.isa >= SSDGS_ISA_COUNT ||
+        (asked.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)asked.isa)))
         return SSDGS_ERR_ISA;
-    ssdgs_context *context = (ssdgs_context *)ssdgs__allocate_from(&zero.allocator, sizeof *context);
+    ssdgs_context *context = (ssdgs_context *)ssdgs__allocate_from(&asked.allocator, sizeof *context);
     if (!context) return SSDGS_ERR_MEMORY;
-    context->allocator = zero.allocator;
-    context->logger = zero.logger;
-    context->tracer = zero.tracer;
-    if (zero.gpu) context->gpu = *zero.gpu;
-    context->isa = (int)zero.isa;
+    context->allocator = asked.allocator;
+    context->logger = asked.logger;
+    context->tracer = asked.tracer;
+    if (asked.gpu) context->gpu = *asked.gpu;
+    context->isa = (int)asked.isa;
     for (int isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) context->isa = isa;
     context->k = ssdgs__table(context->isa);
     context->references = 1;
-    context->parallel = zero.parallel;
-    context->threads = 1;
-    context->groups = context->parallel.run ? 3 * (zero.threads ? zero.threads : 4) : 0;
-    if (!context->parallel.run) {
-        ssdgs__context_serial(context);
+    ssdgs__context_serial(context);
+    if (asked.parallel.run) {
+        context->parallel = asked.parallel;
+        context->threads = asked.threads ? asked.threads : 4;
+        context->groups = 3 * context->threads;
+    } else {
 #ifndef SSDGS_NO_THREADS
-        context->threads = zero.threads ? zero.threads : ssdgs__cpu_count();
-        if (context->threads < 1) context->threads = 1;
-        if (context->threads > 1) {
-            context->pool = ssdgs__pool_create(&context->allocator, context->threads);
+        const int threads = asked.threads ? asked.threads : ssdgs__cpu_count();
+        if (threads > 1) {
+            context->pool = ssdgs__pool_create(&context->allocator, threads);
             if (!context->pool) {
-                ssdgs__release_to(&zero.allocator, context);
+                ssdgs__release_to(&asked.allocator, context);
                 return SSDGS_ERR_MEMORY;
             }
+            context->threads = context->pool->thread_count + 1;
             context->parallel.run = ssdgs__pool_run;
             context->parallel.user = context->pool;
 #ifndef _WIN32
@@ -2395,7 +2406,7 @@ struct ssdgs_model {
     uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must
                              follow */
     int references;       /* itself and its trainers: the last that goes frees it */
-    int version;          /* of ssdgs.h that wrote its file, 0 if that does not say; this one's without */
+    int version;          /* SSDGS_VERSION that wrote its file, 0 if that says none; without a file ours */
     int count;
     size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -2405,7 +2416,7 @@ struct ssdgs_model {
     double low[3], high[3];            /* the box that holds all that its Gaussians draw */
     ssdgs__bounds bounds;              /* of them to three standard deviations, but for a few strays */
     uint64_t box_revision;             /* of which revision both are */
-    ssdgs_real *exposure;       /* (capacity) what of an even sky its own Gaussians leave each of them */
+    ssdgs_real *exposure; /* (2 x exposure_room) what of an even sky its own Gaussians leave each; scratch */
     uint64_t exposure_revision; /* for which of its revisions */
     size_t exposure_room;
 };
@@ -2572,9 +2583,10 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(origin[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(origin[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(origin[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    for (int i = 0; i < 3 && ssdgs__has_medium(s, s->terms); i++) {
-        if (!s->transport)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
+    const int medium = ssdgs__has_medium(s, s->terms);
+    if (medium && !s->transport)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
+    for (int i = 0; medium && i < 3; i++) {
         const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
         if (!(scattering >= (ssdgs_real)1e-12 && scattering <= (ssdgs_real)1e12) ||
             !(absorption >= 0 && absorption <= (ssdgs_real)1e12))
@@ -2655,9 +2667,10 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     if (!out) return ssdgs__null(context, "ssdgs_model_create", "out");
     const ssdgs_result result = ssdgs__settings_check(context, &s);
     if (result) return result;
-    if (count < 0) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians", count);
+    if (count < 0)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians: fewer than 0", count);
     if (count > SSDGS__MAX_GAUSSIANS)
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians", count);
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians: over 2^28", count);
     ssdgs_model *model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
     if (!model) return SSDGS_ERR_MEMORY;
     model->context = context;
@@ -2672,8 +2685,8 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
     size_t bytes;
-    if (model->globals && ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
-        model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
+    if (!ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) bytes = SIZE_MAX;
+    if (model->globals) model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!model->gaussians) {
         ssdgs__model_drop(model);
         return SSDGS_ERR_MEMORY;
@@ -2760,7 +2773,7 @@ static double ssdgs__logit(double x) {
     return raw < -SSDGS__MOST_RAW ? -SSDGS__MOST_RAW : raw > SSDGS__MOST_RAW ? SSDGS__MOST_RAW : raw;
 }
 
-/* The unit quaternion that turns the z axis into a direction; the identity for 0 0 0. */
+/* A quaternion, of any length, that turns the z axis into a direction; the identity for 0 0 0. */
 static void ssdgs__turn_to(const ssdgs_real direction[3], double q[4]) {
     const double x = (double)direction[0], y = (double)direction[1], z = (double)direction[2];
     const double length = sqrt(x * x + y * y + z * z);
@@ -2816,11 +2829,11 @@ static void ssdgs__specular_store(const ssdgs_real specular[3], int deferred, ss
 }
 
 /* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that has
-   the normal already stays: what it says of directions along the surface would be lost. */
+   the normal already stays, as a new one would lose its tangents. */
 static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
     double raw[SSDGS_CHANNELS], size = 0;
     const int flat = g->normal[0] == 0 && g->normal[1] == 0 && g->normal[2] == 0;
-    ssdgs_real along = 0, length = 0;
+    double along = 0, length = 0;
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)plane[(size_t)i * stride];
     ssdgs_real old[4];
     for (int i = 0; i < 4; i++) {
@@ -2832,16 +2845,15 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(old, q, r);
     for (int i = 0; i < 3; i++) {
-        along += r[3 * i + 2] * g->normal[i];
-        length += g->normal[i] * g->normal[i];
+        along += (double)r[3 * i + 2] * (double)g->normal[i];
+        length += (double)g->normal[i] * (double)g->normal[i];
         raw[SSDGS_POSITION + i] = (double)g->position[i];
         raw[SSDGS_LOG_SCALE + i] = log((double)g->scale[i]);
         raw[SSDGS_DIFFUSE + i] = ssdgs__softplus_inverse((double)g->diffuse[i]);
         raw[SSDGS_SCATTERING + i] = ssdgs__softplus_inverse((double)g->scattering[i]);
     }
     if (flat) memcpy(raw + SSDGS_FRAME, raw + SSDGS_ROTATION, 4 * sizeof *raw);
-    else if (!(along > (ssdgs_real)0.999999 * SSDGS__SQRT(length)))
-        ssdgs__turn_to(g->normal, raw + SSDGS_FRAME);
+    else if (!(along > 0.999999 * sqrt(length))) ssdgs__turn_to(g->normal, raw + SSDGS_FRAME);
     raw[SSDGS_OPACITY] = ssdgs__logit((double)g->opacity);
     if (deferred) {
         raw[SSDGS_ASG_WEIGHT] = log((double)g->sharpness[0]);
@@ -2967,11 +2979,10 @@ static int ssdgs__key_compare(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Halves the Gaussians listed (keys, their indices in the low halves) across their longest side, and each
-   half likewise, down to
-   8. Halves are of whole nodes, as many as go in 8s: the largest fit, so that each node is compact.
-   Neighbours in space then share a block, whose neurons live and die together, the cache, and a node of what
-   transport gathers from. */
+/* Puts keys (Gaussians' indices in the low halves) in order: halves them across their longest side, then each
+   half, down to 8. A half has a multiple of the largest 8^k below the count, so each node, a run of 8^k, is
+   compact. Neighbours then share a block, whose neurons live and die together, the cache, and transport's
+   nodes. */
 static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *keys, size_t count) {
     while (count > 8) {
         const ssdgs_real *along = position;
@@ -3003,7 +3014,7 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
     }
 }
 
-/* Puts a Gaussian's values, or what is kept of them, in the places of its key. scratch: count values. */
+/* Reorders planes: place i gets what was at index keys[i]. scratch: count values. */
 static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count,
                            ssdgs_real *scratch) {
     for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
@@ -3015,10 +3026,8 @@ static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *ke
 
 static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
     const size_t count = (size_t)model->count;
-    size_t bytes;
-    uint64_t *keys;
-    if (!ssdgs__product_fits(count + 1, sizeof *keys + sizeof(ssdgs_real), &bytes)) return SSDGS_ERR_MEMORY;
-    keys = (uint64_t *)ssdgs__allocate(model->context, bytes);
+    uint64_t *keys =
+        (uint64_t *)ssdgs__allocate(model->context, (count + 1) * (sizeof *keys + sizeof(ssdgs_real)));
     if (!keys) return SSDGS_ERR_MEMORY;
     for (size_t i = 0; i < count; i++) keys[i] = i;
     ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
@@ -3108,13 +3117,13 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
    holds. Called by render and by the trainer. */
 
 typedef struct ssdgs__view_memory {
-    ssdgs__buffer light_map, map_tile; /* the view's; the rest is that of a view of any batch */
+    ssdgs__buffer light_map, map_tile; /* the view's own; the batches share the rest */
     ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
         sums, histogram;
-    uint64_t chunk_room[64]; /* SSDGS__BIN_CHUNKS */
+    uint64_t chunk_room[SSDGS__BIN_CHUNKS];
 } ssdgs__view_memory;
 
-/* What the last frame was of: as long as that stays, what was found for it does. */
+/* What the last frame showed. While that stays, so do its results. */
 typedef struct ssdgs__cache {
     int objects; /* how many; -1: nothing is kept */
     ssdgs_camera camera;
@@ -3201,6 +3210,7 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
     model->frame = NULL;
     model->context = to;
     model->revision = ++to->revisions;
+    model->box_revision = model->exposure_revision = 0; /* they counted in `from` */
     to->references++;
     return SSDGS_OK;
 }
@@ -3231,6 +3241,11 @@ static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_me
     return SSDGS_OK;
 }
 
+/* c = a x b */
+static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
+    for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
 /* View axes (right, down, forward) looking along `forward` from `eye`; the image's up is the axis least along
    forward. */
 static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3],
@@ -3251,9 +3266,7 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
     }
     double r[3];
     for (;;) { /* an up along the view is replaced */
-        r[0] = f[1] * u[2] - f[2] * u[1];
-        r[1] = f[2] * u[0] - f[0] * u[2];
-        r[2] = f[0] * u[1] - f[1] * u[0];
+        ssdgs__cross(f, u, r);
         length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
         if (length > 1e-6 * sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) && length < 1e300) break;
         u[0] = u[1] = u[2] = 0;
@@ -3261,9 +3274,7 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
     }
     for (int i = 0; i < 3; i++) r[i] /= length;
     double d[3];
-    d[0] = f[1] * r[2] - f[2] * r[1];
-    d[1] = f[2] * r[0] - f[0] * r[2];
-    d[2] = f[0] * r[1] - f[1] * r[0];
+    ssdgs__cross(f, r, d);
     for (int i = 0; i < 3; i++) {
         view[i] = (ssdgs_real)r[i];
         view[4 + i] = (ssdgs_real)d[i];
@@ -3292,6 +3303,12 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     camera.cx = (ssdgs_real)width / 2;
     camera.cy = (ssdgs_real)height / 2;
     return camera;
+}
+
+/* For frames of which only the lights' views count. */
+static ssdgs_camera ssdgs__no_camera(void) {
+    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
+    return ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
 }
 
 SSDGS__SMALL_BEGIN
@@ -3407,7 +3424,7 @@ static const ssdgs_placed *ssdgs__object_of(const ssdgs_frame *frame, int g) {
     return frame->objects + (frame->object_of ? frame->object_of[g / SSDGS__BLOCK] : 0);
 }
 
-static int ssdgs__chunks(int count) { return (count + SSDGS__CHUNK - 1) / SSDGS__CHUNK; }
+static int ssdgs__chunks(int count) { return count / SSDGS__CHUNK + (count % SSDGS__CHUNK > 0); }
 
 static int ssdgs__chunk_end(const ssdgs_frame *frame, int chunk) {
     return frame->count / SSDGS__CHUNK > chunk ? (chunk + 1) * SSDGS__CHUNK : frame->count;
@@ -3507,13 +3524,13 @@ static int ssdgs__box_of(const ssdgs_placed *o, int index, ssdgs_real faint, dou
                          double *log_scale) {
     const ssdgs_model_view *g = &o->gaussians;
     const ssdgs_real *p = g->gaussians + index;
-    ssdgs_real largest = -20;
+    ssdgs_real largest = -SSDGS__MOST_RAW;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
     for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
     for (*log_scale = 0; j < SSDGS_OPACITY;
          j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
         const ssdgs_real s = p[(size_t)j * g->stride];
-        usable = usable && s < 20;
+        usable = usable && s < SSDGS__MOST_RAW;
         largest = s > largest ? s : largest;
         *log_scale += (double)(s > -SSDGS__MOST_RAW ? s : -SSDGS__MOST_RAW) / 3;
     }
@@ -3561,7 +3578,7 @@ static void ssdgs__bounds_task(void *data, int index) {
         }
 }
 
-/* least, in order, are the `keep` least of the numbers it was shown. */
+/* Keeps the `keep` least of the numbers it is shown, in order. */
 static void ssdgs__keep_least(double *least, int keep, double number) {
     int i = keep - 1;
     if (number >= least[i]) return;
@@ -3596,7 +3613,7 @@ static void ssdgs__cut_strays(const ssdgs_frame *frame, ssdgs_real faint, ssdgs_
     }
 }
 
-/* Of the Gaussians that alpha_threshold lets draw anything. */
+/* The bounds of what alpha_threshold lets draw. */
 static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds *total) {
     ssdgs_context *context = frame->context;
     const int chunks = ssdgs__chunks(frame->count);
@@ -3624,7 +3641,7 @@ static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds 
 
 static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o);
 
-/* Of all of a model's, where it was trained. */
+/* A model's, in its space, at alpha 1/255. */
 static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bounds) {
     ssdgs_context *context = model->context;
     const ssdgs_object object = ssdgs_object_default(model);
@@ -3667,8 +3684,8 @@ static int ssdgs__limited(const ssdgs_light *light) {
     return ssdgs__aimed(light) || (light->kind == SSDGS_LIGHT_POINT && light->range > 0);
 }
 
-/* Whether a light, or with -1 the camera, sees an object: rows (objects) of the camera and the lights. Of one
-   object alone nobody asks. */
+/* Which objects a light (-1: the camera) reaches: its row (objects). NULL, as with one object: all of them.
+ */
 static const unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
     return frame->reach ? frame->reach + (ptrdiff_t)(light + 1) * frame->object_count : NULL;
 }
@@ -3680,8 +3697,8 @@ static int ssdgs__beyond(const ssdgs_frame *frame, int light, const ssdgs_placed
     return reach && !reach[o - frame->objects];
 }
 
-/* From *at on, before end: the next Gaussians of objects that the camera or a light reaches, up to before
- *stop. 0: there are none. What the stages up to WALK know of the others is not set. */
+/* Moves *at to the next Gaussian, before end, of an object that the light (-1: the camera) reaches; *stop
+   ends its run. 0: there is none. For the others the stages up to WALK set nothing. */
 static int ssdgs__reached_next(const ssdgs_frame *frame, int light, int *at, int end, int *stop) {
     const unsigned char *reach = ssdgs__reach(frame, light);
     *stop = end;
@@ -3818,7 +3835,9 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
         const int aimed = ssdgs__aimed(lights + i);
         if (aimed) norm2 = (double)(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
         if ((aimed || lights[i].kind == SSDGS_LIGHT_DIRECTIONAL) && !(fabs(norm2 - 1) <= 1e-3))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                               aimed ? "light %d: its direction is not a unit vector"
+                                     : "light %d: position, of a directional light, is not a unit vector",
                                i);
         if (lights[i].kind == SSDGS_LIGHT_SPOT &&
             !(cone[0] >= 0 && cone[1] > cone[0] && cone[1] <= (ssdgs_real)3.1416))
@@ -3914,9 +3933,9 @@ static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
     return (ssdgs__cached_light *)frame->memory->cached_lights.memory;
 }
 
-/* Finds what of the last frame still holds, and notes what this one is of. Training changes the model every
-   time. same: the objects are those of the last frame. stirred: for the
-   camera and each light, whether one that moved is or was in its reach. */
+/* Finds what of the last frame still holds, then notes this one. In training nothing does: the model changes.
+   same: the last frame's objects. stirred: for the camera and each light, whether an object that moved is or
+   was in reach. */
 static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned char *stirred) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
@@ -3939,8 +3958,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
     ssdgs_occluder occluder;
     memset(&occluder, 0, sizeof occluder);
     if (frame->occluder) occluder = *frame->occluder;
-    known = known && cache->lights_ready && frame->light_count == cache->light_count &&
-            !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
+    known = known && cache->lights_ready && !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
             occluder.shadow == cache->occluder.shadow && occluder.user == cache->occluder.user &&
             occluder.revision == cache->occluder.revision && frame->maps <= cache->maps &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
@@ -3950,8 +3968,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
     for (int i = 0; i < frame->light_count; i++) {
         const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
         lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
-                         ssdgs__casts(light) == ssdgs__casts(last);
-        lights[i].kept = lights[i].kept && !memcmp(light->position, last->position, sizeof light->position) &&
+                         ssdgs__casts(light) == ssdgs__casts(last) &&
+                         !memcmp(light->position, last->position, sizeof light->position) &&
                          !memcmp(&light->range, &last->range, sizeof light->range);
         if (light->kind == SSDGS_LIGHT_SPOT) /* whose map follows its cone; a focus is of shading alone */
             lights[i].kept = lights[i].kept &&
@@ -3972,6 +3990,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
     cache->options = *now;
     cache->terms = frame->terms;
     cache->light_count = frame->light_count;
+    cache->lights_ready = 0; /* again once the walks are done */
 }
 
 /* ---- the light table: what kernels need of each light, made once a frame ---- */
@@ -3984,7 +4003,15 @@ static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
 SSDGS__SMALL_BEGIN
 
 /* What true dipole transport, by soft distances, brings to an evenly lit plane, over the irradiance. */
-static double ssdgs__beneath_plane(int length) { return exp(-SSDGS__SOFT / (0.04 * (1 << length))); }
+static double ssdgs__beneath_plane(int length) {
+    return exp(-SSDGS__SOFT / (SSDGS__SHORTEST * (1 << length)));
+}
+
+/* 4 A / 3 of eq. 5, where A follows from the index of refraction. */
+static double ssdgs__boundary(double eta) {
+    const double fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+    return 4.0 / 3 * (1 + fdr) / (1 - fdr);
+}
 
 /* The dipole of settings.medium (eq. 5 with Jensen's distances) as weights of true transport's lengths, for
    each colour: at 24 distances, from half a mean free path to 16, the sum of least squares, relative to the
@@ -3993,8 +4020,7 @@ static double ssdgs__beneath_plane(int length) { return exp(-SSDGS__SOFT / (0.04
 static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucency,
                                   ssdgs_real weights[3 * SSDGS__LENGTHS]) {
     enum { PLACES = 24, ROUNDS = 100 };
-    const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
-    const double boundary = 4.0 / 3 * (1 + fdr) / (1 - fdr), pi = 3.14159265358979323846;
+    const double eta = (double)s->eta, boundary = ssdgs__boundary(eta), pi = 3.14159265358979323846;
     const double passed =
         1 + 0.4399 - eta * (0.7099 - eta * (0.3319 - eta * 0.0636)); /* Egan and Hilgeman's */
     for (int c = 0; c < 3; c++) {
@@ -4011,7 +4037,8 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
                 dipole += albedo / (4 * pi) * z * (root * d + 1) * exp(-root * d) / (d * d * d);
             }
             for (int k = 0; k < SSDGS__LENGTHS; k++) {
-                const double length = 0.04 * (1 << k) * (double)(s->length_unit / translucency) * all;
+                const double length =
+                    SSDGS__SHORTEST * (1 << k) * (double)(s->length_unit / translucency) * all;
                 kernel[i][k] = exp(-r / length) / (2 * pi * length * r) / dipole;
             }
             rest[i] = 1;
@@ -4038,15 +4065,14 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
     }
 }
 
-/* As an object sees it in its own space, where a length is 1 / scale of the world's. The one behind the last
-   is of irradiance 1, for ambient light. lobes: another light's, which has the same, or NULL. */
+/* A light in an object's space, where a length is 1 / scale of the world's. Behind the last is ambient
+   light's, of irradiance 1. lobes: another light's, to copy the lobes from, or NULL. */
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
                                           const ssdgs__lighting *lobes) {
     static const ssdgs_light even = {
         SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 1, 1}, {0, 0, 0}, {0, 0}, 0, 0, 1};
     const ssdgs_settings *s = &o->settings;
     const ssdgs_light *from = light < frame->light_count ? frame->lights + light : &even;
-    const double eta = (double)s->eta, fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
     ssdgs__lighting k;
     memset(&k, 0, sizeof k);
     k.directional = from->kind == SSDGS_LIGHT_DIRECTIONAL;
@@ -4056,7 +4082,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     else ssdgs__to_object(o, from->position, k.light);
     for (int i = 0; i < 3; i++) k.intensity[i] = from->intensity[i] * s->light_scale / area;
     k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
-    k.virtual_depth = (ssdgs_real)(1 + 4.0 / 3 * (1 + fdr) / (1 - fdr));
+    k.virtual_depth = (ssdgs_real)(1 + ssdgs__boundary((double)s->eta));
     k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
     k.diffuse = (o->terms & SSDGS_DIFFUSE_TERM) != 0;
     k.specular = (o->terms & SSDGS_SPECULAR_TERM) != 0;
@@ -4170,8 +4196,8 @@ static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     o->mask = object->mask;
 }
 
-/* Puts the objects into the frame, one after the other. same: they are those of the last frame, if elsewhere.
-   tuned: one of them is not as translucent as it was. */
+/* Puts the objects into the frame, one after the other. same: they are the last frame's, perhaps moved.
+   tuned: the translucency of one has changed. */
 static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *objects, int count,
                                      int light_count, int *same, int *tuned) {
     ssdgs_context *context = frame->context;
@@ -4235,7 +4261,7 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
     return SSDGS_OK;
 }
 
-/* Of which material each 64 Gaussians are; none where there is one. */
+/* Notes the material of each 64 Gaussians; NULL if all have one. */
 static ssdgs_result ssdgs__materials(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     uint16_t *of;
@@ -4263,6 +4289,20 @@ typedef struct ssdgs__request {
     int mirrored;                   /* 1: the view may mirror */
     const ssdgs_occluder *occluder; /* NULL: none */
 } ssdgs__request;
+
+static ssdgs__request ssdgs__request_of(const ssdgs_object *objects, int object_count,
+                                        const ssdgs_camera *camera, const ssdgs_light *lights,
+                                        int light_count, const ssdgs_render_options *options) {
+    ssdgs__request request;
+    memset(&request, 0, sizeof request);
+    request.objects = objects;
+    request.object_count = object_count;
+    request.camera = camera;
+    request.lights = lights;
+    request.light_count = light_count;
+    request.options = options;
+    return request;
+}
 
 static int ssdgs__components_asked(const ssdgs_image *image) {
     return image->diffuse || image->specular || image->scattering || image->normal || image->shadow ||
@@ -4311,8 +4351,8 @@ static int ssdgs__in_sight(const ssdgs_frame *frame, const ssdgs_placed *o) {
     for (int axis = 0; axis < 2; axis++) {
         const double focal = (double)(axis ? camera->fy : camera->fx),
                      centre = (double)(axis ? camera->cy : camera->cx);
-        const double low = (-8 - centre) / focal,
-                     high = ((axis ? camera->height : camera->width) + 8 - centre) / focal;
+        const double low = (-21 - centre) / focal, /* a splat's blur reaches 20.4 px at most */
+            high = ((axis ? camera->height : camera->width) + 21 - centre) / focal;
         if ((at[axis] - high * at[2]) / sqrt(1 + high * high) > 2 * o->radius) return 0;
         if ((low * at[2] - at[axis]) / sqrt(1 + low * low) > 2 * o->radius) return 0;
     }
@@ -4383,7 +4423,7 @@ static int ssdgs__has_ambient(const ssdgs_render_options *options) {
 
 static ssdgs_result ssdgs__expose(ssdgs_placed *o);
 
-/* Points the frame's arrays of size n, its image planes and its views at memory. */
+/* Checks a request, places its objects, finds what is cached, reserves memory. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *context,
                                        ssdgs__frame_memory **memory, const ssdgs__request *request) {
     const ssdgs_camera *camera = request->camera;
@@ -4405,7 +4445,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (result) return result;
     frame->stride = image && image->stride ? image->stride : camera->width;
     if (frame->stride < camera->width)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: a stride of %d for a width of %d",
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: stride = %d is below the width of %d",
                            frame->stride, camera->width);
     frame->scene_depth = image ? image->scene_depth : NULL;
     frame->image = image;
@@ -4441,6 +4481,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     const int needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__cached_light *cached;
+    if (frame->light_count != m->cache.light_count) m->cache.lights_ready = 0;
     SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
     result = ssdgs__find_reach(frame, same, &stirred);
     if (result) return result;
@@ -4485,12 +4526,11 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     }
     frame->views[0].cached = m->cache.camera_ready;
     frame->batch[1] = frame->view_count;
-    for (int i = 0, j = 1; i < frame->light_count; i++) {
-        if (!needs_light) continue;
+    for (int i = 0, j = 1; needs_light && i < frame->light_count; i++) {
         if (!cached[i].kept) ssdgs__light_views(frame, i, frame->views + j);
         for (const int end = j + cached[i].views; j < end; j++) frame->views[j].cached = cached[i].kept;
     }
-    m->cache.camera_ready = m->cache.lights_ready = 0; /* again once the walks are done */
+    m->cache.camera_ready = 0; /* again once the walks are done */
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
@@ -4539,15 +4579,16 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     return result ? result : ssdgs__materials(frame);
 }
 
-/* Of one model, where it was trained: memory is its own. */
+/* Begins a frame of one model, in its space and memory. */
 static SSDGS__TRAINING ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ssdgs_model *model,
                                                           const ssdgs_camera *camera,
                                                           const ssdgs_light *lights, int light_count,
                                                           const ssdgs_render_options *options, int components,
                                                           int training) {
     const ssdgs_object object = ssdgs_object_default(model);
-    const ssdgs__request request = {&object, 1,          camera,   lights, light_count, options,
-                                    NULL,    components, training, 0,      0,           NULL};
+    ssdgs__request request = ssdgs__request_of(&object, 1, camera, lights, light_count, options);
+    request.components = components;
+    request.training = training;
     return ssdgs__frame_begin(frame, model->context, &model->frame, &request);
 }
 
@@ -4557,8 +4598,6 @@ SSDGS__SMALL_END
 
 /* Reads raw parameters and views. Writes record, depth, order, instance, tile_start, tile_list. Stages
    PROJECT, SORT and BIN. */
-
-#define SSDGS__BIN_CHUNKS 64
 
 static ssdgs_real ssdgs__log2_threshold(const ssdgs_frame *frame) {
     const double threshold = (double)frame->options.alpha_threshold;
@@ -4851,8 +4890,10 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
             room += chunk_room;
         }
         if (room > UINT32_MAX / 2)
-            return ssdgs__fail(context, SSDGS_ERR_LIMIT, "too many splats for an image of %d x %d", v->width,
-                               v->height);
+            return ssdgs__fail(context, SSDGS_ERR_LIMIT,
+                               v->light < 0 ? "too many splats for an image of %d x %d"
+                                            : "too many splats for a light's map of %d x %d",
+                               v->width, v->height);
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->of_gaussian, v->of_gaussian, ssdgs_instances, n + 1);
         ssdgs_instances *of_rank;
@@ -4876,7 +4917,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
 /* Reads records and tile lists of all views in one loop: the camera's walk and the light pass run side by
    side. Writes seen, visibility, depth_cue, flux and the light maps. Stage WALK. */
 
-/* With walked, of its entries those that the walk saw blended. */
+/* walked: entries count only where the walk saw them blend. */
 static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index,
                                   int walked) {
     ssdgs__tile t;
@@ -4970,7 +5011,7 @@ static void ssdgs__gather_light_task(void *data, int index) {
         }
 }
 
-/* What the occluder leaves of what comes to so many Gaussians, at points (count,3). */
+/* Multiplies the visibility and flux of Gaussians `which` by the occluder's fractions. */
 static void ssdgs__occlude(const ssdgs_frame *frame, int light, const int *which, const ssdgs_real *points,
                            int count) {
     const size_t first = (size_t)frame->count * (size_t)light;
@@ -5198,10 +5239,10 @@ static void ssdgs__join_task(void *data, int index) {
     size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels((size_t)tree->object->gaussians.count, first);
     for (int light = 0; light < job->frame->light_count && tree->leaves; light++) {
-        if (ssdgs__beyond(job->frame, light, tree->object)) continue;
-        for (int level = job->lights[light].transport_ready ? levels : 1; level < levels; level++) {
-            ssdgs__node *const nodes = tree->nodes + tree->count * (size_t)light, *const to =
-                                                                                      nodes + first[level];
+        if (job->lights[light].transport_ready || ssdgs__beyond(job->frame, light, tree->object)) continue;
+        ssdgs__node *nodes = tree->nodes + tree->count * (size_t)light;
+        for (int level = 1; level < levels; level++) {
+            ssdgs__node *to = nodes + first[level];
             const size_t below = first[level] - first[level - 1];
             for (size_t i = 0; i < below; i += SSDGS__LEAF)
                 to[i / SSDGS__LEAF] = ssdgs__node_join(nodes + first[level - 1] + i,
@@ -5397,8 +5438,8 @@ typedef struct ssdgs__transport_job {
 } ssdgs__transport_job;
 
 /* True dipole transport to some groups of a block, a mask: sum_k = sum over h of flux_h exp(-r / l_k) /
-   (2 pi l_k r), r their distance. The profiles integrate to 1 over a plane. What is far from the block is
-   one series around it. Each group of 16 takes the rest so, or point by point. */
+   (2 pi l_k r), r their distance. The profiles integrate to 1 over a plane. Far nodes become one
+   series around the block. Each group of 16 takes the rest as a series or as points. */
 static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs__tree *tree, int light,
                                    int slot, const ssdgs_real *x, int groups, ssdgs_real *sums) {
     const ssdgs_frame *frame = job->tree.frame;
@@ -5418,8 +5459,8 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs_
     t.remote = job->sources + (size_t)slot * 9 * SSDGS__SOURCES;
     t.nearby = t.remote + 5 * SSDGS__SOURCES;
     t.scale[0] = soft * soft;
-    t.scale[1] =
-        (ssdgs_real)-1.4426950408889634 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
+    t.scale[1] = (ssdgs_real)-1.4426950408889634 /
+                 ((ssdgs_real)SSDGS__SHORTEST * (ssdgs_real)(1 << (SSDGS__LENGTHS - 1)) * unit);
     t.radii = SSDGS__FAR * frame->options.transport_detail;
     t.reaches = SSDGS__WIDE * frame->options.transport_detail;
     t.remote_count = t.nearby_count = t.leaf_count = 0;
@@ -5453,7 +5494,7 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs_
         if (groups >> i & 1) t.k->series(t.group[i].series, t.group[i].middle, x + 16 * i, 16, sums + 16 * i);
     for (int k = 0; k < SSDGS__LENGTHS; k++) {
         const ssdgs_real scale =
-            (ssdgs_real)0.15915494309189535 / ((ssdgs_real)0.04 * (ssdgs_real)(1 << k) * unit);
+            (ssdgs_real)0.15915494309189535 / ((ssdgs_real)SSDGS__SHORTEST * (ssdgs_real)(1 << k) * unit);
         for (int s = 0; s < SSDGS__BLOCK; s++) sums[k * SSDGS__BLOCK + s] *= scale;
     }
 }
@@ -5461,7 +5502,7 @@ static void ssdgs__transport_block(const ssdgs__transport_job *job, const ssdgs_
 /* Blocks of a slot are neighbours; slots are fixed by the number of blocks alone. */
 static int ssdgs__slot_begin(int blocks, int slot) { return (int)((int64_t)blocks * slot / SSDGS__SLOTS); }
 
-/* Groups with a Gaussian to be shaded, where they are not known. */
+/* Transport to groups that are to be shaded and not known yet. */
 static void ssdgs__transport_task(void *data, int slot) {
     const ssdgs__transport_job *job = (const ssdgs__transport_job *)data;
     const ssdgs_frame *frame = job->tree.frame;
@@ -5782,6 +5823,7 @@ static int ssdgs__inputs(const ssdgs_settings *s, const ssdgs__block_layout *l, 
     if (!shadow && s->depth_cue) SSDGS__INPUT(1, 4, inverse_unit, l->cue, 0);
     if (!shadow && s->transport) SSDGS__INPUT(SSDGS__LENGTHS, -1, 1, l->transport, 0);
 #undef SSDGS__INPUT
+    SSDGS_ASSERT(row == (shadow ? l->shadow : l->scattering)[0]);
     return n;
 }
 
@@ -5911,8 +5953,7 @@ static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
 
 /* What of a light's irradiance its range, its cone, as in glTF's KHR_lights_punctual, and its focus leave. */
 typedef struct ssdgs__reaching {
-    double direction[3], range2, outer, width,
-        focus; /* 1 / range^2; the cone's cosines: the outer, how far on */
+    double direction[3], range2, outer, width, focus; /* 1 / range^2; the outer cosine, the inner's less it */
 } ssdgs__reaching;
 
 static ssdgs__reaching ssdgs__reaching_of(const ssdgs_light *light, const ssdgs_real direction[3],
@@ -6183,7 +6224,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
         const ssdgs_light *source = frame->lights + light;
         const int off = ssdgs__beyond(frame, light, o);
-        const int limited = ssdgs__limited(source);
+        const int limited = ssdgs__limited(source), casts = ssdgs__casts(source);
         ssdgs_real reach[SSDGS__BLOCK];
         const int reached =
             o->light_count && !off &&
@@ -6199,7 +6240,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; s < SSDGS__BLOCK; s++) {
             const size_t of_light = n * (size_t)light + at[s];
             part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
-            part[l->cue + (size_t)s] = lighting->scattering && settings->depth_cue && ssdgs__casts(source)
+            part[l->cue + (size_t)s] = lighting->scattering && settings->depth_cue && casts
                                            ? frame->depth_cue[of_light] / (o->scale * o->translucency)
                                            : 0;
         }
@@ -6208,13 +6249,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS; i++) {
             ssdgs_real *to =
                 part + l->transport + i * SSDGS__BLOCK; /* in units of the irradiance of its own */
-            const ssdgs_real even = ssdgs__casts(source) ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
+            const ssdgs_real even = casts ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
             const size_t first = (blocks * (size_t)light * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK;
             for (int s = 0; s < SSDGS__BLOCK; s++) {
                 const size_t from =
                     at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
-                to[s] =
-                    ssdgs__casts(source) ? job->transport[first + from] / irradiance[s] : cosine[s] * even;
+                to[s] = casts ? job->transport[first + from] / irradiance[s] : cosine[s] * even;
             }
         }
         if (l->shadow_layers && lighting->shadow) {
@@ -6243,7 +6283,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             memset(outs, 0, 6 * SSDGS__BLOCK * sizeof *outs);
             for (int s = 0; s < live; s++) {
                 ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
-                to[0] = lighting->shadow && shadow ? shadow[s] : 0;
+                to[0] = shadow ? shadow[s] : 0;
                 to[1] = part[l->visibility + (size_t)s];
                 to[2] = scratch[l->lobe + 10 * SSDGS__BLOCK + (size_t)s];
             }
@@ -6300,9 +6340,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     }
 }
 
-/* Gaussians within max_error take the colour of the one of their object shaded before them: a neighbour, as
-   training leaves them. Those from a block's first on, up to the next block's; an object's first block has
-   those ahead of it too. */
+/* A skipped Gaussian takes the colour of the last one of its object shaded before it, a neighbour. A block
+   serves those from its first up to the next block's first; an object's first block also those ahead. */
 static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int block) {
     const ssdgs_frame *frame = job->frame;
     const ssdgs__shade_block *b = job->block + block;
@@ -6404,7 +6443,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         }
     }
     job.counts = frame->memory->cache.counts;
-    if (transport && frame->flux) {
+    if (transport) {
         result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
     }
@@ -6428,8 +6467,8 @@ static int ssdgs__learning_lights(const ssdgs_frame *frame) {
     return frame->light_count + (frame->objects->exposure != NULL);
 }
 
-/* Gives ambient light's lighting its intensity, after adding that one's gradient to the lane sums where a
-   lamp's position has its own. */
+/* Adds dL/d(ambient light's intensity) to the lane sums that hold a lamp's dL/d(position), then gives lamp
+   that intensity. */
 static void ssdgs__ambient_backward(const ssdgs_frame *frame, ssdgs__lighting *lamp,
                                     const ssdgs__colour_in *in, const ssdgs_real *dcolor,
                                     ssdgs_real *lane_sums) {
@@ -6442,8 +6481,8 @@ static void ssdgs__ambient_backward(const ssdgs_frame *frame, ssdgs__lighting *l
     for (int c = 0; c < 3; c++) lamp->intensity[c] *= frame->options.ambient[0][c];
 }
 
-/* E is its reach / distance^2: of drows' gradient to E what is the reach's goes to positions and the light,
-   and that to 1 / distance^2 stays. */
+/* E = reach / distance^2. dL/d(reach) goes on to positions and the light; dL/d(1 / distance^2) stays in
+   drows. */
 static void ssdgs__reach_backward(const ssdgs_frame *frame, int light, const ssdgs_real *gauss,
                                   ssdgs_real *drows, ssdgs_real *dgauss, ssdgs_real *lane_sums) {
     ssdgs_real reach[SSDGS__BLOCK], slope[3 * SSDGS__BLOCK], *de = drows + SSDGS__IRRADIANCE * SSDGS__BLOCK;
@@ -6496,7 +6535,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         ssdgs__lighting lamp = ssdgs__lightings(frame, frame->objects)[light];
         const ssdgs__lighting *lighting = &lamp;
         const ssdgs_real *part = memory + l->lights + l->light_size * (size_t)light;
-        const ssdgs_real *shadow = l->shadow_layers && !even ? part + l->scattering_at - SSDGS__BLOCK : NULL;
+        const ssdgs_real *shadow =
+            l->shadow_layers && lighting->shadow ? part + l->scattering_at - SSDGS__BLOCK : NULL;
         const ssdgs_real *scattering =
             part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * lights + light) * SSDGS__LANE_SUMS * 16;
@@ -6630,8 +6670,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
 /* Reads color, layers, tile lists and light maps. Writes pixels, layer_pixels, transmittance. Stages
    COMPOSITE, COMPOSITE_BACKWARD and PROJECT_BACKWARD. */
 
-/* A tile's values, [micro-tile][4][16 lanes], of which the first `count` go to planes, or are added there, or
-   come from them. */
+/* Writes, or with add adds, the first `count` of a tile's values, [micro-tile][4][16 lanes], to planes. */
 static void ssdgs__tile_store(const ssdgs__tile *tile, const ssdgs_real *values, int count, int add,
                               ssdgs_real *const planes[]) {
     for (int micro = 0; micro < 16; micro++)
@@ -6687,9 +6726,9 @@ typedef struct ssdgs__composite_job {
     int deferred;          /* 1: with the layers and what they are lit to */
 } ssdgs__composite_job;
 
-/* Transmittance at a distance from the light through one pixel of its map: what a fall leaves stays, all
-   along the gap behind a veil, until the next fall is nearer than `thick`, and from there goes straight to
-   what there was before that. steep: its derivative by the distance. */
+/* Transmittance at a distance from the light, by one pixel of its map. After a fall it stays at what that
+   left, until `thick` ahead of the next fall, then goes linearly to what there was before that one. steep:
+   its derivative by the distance. */
 static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
                                               ssdgs_real thick, ssdgs_real *steep) {
     const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
@@ -6774,6 +6813,9 @@ static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, int fi
     return passed;
 }
 
+/* Where a tile keeps pixel i of 256: [micro-tile][4][16 lanes]. */
+static int ssdgs__tile_lane(int i) { return i / 16 * 64 + i % 16; }
+
 /* The camera's ray (x, y, 1) of a tile's pixel i, [micro-tile][16 lanes], and where in the world it is at
    depth z. */
 static void ssdgs__place_of_pixel(const ssdgs__lighting *k, const ssdgs__tile *tile, int i, ssdgs_real z,
@@ -6795,7 +6837,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
     int lanes[SSDGS__POINTS], points_count = 0;
     const int first = ssdgs__first_view(frame, light);
     for (int i = 0; i < 256; i++) {
-        const int lane = i / 16 * 64 + i % 16;
+        const int lane = ssdgs__tile_lane(i);
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         ssdgs_real ray[2], at[3];
         visibility[lane] = 1;
@@ -6825,10 +6867,9 @@ static int ssdgs__material_after(const ssdgs__tile *tile, int material) {
     return first < 0 && material < 0 ? 0 : first; /* 0: with nothing to blend a tile still has its pixels */
 }
 
-/* Of several materials in a tile: joins the v and S of one, (2 of [micro-tile][4][16 lanes]), with those that
-   pixel_visibility and pixel_shadow hold of the ones before it, by their covers, and makes of D, which stands
-   alone so far, what gives the sum of both diffuse terms when it is multiplied by the joint S. Layers: the
-   material's depth layer, its cover third; the light's D. */
+/* Of several materials in a tile: averages this one's v and S (the first 2 of visibility) with those before
+   it, in pixel_visibility and pixel_shadow, weighted by cover. Scales D such that D x the joint S is the sum
+   of both diffuse terms. depth: this material's depth layer; its third value is the cover. */
 static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *tile, int light,
                                 const ssdgs_real *depth, ssdgs_real *diffuse, ssdgs_real *visibility) {
     const size_t plane = (size_t)tile->width * (size_t)tile->height * (size_t)light;
@@ -6840,7 +6881,7 @@ static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *til
         ssdgs__tile_load(
             tile, ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c), c, others);
     for (int i = 0; i < 256; i++) {
-        const int at = i / 16 * 64 + i % 16;
+        const int at = ssdgs__tile_lane(i);
         const ssdgs_real cover = depth[at + 32], all = before[at + 32]; /* has this one's cover already */
         const ssdgs_real share = all > SSDGS__THIN ? cover / all : 1, shadow = visibility[at + 16];
         for (int j = 0; j < 2; j++) {
@@ -6963,7 +7004,7 @@ typedef struct ssdgs__uncomposite_job {
     size_t stride;              /* of tile_sums: 8 and 4 per layer */
 } ssdgs__uncomposite_job;
 
-/* The fourth of a walk's first layer: what the gradients' product with the pixel comes to, 1: with T's. */
+/* Sets the first layer's fourth value to the sum of gradient x pixel; transmittance 1: with T's. */
 static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradient, int layers,
                                     int transmittance) {
     for (int micro = 0; micro < 16; micro++)
@@ -6989,7 +7030,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
     const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
     const int first = ssdgs__first_view(frame, light);
     for (int i = 0; i < 256; i++) {
-        const int lane = i / 16 * 64 + i % 16, layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
+        const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
         ssdgs_real ray[2], at[3], slope[3], along = 0;
         if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
@@ -7033,11 +7074,10 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
     for (int c = 0; deferred && frame->normal_gradient && c < 4; c++)
-        ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c % 3 + 2 * (c / 3),
-                         gradient + (c < 3 ? 4 : 3) * SSDGS__TILE_LAYER);
+        ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c < 3 ? c : 2,
+                         gradient + (SSDGS__DEPTH_LAYER + (c < 3)) * SSDGS__TILE_LAYER);
     const ssdgs_real *color[SSDGS__LAYERS];
-    for (int light = deferred ? frame->light_count - 1 : -1; light >= 0;
-         light--) { /* the first's are walked with the others */
+    for (int light = deferred ? frame->light_count - 1 : -1; light >= 0; light--) {
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
         for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
             for (int c = 0; c < 3; c++)
@@ -7051,9 +7091,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
         if (!frame->visibility_given)
             ssdgs__place_backward(frame, job->lightings + light, light, &tile, pixels, gradient,
                                   highlight_sums);
-        if (!light) continue;
-        for (int layer = 0; layer < SSDGS__PER_LIGHT;
-             layer++) { /* training has one light: these may take long */
+        if (!light) continue;                                    /* its layers are walked below */
+        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++) { /* photographs with several lights are few */
             const int at = lit + layer * SSDGS__TILE_LAYER;
             *color = ssdgs__layer(frame, first - 1 + layer);
             ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
@@ -7101,7 +7140,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         d[4] = (ssdgs_real)-0.5 * sum[5];
         d[5] = sum[0];
         d[6] = sum[6];
-        d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, 2)[4 * g] : 0;
+        d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER - 1)[4 * g] : 0;
     }
 }
 
@@ -7149,6 +7188,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__composite_backward(ssdgs_frame *frame
     memset(frame->global_gradient, 0, frame->model->global_count * sizeof(ssdgs_real));
     memset(frame->light_gradient, 0, sizeof frame->light_gradient);
     memset(frame->view_gradient, 0, sizeof frame->view_gradient);
+    memset(frame->ambient_gradient, 0, sizeof frame->ambient_gradient);
     ssdgs__parallel(context, (int)tiles, ssdgs__composite_backward_task, &job);
     ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__splat_gradient_task, &job);
     if (frame->layer_count) ssdgs__highlight_gradient(frame, &job);
@@ -7230,8 +7270,8 @@ static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
     return result;
 }
 
-/* The stages up to WALK run once for every batch of views: what they leave for the others is small. A batch
-   is as many lights as do with SSDGS__BATCH_BYTES, or one. */
+/* The stages up to WALK run once per batch of views; later stages need little of their memory. A batch has
+   the lights that fit SSDGS__BATCH_BYTES, at least one. */
 static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
     ssdgs__cache *cache = &frame->memory->cache;
@@ -7377,16 +7417,14 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     if (image->color)
         ssdgs__write_rows(frame, frame->pixels, 3, stride, frame->options.background, image->color);
-    size_t i;
-    int y;
     if (image->median_depth)
         ssdgs__write_rows(frame, frame->median_depth, 1, stride, NULL, image->median_depth);
-    if (image->alpha)
-        for (y = 0, i = 0; y < camera->height; y++)
-            for (int x = 0; x < camera->width; x++, i++)
-                image->alpha[(size_t)y * (size_t)stride + (size_t)x] = 1 - frame->transmittance[i];
-    ssdgs_real *planes;
-    SSDGS__RESERVE(frame->scratch->image, planes, ssdgs_real, pixels * 3);
+    for (int y = 0; image->alpha && y < camera->height; y++)
+        for (int x = 0; x < camera->width; x++)
+            image->alpha[(size_t)y * (size_t)stride + (size_t)x] =
+                1 - frame->transmittance[(size_t)y * (size_t)camera->width + (size_t)x];
+    ssdgs_real *planes = NULL;
+    if (ssdgs__components_asked(image)) SSDGS__RESERVE(frame->scratch->image, planes, ssdgs_real, pixels * 3);
     for (int c = 0; c < 4; c++) {
         ssdgs_real *const to[4] = {image->diffuse, image->specular, image->scattering, image->normal};
         const ssdgs_real *const from[4] = {frame->diffuse, frame->specular, frame->scattering, frame->normal};
@@ -7412,8 +7450,8 @@ static ssdgs_result ssdgs__render_model(ssdgs_model *model, const ssdgs_camera *
     ssdgs_frame frame;
     if (!camera || !image) return ssdgs__null(model->context, "ssdgs_render", camera ? "image" : "camera");
     const ssdgs_object object = ssdgs_object_default(model);
-    const ssdgs__request request = {&object, 1, camera, lights, light_count, options,
-                                    image,   0, 0,      0,      0,           NULL};
+    ssdgs__request request = ssdgs__request_of(&object, 1, camera, lights, light_count, options);
+    request.image = image;
     const ssdgs_result result = ssdgs__frame_begin(&frame, model->context, &model->frame, &request);
     return result ? result : ssdgs__render(&frame, image, stats);
 }
@@ -7495,9 +7533,11 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     if (result) return result;
     if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
     if (!result) result = ssdgs__objects_check(context, objects, object_count);
-    const ssdgs__request request = {objects,     object_count, camera, lights,
-                                    light_count, options,      image,  0,
-                                    0,           scene->maps,  1,      ssdgs__occluder_of(scene)};
+    ssdgs__request request = ssdgs__request_of(objects, object_count, camera, lights, light_count, options);
+    request.image = image;
+    request.maps = scene->maps;
+    request.mirrored = 1;
+    request.occluder = ssdgs__occluder_of(scene);
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
     return ssdgs__leave(context, result);
@@ -7526,20 +7566,15 @@ static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request 
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options) {
-    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
     if (!scene) return SSDGS_ERR_ARGUMENT;
     const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_light");
     if (result) return result;
     const int seen = scene->frame && scene->frame->cache.camera.width > 0; /* else by no camera so far */
-    const ssdgs_camera camera =
-        seen ? scene->frame->cache.camera : ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
-    const ssdgs__request request = {objects,     object_count,
-                                    &camera,     lights,
-                                    light_count, options,
-                                    NULL,        0,
-                                    0,           1,
-                                    1,           ssdgs__occluder_of(scene)};
-    scene->maps = 1;
+    const ssdgs_camera camera = seen ? scene->frame->cache.camera : ssdgs__no_camera();
+    ssdgs__request request = ssdgs__request_of(objects, object_count, &camera, lights, light_count, options);
+    request.maps = scene->maps = 1;
+    request.mirrored = 1;
+    request.occluder = ssdgs__occluder_of(scene);
     return ssdgs__leave(scene->context, ssdgs__scene_light(scene, &request));
 }
 
@@ -7597,9 +7632,8 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
 static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory **memory,
                                        const ssdgs_real direction[3], ssdgs_real *exposure,
                                        ssdgs_real *sums) {
-    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
     const ssdgs_object object = ssdgs_object_default(model);
-    const ssdgs_camera camera = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
+    const ssdgs_camera camera = ssdgs__no_camera();
     const ssdgs_render_options options = ssdgs_render_options_preview();
     ssdgs_light light;
     memset(&light, 0, sizeof light);
@@ -7608,7 +7642,8 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
         light.position[c] = direction[c];
         light.intensity[c] = 1;
     }
-    const ssdgs__request request = {&object, 1, &camera, &light, 1, &options, NULL, 0, 0, 1, 0, NULL};
+    ssdgs__request request = ssdgs__request_of(&object, 1, &camera, &light, 1, &options);
+    request.maps = 1;
     ssdgs_frame frame;
     ssdgs_result result = ssdgs__frame_begin(&frame, model->context, memory, &request);
     if (!result) {
@@ -7628,8 +7663,8 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
     return result;
 }
 
-/* exposure (2 x room): what of an even sky a model leaves its Gaussians, by the lights' walk from the corners
-   of an icosahedron. The second half is scratch. */
+/* exposure (2 x room): the share of an even sky that reaches each Gaussian, by light walks from an
+   icosahedron's corners. The second half is scratch. */
 static ssdgs_result ssdgs__expose_model(ssdgs_model *model, size_t room, ssdgs_real *exposure) {
     static const ssdgs_real a = (ssdgs_real)0.5257311121191336, b = (ssdgs_real)0.85065080835204;
     ssdgs__frame_memory *memory = NULL;
@@ -7678,7 +7713,7 @@ typedef struct ssdgs__sky {
 typedef struct ssdgs__environment {
     const ssdgs_real *pixels;
     int width, height;
-    double ceiling; /* of the luminance that is ambient's; 0: none is */
+    double ceiling; /* luminance up to it is ambient's; 0: none */
 } ssdgs__environment;
 
 static double ssdgs__luminance(const ssdgs_real *rgb) {
@@ -7729,8 +7764,8 @@ static int ssdgs__sky_cut(const ssdgs__environment *e, ssdgs__sky *sky, ssdgs__s
     double least = sky->spread;
     int found = 0;
     for (int axis = 0; axis < 2; axis++) {
-        ssdgs__sky part[2];
-        memset(part, 0, sizeof part);
+        ssdgs__sky part[2] = {*sky, *sky};
+        part[0].light = part[0].along[0] = part[0].along[1] = part[0].along[2] = 0;
         const int begin = axis ? sky->top : sky->left, end = axis ? sky->bottom : sky->right;
         for (int at = begin; at + 1 < end; at++) {
             if (axis) ssdgs__sky_add(e, part, sky->left, at, sky->right, at + 1);
@@ -7741,13 +7776,8 @@ static int ssdgs__sky_cut(const ssdgs__environment *e, ssdgs__sky *sky, ssdgs__s
             if (!(part[0].spread + part[1].spread < least)) continue;
             least = part[0].spread + part[1].spread;
             found = 1;
-            for (int i = 0; i < 2; i++) {
-                best[i] = part[i];
-                best[i].left = sky->left;
-                best[i].top = sky->top;
-                best[i].right = sky->right;
-                best[i].bottom = sky->bottom;
-            }
+            best[0] = part[0];
+            best[1] = part[1];
             if (axis) best[0].bottom = best[1].top = at + 1;
             else best[0].right = best[1].left = at + 1;
         }
@@ -7860,7 +7890,11 @@ SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_rea
     else if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "environment: %d x %d pixels", width, height);
     else if (light_count < 0 || light_count > 65536 || (light_count && !lights))
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "environment: %d lights", light_count);
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                             light_count < 0 || light_count > 65536
+                                 ? "environment: %d lights, not 0 to 65536"
+                                 : "environment: %d lights, but the array is NULL",
+                             light_count);
     else result = ssdgs__environment_split(context, &e, to_world, lights, light_count, ambient);
     return ssdgs__leave(context, result);
 }
@@ -7872,7 +7906,7 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
     ssdgs__bounds bounds;
     if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
     const ssdgs_result result =
-        ssdgs__bounds_of_model(model, &bounds); /* without strays, but by longest axes */
+        ssdgs__bounds_of_model(model, &bounds); /* without strays, of balls: too wide */
     if (result) return result;
     ssdgs__place(&object, &placed);
     ssdgs_real least[3] = {0, 0, 0}, most[3] = {0, 0, 0};
@@ -7896,8 +7930,9 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
         none = 0;
     }
     for (int j = 0; j < 3; j++) {
-        low[j] = least[j] > (ssdgs_real)bounds.low[j] ? least[j] : (ssdgs_real)bounds.low[j];
-        high[j] = most[j] < (ssdgs_real)bounds.high[j] ? most[j] : (ssdgs_real)bounds.high[j];
+        const int cut = bounds.count > 0; /* else all are too faint to draw */
+        low[j] = !cut || least[j] > (ssdgs_real)bounds.low[j] ? least[j] : (ssdgs_real)bounds.low[j];
+        high[j] = !cut || most[j] < (ssdgs_real)bounds.high[j] ? most[j] : (ssdgs_real)bounds.high[j];
     }
     return SSDGS_OK;
 }
@@ -7937,8 +7972,8 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     return out;
 }
 
-/* The bytes of 8192 equal parts of 0 .. 1, the last one half, by the sRGB curve, made for each call: each
-   part has the byte of its middle, 0.2 of a byte from its ends at most. */
+/* sRGB bytes of 0 .. 1 in 8192 equal parts, the last one half as wide. A part has the byte of its middle, at
+   most 0.2 of a byte off at its ends. */
 #define SSDGS__PARTS 8192
 #define SSDGS__PART_SCALE ((ssdgs_real)(SSDGS__PARTS - 0.5))
 
@@ -7955,7 +7990,7 @@ static void ssdgs__bytes_make(unsigned char bytes[SSDGS__PARTS]) {
     }
 }
 
-/* Of a value by the table, or as it is without one; NaN's is 0. */
+/* A value's byte: by the table, else linear; NaN gives 0. */
 static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *table, ssdgs_real value) {
     value = value > 0 ? value : 0;
     value = value < 1 ? value : 1;
@@ -8102,7 +8137,7 @@ static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
     }
 }
 
-/* Of a value by the lines, or as it is without them. */
+/* The value encoded by the lines, or as it is. */
 static SSDGS__INLINE ssdgs_real ssdgs__on_curve(const ssdgs__line *lines, ssdgs_real linear) {
 #ifdef SSDGS_REAL64
     return lines ? ssdgs_srgb_encode(linear) : linear; /* exact, for tests */
@@ -8162,16 +8197,17 @@ static void ssdgs__loss_pad_task(void *data, int index) {
               end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
     for (int y = begin; y < end; y++)
         for (int p = 0; p < 5; p++) {
-            const ssdgs_real *from = (p ? job->target : job->image) +
-                                     (size_t)channel * (size_t)w * (size_t)job->height +
-                                     (size_t)(y > 0 ? y : 0) * (size_t)w;
             const ssdgs_real outside =
                 p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
-            const int inside = y >= 0 && y < job->height && p < 2;
+            const int inside = y >= 0 && y < job->height;
             ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
             for (int x = 0; x < 16; x++) to[x] = outside;
-            for (int x = 0; x < w; x++) to[16 + x] = inside ? from[x] - (ssdgs_real)0.5 : outside;
+            for (int x = 0; x < w && !inside; x++) to[16 + x] = outside;
             for (int x = 16 + w; x < (int)job->stride; x++) to[x] = outside;
+            if (!inside || p > 1) continue; /* ssim_row writes the derivatives */
+            const ssdgs_real *from = (p ? job->target : job->image) +
+                                     ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)w;
+            for (int x = 0; x < w; x++) to[16 + x] = from[x] - (ssdgs_real)0.5;
         }
 }
 
@@ -8260,6 +8296,7 @@ static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, c
 }
 
 static double ssdgs__psnr(double mse) { return mse > 1e-10 ? -10 * log10(mse) : 100; }
+
 /* ---- comparing images ---- */
 
 static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *image,
@@ -8429,10 +8466,9 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
 #undef SSDGS__R
 #undef SSDGS__G
 
-typedef struct ssdgs__ply_cursor { /* walks an element's properties: zero it, then call ssdgs__ply_next */
+typedef struct ssdgs__ply_cursor { /* walks properties: set field to NULL, then call ssdgs__ply_next */
     const ssdgs__ply_field *field;
     int index, word;
-    char name[32];
 } ssdgs__ply_cursor;
 
 static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
@@ -8447,17 +8483,20 @@ static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
         if (cursor->field == end) return 0;
     }
     cursor->word = cursor->field->word + cursor->index;
-    const size_t length = strlen(cursor->field->stem);
-    memcpy(cursor->name, cursor->field->stem, length + 1);
-    if (cursor->field->count)
-        cursor->name[length] = (char)('0' + cursor->index), cursor->name[length + 1] = 0;
     return 1;
 }
 
-/* Where a setting lies: an int or a ssdgs_real. */
-static unsigned char *ssdgs__ply_setting(ssdgs_settings *settings, const ssdgs__ply_cursor *cursor) {
-    return (unsigned char *)settings + (size_t)cursor->field->word * sizeof(int) +
-           (size_t)cursor->index * sizeof(ssdgs_real);
+/* The name of the property, which it writes to name. */
+static const char *ssdgs__ply_name(const ssdgs__ply_cursor *cursor, char name[32]) {
+    const size_t length = strlen(cursor->field->stem);
+    memcpy(name, cursor->field->stem, length + 1);
+    if (cursor->field->count) name[length] = (char)('0' + cursor->index), name[length + 1] = 0;
+    return name;
+}
+
+/* Where in ssdgs_settings a setting lies: an int or a ssdgs_real. */
+static size_t ssdgs__ply_setting(const ssdgs__ply_cursor *cursor) {
+    return (size_t)cursor->field->word * sizeof(int) + (size_t)cursor->index * sizeof(ssdgs_real);
 }
 
 /* Where anything else lies. */
@@ -8679,7 +8718,7 @@ static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_tok
         return ssdgs__ply_refuse(ply, "the count is not a number");
     for (int i = 0; i < ply->element_count; i++)
         if (ssdgs__ply_same(ply->elements[i].name, element->name))
-            return ssdgs__ply_refuse(ply, "the second of its name");
+            return ssdgs__ply_refuse(ply, "this name was given before");
     element->first = ply->property_count;
     element->kind = SSDGS__PLY_KINDS - 1;
     while (element->kind >= 0 && !ssdgs__ply_is(element->name, ssdgs__ply_kinds[element->kind]))
@@ -8690,9 +8729,9 @@ static ssdgs_result ssdgs__ply_add_element(ssdgs__ply *ply, const ssdgs__ply_tok
 }
 
 static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_token *tokens, int list) {
+    if (ply->element_count == 0) return ssdgs__ply_refuse(ply, "a property before any element");
     ssdgs__ply_element *element = ply->elements + ply->element_count - 1;
     ssdgs__ply_property *property = ply->properties + ply->property_count;
-    if (ply->element_count == 0) return ssdgs__ply_refuse(ply, "a property before any element");
     if (ply->property_count == SSDGS__PLY_MAX_PROPERTIES)
         return ssdgs__ply_refuse(ply, "more than 1024 properties");
     property->name = tokens[list ? 4 : 2];
@@ -8704,10 +8743,11 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
         return ssdgs__ply_refuse(ply, "a list's count must be an integer");
     for (int i = element->first; i < ply->property_count; i++)
         if (ssdgs__ply_same(ply->properties[i].name, property->name))
-            return ssdgs__ply_refuse(ply, "the second of its name");
+            return ssdgs__ply_refuse(ply, "this name was given before");
     ssdgs__ply_cursor cursor;
+    char name[32];
     for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
-        if (!ssdgs__ply_is(property->name, cursor.name)) continue;
+        if (!ssdgs__ply_is(property->name, ssdgs__ply_name(&cursor, name))) continue;
         if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB) {
             if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 &&
                 property->type != SSDGS__PLY_UINT16)
@@ -8780,12 +8820,7 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
     value = (double)raw - (negative ? (double)((uint64_t)1 << 8 * size) : 0);
     if (type == SSDGS__PLY_FLOAT64) memcpy(&value, &raw, sizeof value);
     if (type == SSDGS__PLY_FLOAT32 && !moved) return *bits = (uint32_t)raw, 1;
-    if (type == SSDGS__PLY_FLOAT32) {
-        *bits = (uint32_t)raw;
-        float single;
-        memcpy(&single, bits, sizeof single);
-        value = (double)single;
-    }
+    if (type == SSDGS__PLY_FLOAT32) value = ssdgs__ply_value((uint32_t)raw);
     *bits = ssdgs__ply_bits(moved ? value - origin : value);
     return 1;
 }
@@ -8839,10 +8874,11 @@ static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
 /* Every property whose word lies in [first, last) must be there. */
 static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int first, int last) {
     ssdgs__ply_cursor cursor;
+    char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
-                               ply->name, ssdgs__ply_kinds[kind], cursor.name,
+                               ply->name, ssdgs__ply_kinds[kind], ssdgs__ply_name(&cursor, name),
                                kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
                                        cursor.word <= SSDGS_OPACITY
                                    ? ": these are no Gaussian splats, but a point cloud or a mesh"
@@ -8881,20 +8917,22 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers",
                            ply->name);
     ssdgs__ply_cursor cursor;
+    char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
         const double value = ssdgs__ply_value(words[cursor.word]);
         const ssdgs_real real = (ssdgs_real)value;
         if (!ssdgs__ply_finite(words[cursor.word]) ||
             (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s makes no sense", ply->name,
-                               cursor.name);
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s is not finite or not whole",
+                               ply->name, ssdgs__ply_name(&cursor, name));
         int integer = cursor.field->integer ? (int)value : 0;
-        if (cursor.field->integer) memcpy(ssdgs__ply_setting(settings, &cursor), &integer, sizeof integer);
-        else memcpy(ssdgs__ply_setting(settings, &cursor), &real, sizeof real);
+        unsigned char *to = (unsigned char *)settings + ssdgs__ply_setting(&cursor);
+        if (cursor.field->integer) memcpy(to, &integer, sizeof integer);
+        else memcpy(to, &real, sizeof real);
     }
     if (settings->version < 1 || settings->version > SSDGS_VERSION)
-        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: of version %d, not known here", ply->name,
-                           settings->version);
+        return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: version %d; this library reads 1 to %d",
+                           ply->name, settings->version, SSDGS_VERSION);
     ply->version = settings->version;
     settings->version = SSDGS_VERSION;
     ply->context->subject = ply->name;
@@ -8975,8 +9013,8 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     return SSDGS_OK;
 }
 
-/* An origin for doubles of others that lie a thousand times their box away from 0, where floats of them would
-   be coarse. */
+/* Sets an origin where doubles of a foreign file lie a thousand times their box from 0: floats would be
+   coarse. */
 static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
@@ -8989,7 +9027,7 @@ static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
     size_t row;
     for (row = 0; doubles == 3 && row < vertex->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
-        if (!ssdgs__ply_row(ply, vertex, words)) return; /* which reading it will tell */
+        if (!ssdgs__ply_row(ply, vertex, words)) return; /* reading the rows reports it */
         for (int i = 0; i < 3; i++) {
             const double x = ssdgs__ply_value(words[i]);
             if (!ssdgs__ply_finite(words[i])) continue;
@@ -9033,7 +9071,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     stats->untrained = !stats->plain && !ours;
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
-        for (int kind = 0; kind < 3; kind++) ply->origin[kind] = (double)settings.origin[kind];
+        for (int c = 0; c < 3; c++) ply->origin[c] = (double)settings.origin[c];
     } else if (stats->plain) {
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
@@ -9128,8 +9166,7 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
 
 #ifndef SSDGS_NO_STDIO
 
-/* What is no regular file is not read, since that may never end, and not replaced: a folder, a device, a
-   pipe. */
+/* Folders, devices and pipes are not read, which may never end, and not replaced. */
 static int ssdgs__irregular(const char *path) {
 #ifdef _WIN32
     const DWORD kind = GetFileAttributesA(path);
@@ -9156,9 +9193,10 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
     rewind(file);
     unsigned char *larger;
     while (used == room && !result) { /* a byte more than the file has tells its end */
-        const size_t more = room ? room : hint > 0 && (uint64_t)hint < limit ? (size_t)hint + 1 : 65536;
-        if (room > limit || more > SIZE_MAX - room) {
-            result = ssdgs__fail(context, SSDGS_ERR_LIMIT, "%s: larger than 8 GiB", path);
+        size_t more = room ? room : hint > 0 && (uint64_t)hint <= limit ? (size_t)hint + 1 : 65536;
+        if (more > limit + 1 - room) more = (size_t)(limit + 1 - room);
+        if (!more || more > SIZE_MAX - room) {
+            result = ssdgs__fail(context, SSDGS_ERR_LIMIT, "%s: too large (8 GiB at most)", path);
         } else if ((larger = (unsigned char *)ssdgs__allocate(context, room + more)) == NULL) {
             result = SSDGS_ERR_MEMORY;
         } else {
@@ -9353,7 +9391,7 @@ static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *word
 }
 
 static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
-    ssdgs_settings settings = model->settings;
+    const ssdgs_settings *settings = &model->settings;
     uint32_t words[SSDGS__PLY_WORDS];
     if (kind == SSDGS__PLY_VERTEX) ssdgs__ply_look(model, row, words);
     ssdgs__ply_cursor cursor;
@@ -9361,15 +9399,15 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
         uint32_t *word = &words[cursor.word];
         ssdgs_real real;
         if (cursor.field->integer) {
-            memcpy(word, ssdgs__ply_setting(&settings, &cursor), sizeof *word);
+            memcpy(word, (const unsigned char *)settings + ssdgs__ply_setting(&cursor), sizeof *word);
         } else if (kind == SSDGS__PLY_SETTINGS) {
-            memcpy(&real, ssdgs__ply_setting(&settings, &cursor), sizeof real);
+            memcpy(&real, (const unsigned char *)settings + ssdgs__ply_setting(&cursor), sizeof real);
             *word = ssdgs__ply_bits((double)real);
         } else if (cursor.word < SSDGS_CHANNELS) {
             real = *ssdgs__ply_cell(model, row, &cursor);
             *word = ssdgs__ply_bits((double)real);
-            if (kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION && ssdgs__has_origin(&settings)) {
-                const double position = (double)settings.origin[cursor.word] + (double)real;
+            if (kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION && ssdgs__has_origin(settings)) {
+                const double position = (double)settings->origin[cursor.word] + (double)real;
                 uint64_t bits;
                 memcpy(&bits, &position, sizeof bits);
                 ssdgs__writer_word(writer, (uint32_t)bits);
@@ -9390,7 +9428,8 @@ static ssdgs_result ssdgs__savable(const ssdgs_model *model, const char *path) {
 
 static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path) {
     if (!path) return ssdgs__null(model->context, "ssdgs_model_save", "path");
-    if (ssdgs__savable(model, path)) return SSDGS_ERR_NONFINITE;
+    const ssdgs_result result = ssdgs__savable(model, path);
+    if (result) return result;
     ssdgs__writer writer;
     ssdgs__writer_open(&writer, model->context, path);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
@@ -9399,7 +9438,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
     for (int kind = 0; kind < SSDGS__PLY_KINDS; kind++) {
         rows[kind] =
             kind == SSDGS__PLY_VERTEX ? (size_t)model->count : ssdgs__ply_rows(&model->settings, kind);
-        char line[128];
+        char line[128], name[32];
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
@@ -9408,7 +9447,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
                      cursor.field->integer                             ? "int"
                      : position && ssdgs__has_origin(&model->settings) ? "double"
                                                                        : "float",
-                     cursor.name);
+                     ssdgs__ply_name(&cursor, name));
             ssdgs__writer_text(&writer, line);
         }
     }
@@ -9444,10 +9483,11 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
     "ASG weight",     "material",           "ASG basis",         "ASG sharpness",
     "ASG sigma",      "scattering network", "shadow network"};
 
-/* A photograph's camera and light corrections: shift t', rotation w (x_cam = exp(w)(R x + t) + t'), light
-   shift, ln of its intensity's factor. What a photograph moves: gradients of the first nine, a Gauss-Newton
-   step of the last and how sure it is, and the gradient of settings.ambient. */
+/* What a photograph moves: gradients of value[0 .. 8] below, a Gauss-Newton step of value[9] and how sure it
+   is, the gradient of settings.ambient. */
 #define SSDGS__MOVES 14
+/* value: the camera's shift t' and rotation w (x_cam = exp(w)(R x + t) + t'), the light's shift, ln of its
+   intensity's factor. */
 typedef struct ssdgs__correction {
     double value[10], mean[9], square[9];
     double sure;  /* how well the photograph tells the intensity */
@@ -9466,17 +9506,17 @@ struct ssdgs_trainer {
     ssdgs_real *magnify; /* per photograph: what makes up for an object small in the picture, 1 for others */
     int photo_count;
     uint32_t *order;           /* the photographs in the order of a pass */
-    int pass;                  /* that one; -1: none */
+    int pass;                  /* whose; -1: none */
     size_t stride;             /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
-    ssdgs_real *screen_gradient; /* (n) summed since the last density control, with how often and how strongly
-                                    it was seen */
+    ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, weights, half
+                                    shadow */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
     ssdgs_real *half_shadow;
     ssdgs_real *exposure; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
-    int exposed;          /* those are of these Gaussians */
+    int exposed;          /* 1: it is up to date */
     double ambient[6];    /* Adam's moments of settings.ambient: means, then squares */
     int ambient_steps;    /* and its clock */
     double extent;        /* 1.1 x the cameras' radius */
@@ -9589,15 +9629,10 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
     return terms;
 }
 
-/* Whether opacities are reset after an iteration. */
-static int ssdgs__resets(const ssdgs_train_options *o, int iteration) {
-    return o->opacity_reset_every && iteration > 0 && iteration % o->opacity_reset_every == 0 &&
-           ssdgs__schedule_time(o, iteration + o->opacity_reset_every / 2) <= o->densify_until;
-}
-
-/* The last iteration that could have been followed by a reset. */
+/* The last iteration up to this one after which opacities are reset; 0: none. */
 static int ssdgs__last_reset(const ssdgs_train_options *o, int iteration) {
-    return o->opacity_reset_every ? iteration - iteration % o->opacity_reset_every : 0;
+    const int every = o->opacity_reset_every, last = every ? iteration - iteration % every : 0;
+    return ssdgs__schedule_time(o, last + every / 2) <= o->densify_until ? last : 0;
 }
 
 static double ssdgs__decay(ssdgs_rate rate, double from, double over, double t) {
@@ -9643,7 +9678,7 @@ static ssdgs_real ssdgs__photo_number(const ssdgs_photo *photo, size_t at) {
     }
 }
 
-/* A stored value, 3: alpha. */
+/* A stored value; 3: alpha. */
 static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, int transfer, size_t pixel, int c) {
     const ssdgs_real number = ssdgs__photo_number(photo, 4 * pixel + (size_t)c);
     return c < 3 && transfer == SSDGS_TRANSFER_SRGB && ssdgs__is_light(photo) ? ssdgs_srgb_encode(number)
@@ -9658,7 +9693,7 @@ static void ssdgs__photo_pixel(const ssdgs_photo *photo, int transfer, const ssd
         value[c] = alpha * ssdgs__photo_value(photo, transfer, pixel, c) + (1 - alpha) * background[c];
 }
 
-/* Those of pixels begin .. end, as planes. */
+/* Stored values of pixels begin .. end, as planes. */
 static void ssdgs__photo_planes(const ssdgs__kernels *k, const ssdgs_photo *photo, int transfer,
                                 const ssdgs_real background[3], size_t begin, size_t end,
                                 ssdgs_real *planes) {
@@ -9768,26 +9803,27 @@ static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], co
 #define SSDGS__PIXELS 1024               /* of an exposure task */
 #define SSDGS__CLIPPED (ssdgs_real)0.999 /* stored values beyond may have been more */
 
-typedef struct ssdgs__exposure_job {
+typedef struct ssdgs__store_job {
     ssdgs_frame *frame;
     const ssdgs_photo *photo;
     const ssdgs_real *background; /* stored values */
     ssdgs_real *image, *slope, *lift,
         *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
-} ssdgs__exposure_job;
+} ssdgs__store_job;
 
 /* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 -
    T), image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u
    encode'(u). A photograph's 1 may stand for anything brighter, so there encode(u) is at most 1; halves and
    floats stand for what they are. */
-static void ssdgs__exposure_task(void *data, int index) {
-    const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
+static void ssdgs__store_task(void *data, int index) {
+    const ssdgs__store_job *job = (const ssdgs__store_job *)data;
     const ssdgs_frame *frame = job->frame;
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height,
                  begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
     const ssdgs_real *t = frame->transmittance + begin;
     const int light = ssdgs__is_light(job->photo);
+    const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
     ssdgs__photo_planes(frame->context->k, job->photo, frame->settings.transfer, job->background, begin,
                         begin + n, job->target);
     ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
@@ -9796,10 +9832,8 @@ static void ssdgs__exposure_task(void *data, int index) {
         for (size_t i = 0; i < n; i++)
             straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
         for (size_t i = n; i < n + 16; i++) straight[i] = 0;
-        if (frame->settings.transfer == SSDGS_TRANSFER_SRGB)
-            frame->context->k->srgb_encode(stored, slope, straight, n);
+        if (!linear) frame->context->k->srgb_encode(stored, slope, straight, n);
         for (size_t i = 0; i < n; i++) {
-            const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
             const ssdgs_real rendered = linear ? straight[i] : stored[i],
                              shown = ssdgs__photo_number(job->photo, 4 * (begin + i) + (size_t)c);
             const int clipped = !light && shown > SSDGS__CLIPPED && rendered > shown;
@@ -9811,8 +9845,8 @@ static void ssdgs__exposure_task(void *data, int index) {
     }
 }
 
-static void ssdgs__exposure_backward_task(void *data, int index) {
-    const ssdgs__exposure_job *job = (const ssdgs__exposure_job *)data;
+static void ssdgs__store_backward_task(void *data, int index) {
+    const ssdgs__store_job *job = (const ssdgs__store_job *)data;
     const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
     const size_t begin = (size_t)index * SSDGS__PIXELS;
     const size_t end = begin + SSDGS__PIXELS < pixels ? begin + SSDGS__PIXELS : pixels;
@@ -9836,7 +9870,8 @@ static void ssdgs__normals_task(void *data, int index) {
     const ssdgs_frame *frame = job->frame;
     const int w = frame->camera.width, h = frame->camera.height, begin = index * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < h ? begin + SSDGS__BAND : h;
-    const ssdgs_real *depth = ssdgs__layer_plane(frame, 3, 0), *alpha = ssdgs__layer_plane(frame, 3, 2);
+    const ssdgs_real *depth = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0),
+                     *alpha = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2);
     ssdgs_real *rows = job->scratch + (size_t)index * (SSDGS__BAND + 6) * job->stride;
     ssdgs_real *out = rows + (SSDGS__BAND + 2) * job->stride;
     memset(rows, 0, (SSDGS__BAND + 2) * job->stride * sizeof *rows);
@@ -9874,7 +9909,7 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     return SSDGS_OK;
 }
 
-/* The loss of one photograph under `terms` and all gradients, left in the frame. */
+/* A photograph to draw, and how. */
 typedef struct ssdgs__photo_job {
     const ssdgs_photo *photo;
     const ssdgs_camera *camera; /* of the photograph, or refined */
@@ -9898,6 +9933,7 @@ static ssdgs_result ssdgs__photo_lights(ssdgs_context *context, const ssdgs_phot
     return SSDGS_OK;
 }
 
+/* The loss of one photograph and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
                                           const ssdgs__photo_job *shot, ssdgs__loss_values *values) {
     const ssdgs_camera *camera = shot->camera;
@@ -9914,13 +9950,13 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     if (!result)
         result =
             ssdgs__frame_of_model(frame, model, camera, lights, 1 + shot->photo->more_count, &options, 0, 1);
-    if (!result && shot->exposure) {
+    if (!result && shot->exposure) { /* set earlier, the frame would find it itself */
         memcpy(frame->options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
         frame->objects->exposure = shot->exposure;
     }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    ssdgs__exposure_job job;
+    ssdgs__store_job job;
     SSDGS__RESERVE(frame->scratch->image, job.image, ssdgs_real, pixels * 9);
     SSDGS__RESERVE(frame->scratch->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
@@ -9928,7 +9964,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     job.background = shot->background;
     job.slope = job.image + pixels * 3;
     job.lift = job.image + pixels * 6;
-    ssdgs__parallel(context, tasks, ssdgs__exposure_task, &job);
+    ssdgs__parallel(context, tasks, ssdgs__store_task, &job);
     double along = 0,
            across = 0; /* as if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels */
     for (size_t i = 0; i < 3 * pixels && shot->exact; i++) {
@@ -9941,7 +9977,7 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
     result = ssdgs__loss(context, &frame->scratch->loss, &images, shot->dssim, frame->pixel_gradient, values);
     if (result) return result;
-    ssdgs__parallel(context, tasks, ssdgs__exposure_backward_task, &job);
+    ssdgs__parallel(context, tasks, ssdgs__store_backward_task, &job);
     result = ssdgs__normals_loss(frame, shot->normal_weight);
     if (result) return result;
     memcpy(frame->frozen, shot->frozen, sizeof frame->frozen);
@@ -9971,8 +10007,8 @@ typedef struct ssdgs__adam_job {
 } ssdgs__adam_job;
 
 static void ssdgs__finite_task(void *data, int index) {
-    const ssdgs__adam_job *job = (const ssdgs__adam_job *)data;
-    ssdgs__adam_range *r = ((ssdgs__adam_job *)data)->range + index;
+    ssdgs__adam_job *job = (ssdgs__adam_job *)data;
+    ssdgs__adam_range *r = job->range + index;
     if (job->k->finite(r->gradient, r->n)) return;
     for (size_t i = 0; i < r->n && !r->bad; i++)
         if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
@@ -10036,7 +10072,7 @@ typedef struct ssdgs__step {
     int terms, learns[SSDGS__GROUPS];
 } ssdgs__step;
 
-/* On the frame's gradients, of a photograph of so many pixels. */
+/* By the frame's gradients. pixels: of a photograph. */
 static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *frame, double pixels,
                                      const ssdgs__step *step) {
     ssdgs_context *context = trainer->context;
@@ -10101,7 +10137,7 @@ static double ssdgs__adam_one(double gradient, double *mean, double *square, int
            (sqrt(*square * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
 }
 
-/* What a light's rate is of: a scene's length, or a radian. */
+/* A light's rate is a share of this: a length, or a radian. */
 static double ssdgs__light_unit(const ssdgs_light *light, double unit) {
     return light->kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : unit;
 }
@@ -10117,16 +10153,12 @@ static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient,
     }
 }
 
-/* A point (w = 1) or direction (0) of the world in the camera's frame, and c = a x b. */
+/* A point (w = 1) or direction (0) of the world in the camera's frame. */
 static void ssdgs__to_camera(const ssdgs_camera *camera, const double world[3], double w, double seen[3]) {
     int j;
     for (int i = 0; i < 3; i++)
         for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++)
             seen[i] += (double)camera->view[4 * i + j] * world[j];
-}
-
-static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
-    for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 static const ssdgs_light *ssdgs__photo_light(const ssdgs_photo *photo, int i) {
@@ -10166,12 +10198,31 @@ static void ssdgs__anchor_intensities(ssdgs_trainer *trainer) {
         trainer->corrections[i].value[9] -= sum / weight;
 }
 
+/* The bounds' longest side. */
+static double ssdgs__bounds_side(const ssdgs_train_options *o) {
+    double longest = 0;
+    for (int j = 0; j < 3; j++) {
+        const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
+        longest = side > longest ? side : longest;
+    }
+    return longest;
+}
+
+static void ssdgs__bounds_centre(const ssdgs_train_options *o, double centre[3]) {
+    for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+}
+
+static int ssdgs__in_bounds(const ssdgs_train_options *o, const double x[3]) {
+    int j = 0;
+    while (j < 3 && x[j] > (double)o->bounds_min[j] && x[j] < (double)o->bounds_max[j]) j++;
+    return j == 3;
+}
+
 /* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common,
    to first order: the scene would follow, and its photographs look the same. */
 static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
     double centre[3], move[3] = {0, 0, 0}, turn[3] = {0, 0, 0};
-    for (int j = 0; j < 3; j++)
-        centre[j] = 0.5 * ((double)trainer->options.bounds_min[j] + (double)trainer->options.bounds_max[j]);
+    ssdgs__bounds_centre(&trainer->options, centre);
     double x[3];
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < trainer->photo_count; i++) {
@@ -10297,6 +10348,12 @@ static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count,
     ssdgs__rearranged(trainer);
 }
 
+/* Clears what Adam knows of a Gaussian. */
+static void ssdgs__forget(ssdgs_trainer *trainer, size_t at) {
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+        trainer->mean[c * trainer->stride + at] = trainer->square[c * trainer->stride + at] = 0;
+}
+
 /* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it
    is small, two samples of it, smaller, if it is large. */
 static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
@@ -10306,6 +10363,7 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
     ssdgs_real *p = trainer->model->gaussians;
     int longest = 0;
     ssdgs__copy_gaussian(p, stride, to, from);
+    ssdgs__forget(trainer, to);
     for (int c = 1; c < 3; c++)
         if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] >
             p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from])
@@ -10339,8 +10397,7 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int 
             *opacity = (ssdgs_real)log(expm1(veil));
         }
     }
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
-        trainer->mean[(size_t)c * stride + from] = trainer->square[(size_t)c * stride + from] = 0;
+    ssdgs__forget(trainer, from);
 }
 
 typedef struct ssdgs__outlines_job {
@@ -10349,14 +10406,12 @@ typedef struct ssdgs__outlines_job {
     unsigned char *outside;      /* per Gaussian */
 } ssdgs__outlines_job;
 
-/* Whether so many photographs are more than a share of all and, as one may be wrong, more than one of eight
-   or more. */
+/* Whether photographs exceed a share of all. Of eight or more one may be wrong: one alone is not enough. */
 static int ssdgs__several(int photographs, int all, double share) {
     return photographs > (all < 8 ? 0 : 1) && photographs > share * all;
 }
 
-/* Whether a camera has a place in the picture: 0 no, 1 yes, 2 yes and its photograph is transparent there and
-   around. */
+/* 0: the place is not in the picture. 1: it is. 2: and the photograph is transparent there and around. */
 static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *camera, int transparent,
                                const ssdgs_real x[3]) {
     const int reach = (camera->width + 127) / 128;
@@ -10418,8 +10473,7 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
     job.trainer = trainer;
     job.cameras = cameras;
     job.outside = outside;
-    ssdgs__parallel(context, (trainer->model->count + SSDGS__CHUNK - 1) / SSDGS__CHUNK, ssdgs__outlines_task,
-                    &job);
+    ssdgs__parallel(context, ssdgs__chunks(trainer->model->count), ssdgs__outlines_task, &job);
     ssdgs__release(context, cameras);
     return SSDGS_OK;
 }
@@ -10434,10 +10488,10 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: weights say little */
     const int before = trainer->iteration - o->batch, last = ssdgs__last_reset(o, before);
-    const int recovering = last > before - o->densify_every && ssdgs__resets(o, last);
+    const int recovering = last && last > before - o->densify_every;
     uint64_t *order;
     size_t kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n);
-    ssdgs_real *p;
+    const ssdgs_real *p = model->gaussians;
     /* two lists of n candidates; at most 2 n Gaussians' order, a plane of them; what is dropped */
     ssdgs__ranked *candidates = (ssdgs__ranked *)ssdgs__allocate(
         context, n * (2 * sizeof *candidates + 2 * sizeof *order + 2 * sizeof *p + 1) + 1);
@@ -10449,7 +10503,6 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         ssdgs__release(context, candidates);
         return result;
     }
-    p = model->gaussians;
     for (size_t i = 0; i < n; i++) {
         ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
         for (int c = 1; c < 3; c++) {
@@ -10502,15 +10555,10 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         ssdgs__release(context, candidates);
         return result;
     }
-    p = model->gaussians;
     size_t i, added;
     for (i = 0, added = 0; i < wanted; i++)
         if (!drop[candidates[i].index])
             ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
-    for (i = n; i < n + added; i++)
-        for (int c = 0; c < SSDGS_CHANNELS; c++)
-            trainer->mean[(size_t)c * trainer->stride + i] =
-                trainer->square[(size_t)c * trainer->stride + i] = 0;
     for (i = 0; i < n + added; i++)
         if (i >= n || !drop[i]) order[kept++] = i;
     ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + 2 * n));
@@ -10738,11 +10786,9 @@ static void ssdgs__merge(ssdgs_model *model, const ssdgs__pair *pair, ssdgs_real
 
 /* How much of each Gaussian is seen from around: what parallel lights shed on it, on average. */
 static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssdgs_real *flux) {
-    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
-    const ssdgs_camera camera = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
+    const ssdgs_camera camera = ssdgs__no_camera();
     const ssdgs_render_options options = ssdgs_render_options_exact();
     const size_t n = (size_t)model->count;
-    memset(seen, 0, n * sizeof *seen);
     for (int view = 0; view < SSDGS__REDUCE_VIEWS; view++) { /* on a spiral around the sphere */
         const double z = 1 - (2 * view + 1.0) / SSDGS__REDUCE_VIEWS, r = sqrt(1 - z * z), turn = 2.39996323;
         const ssdgs_light light = {
@@ -10782,7 +10828,7 @@ static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
     if (model->references > 1)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: a trainer has the model");
     if (count >= model->count) return SSDGS_OK;
-    /* the pairs; keys; what is seen, a plane in another order, which is of a light at first; what goes */
+    /* pairs; keys; seen; scratch, at first one light's flux; gone */
     ssdgs__pair *pairs = (ssdgs__pair *)ssdgs__allocate(
         context, leaves * (SSDGS__REDUCE_LEAF / 2) * sizeof *pairs +
                      n * (sizeof(uint64_t) + 2 * sizeof(ssdgs_real) + 1) + SSDGS__BLOCK);
@@ -10805,7 +10851,6 @@ static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
             if (c == SSDGS_DIFFUSE) keys[left++] = i;
         }
         ssdgs__reduce_keep(model, keys, left, seen, scratch);
-        model->arrangement++;
     }
     for (int round = 0; model->count > count && !result; round++) {
         ssdgs__reduce_job job = {model, seen, round % 2 * SSDGS__REDUCE_LEAF / 2, pairs};
@@ -10838,16 +10883,6 @@ SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count) {
 /* Judges the photographs, starts a run, steps, evaluates, refines. Users call it. */
 
 SSDGS__SMALL_BEGIN
-
-/* The bounds' longest side. */
-static double ssdgs__bounds_side(const ssdgs_train_options *o) {
-    double longest = 0;
-    for (int j = 0; j < 3; j++) {
-        const double side = (double)o->bounds_max[j] - (double)o->bounds_min[j];
-        longest = side > longest ? side : longest;
-    }
-    return longest;
-}
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
     static const char *const names[12] = {"position", "opacity",  "scale",  "rotation",   "color",  "asg",
@@ -10911,9 +10946,9 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
     }
 }
 
-/* Leaves out the outlines of photographs whose mask or pose must be wrong: of eight or more with outlines
-   those that are transparent where more than a third of the places lie that all but one of these, or nine in
-   ten, show. */
+/* Of eight or more outlines leaves out the wrong ones. The object's places are those where at most one
+   photograph, or a tenth, is transparent. One that is transparent at more than a third of them has a wrong
+   mask or pose. */
 static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     enum { PLACES = 2048, FEW = 30 };
     const int photos = trainer->photo_count;
@@ -10923,7 +10958,6 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     if (!shown) return SSDGS_ERR_MEMORY;
     int *refused = shown + photos;
     unsigned char *side = (unsigned char *)(refused + photos);
-    memset(shown, 0, 2 * (size_t)photos * sizeof *shown);
     for (int i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
     for (int place = 0; place < PLACES && outlined >= 8; place++) {
         double u[3];
@@ -10971,8 +11005,8 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     double volume = 1;
     size_t kept = 0;
     if (o->initial_points < 1)
-        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT, "train options: a start of %d points",
-                           o->initial_points);
+        return ssdgs__fail(trainer->context, SSDGS_ERR_ARGUMENT,
+                           "train options: initial_points = %d for an empty model", o->initial_points);
     ssdgs_result result = ssdgs__trainer_grow(trainer, n);
     if (result) return result;
     uint64_t *draws =
@@ -11079,10 +11113,10 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     ssdgs_result result = ssdgs__camera_check(context, &photo->camera, 0);
     if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
     if (!result) result = ssdgs__lights_check(context, photo->more, photo->more_count);
-    int unshadowed = photo->light.unshadowed;
-    for (int i = 0; !result && i < photo->more_count; i++) unshadowed |= photo->more[i].unshadowed;
-    if (!result && unshadowed)
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a photograph's lights have shadows");
+    for (int i = 0; !result && i <= photo->more_count; i++)
+        if (ssdgs__photo_light(photo, i)->unshadowed)
+            result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                 "light %d is unshadowed, but a photograph's lights have shadows", i);
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && ((int)photo->format < 0 || photo->format > SSDGS_PIXELS_RGBA32F))
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
@@ -11250,8 +11284,8 @@ typedef struct ssdgs__shading {
     int directional;
 } ssdgs__shading;
 
-/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture,
-   less what has the colour of its border. */
+/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture.
+   Pixels of the first one's colour count as dark. */
 static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const double centre[3],
                              ssdgs__shading *s) {
     static const ssdgs_real black[3] = {0, 0, 0};
@@ -11396,10 +11430,10 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     ssdgs_context *context = trainer->context;
     const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
     ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
+    if (!s) return SSDGS_ERR_MEMORY;
     double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, best = 0;
     ssdgs__reading found = as_given;
     int n = 0;
-    if (!s) return SSDGS_ERR_MEMORY;
     for (int i = 0; i < trainer->photo_count; i++)
         n += ssdgs__shading_of(trainer->photos + i, trainer->model->settings.transfer, centre, s + n);
     if (n >= FEW) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
@@ -11454,7 +11488,7 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
     const int n = trainer->photo_count;
     double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
     int within = 0, points = 0, several = 0;
-    for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+    ssdgs__bounds_centre(o, centre);
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < n; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
@@ -11479,9 +11513,7 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
                 continue;
             }
             for (int j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
-            int j;
-            for (j = 0; j < 3 && p[j] > (double)o->bounds_min[j] && p[j] < (double)o->bounds_max[j]; j++) {}
-            within += point && j == 3;
+            within += point && ssdgs__in_bounds(o, p);
             points += point;
             several |= photo->more_count > 0;
         }
@@ -11492,8 +11524,10 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
             within, n);
     if (n < 2 || several || (points && points < n)) return SSDGS_OK;
     const int still = sqrt(spread) < 0.03 * lit_from;
-    const double moves = points && radius > 1e-3 * trainer->unit && radius < away ? radius : away;
-    trainer->one_light = still || sqrt(apart) < 0.1 * moves; /* `away`: bounds may be wrong */
+    const double moves = points && radius > 1e-3 * trainer->unit && radius < away
+                             ? radius /* bounds, and so away, may be wrong */
+                             : away;
+    trainer->one_light = still || sqrt(apart) < 0.1 * moves;
     if (!trainer->one_light) return ssdgs__note_shading(trainer, centre);
     if (still)
         ssdgs__note(
@@ -11613,6 +11647,9 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (model->settings.baked)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "a baked model cannot be trained: it has no reflectance");
+    if (ssdgs__has_medium(&model->settings, model->settings.terms))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "settings: scattering.layers = 0: a medium is not trained");
     if (photo_count < 1 || !photos)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL",
@@ -11645,7 +11682,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         }
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
-        /* the mean loss pulls at a screen's width as little as the object is small in it */
+        /* the smaller the object is in it, the less the mean loss pulls */
         const double lack = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
         trainer->magnify[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
         empty += clear == pixels;
@@ -11669,16 +11706,13 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         for (int j = 0; j < 3; j++) mean[j] += centre[j] / photo_count;
     }
     trainer->unit = ssdgs__bounds_side(o);
-    for (int j = 0; j < 3; j++) middle[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+    ssdgs__bounds_centre(o, middle);
     for (int i = 0; i < photo_count; i++) {
         double centre[3], d2 = 0;
         ssdgs__camera_centre(&photos[i].camera, centre);
         for (int j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
         radius = sqrt(d2) > radius ? sqrt(d2) : radius;
-        int j;
-        for (j = 0; j < 3 && centre[j] > (double)o->bounds_min[j] && centre[j] < (double)o->bounds_max[j];
-             j++) {}
-        within += j == 3;
+        within += ssdgs__in_bounds(o, centre);
         double e =
             0; /* as from half the unit at least: a light inside of the object must not darken others */
         for (int l = 0; l <= photos[i].more_count; l++)
@@ -11750,8 +11784,7 @@ static int ssdgs__photo_of(ssdgs_trainer *trainer, int iteration) {
     return (int)order[iteration % n];
 }
 
-/* Adds the gradient of SSDGS__FADE x the sum of opacities / pixels at time t, where outlines are not
-   known. */
+/* With a backdrop, adds the gradient of SSDGS__FADE (1 - t / 30e3) x the sum of opacities / pixels. */
 static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, ssdgs_real *gradient) {
     const size_t n = (size_t)trainer->model->count;
     const ssdgs_real *opacity = trainer->model->gaussians + SSDGS_OPACITY * trainer->stride;
@@ -11788,7 +11821,7 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
                      "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
 }
 
-/* What one says, or a batch on average, beside the gradients of the model. */
+/* What a step reports of its photograph, or of a batch on average. */
 typedef struct ssdgs__drawn {
     double loss, psnr, shaded;
 } ssdgs__drawn;
@@ -11860,10 +11893,23 @@ static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) 
     return at;
 }
 
-/* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits do not
-   depend on how many processes share it. Leaves the mean gradients in the frame, all photographs' in moves
-   (batch, SSDGS__MOVES) and their statistics' sums, (SSDGS__STATISTICS, stride), where *statistics says. A
-   process that fails takes part in the sum, so that the others hear of it. */
+#define SSDGS__EXPOSE_EVERY 100 /* iterations until what comes to each Gaussian is found anew */
+
+/* Finds what of settings.ambient comes to each Gaussian, where the step needs it anew. */
+static ssdgs_result ssdgs__expose_step(ssdgs_trainer *trainer) {
+    const int before = trainer->iteration, last = before - trainer->options.batch;
+    if (!ssdgs__sees_ambient(trainer) ||
+        (trainer->exposed && before / SSDGS__EXPOSE_EVERY <= last / SSDGS__EXPOSE_EVERY))
+        return SSDGS_OK;
+    const ssdgs_result result = ssdgs__expose_model(trainer->model, trainer->stride, trainer->exposure);
+    trainer->exposed = !result;
+    return result;
+}
+
+/* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits are
+   those of one process where each draws a power of two. Leaves the mean gradients in the frame, all
+   photographs' in moves (batch, SSDGS__MOVES) and their statistics' sums, (SSDGS__STATISTICS, stride), where
+   *statistics says. A process whose photograph fails takes part in the sum, so that the others hear of it. */
 static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
                                       ssdgs_frame *frame, double *moves, const ssdgs_real **statistics,
                                       ssdgs__drawn *drawn) {
@@ -11876,8 +11922,8 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     for (int i = own; i > 1; i /= 2) room++;
     ssdgs_real *sums;
     SSDGS__RESERVE(trainer->sums, sums, ssdgs_real, at.size * (size_t)room);
-    ssdgs_result failed = SSDGS_OK;
-    for (int i = 0; i < own; i++) {
+    ssdgs_result failed = ssdgs__expose_step(trainer);
+    for (int i = 0; i < own && !failed; i++) {
         const int b = first + i;
         ssdgs_real *out = sums + at.size * (size_t)depth++;
         memset(out, 0, at.size * sizeof *out);
@@ -11919,38 +11965,37 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
 }
 
 /* Moves the camera and the light of a photograph. */
-static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
-                               const double gradient[SSDGS__MOVES], const int moves[3]) {
+static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, const double moves[SSDGS__MOVES],
+                               const int refines[4]) {
     const ssdgs_train_options *o = &trainer->options;
     const double shows = (double)o->iterations / trainer->photo_count,
                  wider = shows < 300 ? sqrt(300 / shows) : 1;
     const double angle = ssdgs__view_angle(&trainer->photos[photo].camera);
     ssdgs__correction *correction = trainer->corrections + photo;
-    if (moves[0])
-        ssdgs__correction_step(correction, gradient, 0,
+    if (refines[0])
+        ssdgs__correction_step(correction, moves, 0,
                                wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
                                trainer->unit, angle);
-    if (moves[0] && o->rates.position.start > 0)
+    if (refines[0] && o->rates.position.start > 0)
         ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
     if (trainer->photos[photo].more_count) return;
-    if (moves[1])
-        ssdgs__correction_step(correction, gradient, 1,
+    if (refines[1])
+        ssdgs__correction_step(correction, moves, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                ssdgs__light_unit(&trainer->photos[photo].light, trainer->unit), angle);
-    if (moves[2]) ssdgs__intensity_step(correction, gradient);
-    if (moves[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
+    if (refines[2]) ssdgs__intensity_step(correction, moves);
+    if (refines[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
         ssdgs__anchor_intensities(trainer);
 }
 
-#define SSDGS__EXPOSE_EVERY 100  /* iterations until what comes to each Gaussian is found anew */
 #define SSDGS__AMBIENT_RATE 0.01 /* of the lamps' light */
 
 /* Adam on settings.ambient, by the moves of a batch. */
 static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *moves) {
     ssdgs_settings *s = &trainer->model->settings;
     const int batch = trainer->options.batch, steps = ++trainer->ambient_steps;
-    const double rate =
-        SSDGS__AMBIENT_RATE * (1 - 0.99 * t / ssdgs__schedule_end(&trainer->options)) * sqrt((double)batch);
+    const double end = ssdgs__schedule_end(&trainer->options);
+    const double rate = SSDGS__AMBIENT_RATE * (1 - 0.99 * (t < end ? t : end) / end) * sqrt((double)batch);
     for (int c = 0; c < 3; c++) {
         double g = 0;
         for (int i = 0; i < batch; i++) g += moves[SSDGS__MOVES * i + 11 + c] / batch;
@@ -11969,21 +12014,18 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     step.t = ssdgs__schedule_time(o, before);
     step.terms =
         ssdgs__phase(o, trainer->model->settings.asg, step.t, step.learns) & trainer->model->settings.terms;
-    if (ssdgs__sees_ambient(trainer) &&
-        (!trainer->exposed || before / SSDGS__EXPOSE_EVERY > (before - o->batch) / SSDGS__EXPOSE_EVERY)) {
-        result = ssdgs__expose_model(trainer->model, trainer->stride, trainer->exposure);
-        if (result) return result;
-        trainer->exposed = 1;
-    }
     int photos[SSDGS__MAX_BATCH];
     double moves[SSDGS__MOVES * SSDGS__MAX_BATCH];
     for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
     const ssdgs_real *statistics = NULL;
     ssdgs__drawn drawn;
     ssdgs_frame frame;
-    result = o->batch > 1 || o->sum.add
-                 ? ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn)
-                 : ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
+    if (o->batch > 1 || o->sum.add)
+        result = ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn);
+    else {
+        result = ssdgs__expose_step(trainer);
+        if (!result) result = ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
+    }
     if (result) return result;
     const int refines[4] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
                             (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3,
@@ -12016,8 +12058,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
             ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photos[0]], trainer->screen_gradient);
         if (after >= o->densify_from && after / o->densify_every > before / o->densify_every)
             result = ssdgs__densify(trainer);
-        const int last = ssdgs__last_reset(o, after);
-        if (last > before && ssdgs__resets(o, last)) ssdgs__reset_opacity(trainer);
+        if (ssdgs__last_reset(o, after) > before) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
         stats->iteration = trainer->iteration;
@@ -12039,10 +12080,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
-    ssdgs_result result = SSDGS_OK;
     int bad = 0;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    result = ssdgs__enter(trainer->context, "ssdgs_trainer_run");
+    ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_run");
     if (result) return result;
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
@@ -12061,9 +12101,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
     return result;
 }
 
-SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
-                                             ssdgs_light *light) {
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
+static ssdgs_result ssdgs__trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
+                                           ssdgs_light *light) {
     if (!camera || !light)
         return ssdgs__null(trainer->context, "ssdgs_trainer_refined", camera ? "light" : "camera");
     if (index < 0 || index >= trainer->photo_count)
@@ -12071,6 +12110,14 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
                            index, trainer->photo_count);
     ssdgs__correct(trainer->photos + index, trainer->corrections[index].value, camera, light);
     return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
+                                             ssdgs_light *light) {
+    if (!trainer) return SSDGS_ERR_ARGUMENT;
+    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_refined");
+    return result ? result
+                  : ssdgs__leave(trainer->context, ssdgs__trainer_refined(trainer, index, camera, light));
 }
 
 static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo,
@@ -12143,7 +12190,6 @@ static double ssdgs__model_unit(const ssdgs_model *model) {
 
 static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                         const ssdgs_real background[3], int iterations) {
-    static const int frozen[2] = {1, 1};
     if (!photo || !background)
         return ssdgs__null(model->context, "ssdgs_refine_photo", photo ? "background" : "photo");
     if (iterations < 0)
@@ -12162,9 +12208,8 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         ssdgs__correct(photo, correction.value, &camera, &light);
         ssdgs__loss_values values;
         ssdgs_frame frame;
-        const ssdgs__photo_job shot = {
-            photo,           &camera, &light, background, model->settings.terms, {frozen[0], frozen[1]},
-            (ssdgs_real)0.2, 0,       1,      NULL};
+        const ssdgs__photo_job shot = {photo,  &camera,         &light, background, model->settings.terms,
+                                       {1, 1}, (ssdgs_real)0.2, 0,      1,          NULL};
         result = ssdgs__photo_backward(&frame, model, &shot, &values);
         if (result) return result;
         double gradient[SSDGS__MOVES];
@@ -12224,40 +12269,30 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     ssdgs_model *model = trainer->model;
     const size_t n = (size_t)model->count * sizeof(ssdgs_real),
                  globals = model->global_count * sizeof(ssdgs_real);
-    ssdgs_real *planes[3];
+    ssdgs_real *const planes[3] = {model->gaussians, trainer->mean, trainer->square};
+    ssdgs_real *const shared[3] = {model->globals, trainer->global_mean, trainer->global_square};
     ssdgs_result result = SSDGS_OK;
-    planes[0] = model->gaussians;
-    planes[1] = trainer->mean;
-    planes[2] = trainer->square;
-    ssdgs_real *statistics[SSDGS__STATISTICS + 1];
-    statistics[0] = trainer->screen_gradient;
-    statistics[1] = trainer->screen_count;
-    statistics[2] = trainer->contribution;
-    statistics[3] = trainer->half_shadow;
-    statistics[4] = trainer->exposure;
-    ssdgs_real *shared[3];
-    shared[0] = model->globals;
-    shared[1] = trainer->global_mean;
-    shared[2] = trainer->global_square;
     for (int i = 0; i < 3 && !result; i++) {
         for (int c = 0; c < SSDGS_CHANNELS && !result; c++)
             result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
         if (!result) result = visit(user, shared[i], globals);
     }
-    for (int i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) result = visit(user, statistics[i], n);
+    for (size_t i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) /* and the exposure behind them */
+        result = visit(user, trainer->screen_gradient + i * trainer->stride, n);
     if (!result)
         result =
             visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
     return result;
 }
 
-/* Whether two differ in nothing but what training sets: centre, length_unit, light_scale, ambient, origin.
-   Compares two pieces, without the padding between them. */
+/* Whether two differ in nothing but centre, length_unit, light_scale, ambient and origin. Compares pieces,
+   without the padding between them. */
 static int ssdgs__settings_alike(const ssdgs_settings *a, const ssdgs_settings *b) {
     const size_t first =
                      offsetof(ssdgs_settings, octaves) + sizeof a->octaves - offsetof(ssdgs_settings, terms),
                  second = offsetof(ssdgs_settings, eta) + sizeof a->eta - offsetof(ssdgs_settings, light_map);
-    return !memcmp(&a->terms, &b->terms, first) && !memcmp(&a->light_map, &b->light_map, second);
+    return !memcmp(&a->terms, &b->terms, first) && !memcmp(&a->light_map, &b->light_map, second) &&
+           !memcmp(&a->medium, &b->medium, sizeof a->medium);
 }
 
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
@@ -12335,8 +12370,9 @@ static ssdgs_result ssdgs__checkpoint_read(void *user, void *data, size_t size) 
 
 static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char *path) {
     if (!path) return ssdgs__null(trainer->context, "ssdgs_trainer_save", "path");
-    if (ssdgs__trainer_check(trainer)) return SSDGS_ERR_ARGUMENT;
-    if (ssdgs__savable(trainer->model, path)) return SSDGS_ERR_NONFINITE;
+    ssdgs_result result = ssdgs__trainer_check(trainer);
+    if (!result) result = ssdgs__savable(trainer->model, path);
+    if (result) return result;
     ssdgs__writer writer;
     ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_head head;
@@ -12385,7 +12421,6 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     ssdgs_context *context = trainer->context;
     unsigned char *bytes = NULL;
     size_t size = 0;
-    const char *reason = NULL;
     if (!path) return ssdgs__null(context, "ssdgs_trainer_load", "path");
     ssdgs_result result = ssdgs__trainer_check(trainer);
     if (!result) result = ssdgs__read_file(context, path, &bytes, &size);
@@ -12393,7 +12428,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     ssdgs__checkpoint_head own;
     ssdgs__checkpoint_describe(trainer, &own);
     ssdgs__checkpoint_head head;
-    reason = ssdgs__checkpoint_head_of(bytes, size, &head);
+    const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);
     if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
                     head.inputs != own.inputs || !ssdgs__settings_alike(&head.settings, &own.settings)))
         reason = "it belongs to other options, settings or photographs";
@@ -12408,7 +12443,8 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     for (int i = 0; i < 6 && !reason; i++)
         if (!ssdgs__finite((ssdgs_real)head.ambient[i]) || (i > 2 && head.ambient[i] < 0))
             reason = "its values are out of range";
-    if (!reason && (head.ambient_steps < 0 || head.ambient_steps > head.iteration || (head.exposed | 1) != 1))
+    if (!reason && (head.ambient_steps < 0 || head.ambient_steps > head.iteration || head.exposed < 0 ||
+                    head.exposed > 1))
         reason = "its counts are out of range";
     if (!reason) {
         const size_t expected =
@@ -12416,7 +12452,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
             sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1) +
                                   3 * (size_t)head.global_count);
         uint64_t hash;
-        memcpy(&hash, bytes + (size >= 8 ? size - 8 : 0), 8);
+        memcpy(&hash, bytes + size - 8, 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8))
             reason = "its checksum is wrong";
@@ -12497,8 +12533,9 @@ SSDGS__SMALL_END
 
 /* ==== >>kernels  one body for every instruction set ==== */
 
-/* V holds SSDGS__VW lanes of R; VM is a mask. Lanes run over Gaussians or pixels. Kernels call no libm
-   (except in the double build) and fuse only through VFMA, so a forward and its backward round alike. */
+/* V holds SSDGS__VW lanes of R, VM is a mask. Where a or b is NaN, VMIN(a, b) and VMAX(a, b) are b. Kernels
+   call no libm (except in the double build) and fuse only through VFMA, so a forward and its backward round
+   alike. */
 
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
 #define SSDGS__NAME(name) ssdgs__##name##_scalar
@@ -12888,7 +12925,7 @@ SSDGS__FI void F(sincos)(V x, V *s, V *c) {
 SSDGS__FI V F(sigmoid)(V x) { return VDIV(VSET(1), VADD(VSET(1), VEXP(VNEG(x)))); }
 SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(VABS(x))))); }
 
-/* Unit quaternion q (w x y z) from a raw one, and its rotation matrix r, row-major. A zero quaternion is the
+/* Unit quaternion q (w x y z) of a raw one and its row-major matrix r; returns 1 / |raw|. A zero one: the
    identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
     V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
@@ -12912,28 +12949,28 @@ SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
     return inverse;
 }
 
-/* draw = d(rotation)/d(raw)^T dr: through the matrix, then projected off the radial direction. */
-SSDGS__FI void F(rotation_backward)(V draw[4], const V q[4], V inverse, const V d[9]) {
+/* d_raw = d(rotation)/d(raw)^T dr: through the matrix, then projected off the radial direction. */
+SSDGS__FI void F(rotation_backward)(V d_raw[4], const V q[4], V inverse, const V dr[9]) {
     V w = q[0], x = q[1], y = q[2], z = q[3], g[4];
-    V a = VSUB(d[7], d[5]), b = VSUB(d[2], d[6]), c = VSUB(d[3], d[1]);
-    V xy = VADD(d[1], d[3]), xz = VADD(d[2], d[6]), yz = VADD(d[5], d[7]);
+    V a = VSUB(dr[7], dr[5]), b = VSUB(dr[2], dr[6]), c = VSUB(dr[3], dr[1]);
+    V xy = VADD(dr[1], dr[3]), xz = VADD(dr[2], dr[6]), yz = VADD(dr[5], dr[7]);
     g[0] = VDOT3(x, y, z, a, b, c);
-    g[1] = VSUB(VFMA(w, a, VFMA(y, xy, VMUL(z, xz))), VMUL(VMUL(VSET(2), x), VADD(d[4], d[8])));
-    g[2] = VSUB(VFMA(w, b, VFMA(x, xy, VMUL(z, yz))), VMUL(VMUL(VSET(2), y), VADD(d[0], d[8])));
-    g[3] = VSUB(VFMA(w, c, VFMA(x, xz, VMUL(y, yz))), VMUL(VMUL(VSET(2), z), VADD(d[0], d[4])));
+    g[1] = VSUB(VFMA(w, a, VFMA(y, xy, VMUL(z, xz))), VMUL(VMUL(VSET(2), x), VADD(dr[4], dr[8])));
+    g[2] = VSUB(VFMA(w, b, VFMA(x, xy, VMUL(z, yz))), VMUL(VMUL(VSET(2), y), VADD(dr[0], dr[8])));
+    g[3] = VSUB(VFMA(w, c, VFMA(x, xz, VMUL(y, yz))), VMUL(VMUL(VSET(2), z), VADD(dr[0], dr[4])));
     for (int i = 0; i < 4; i++) g[i] = VMUL(VSET(2), g[i]);
     const V radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
-    for (int i = 0; i < 4; i++) draw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
+    for (int i = 0; i < 4; i++) d_raw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
 }
 
 /* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
 SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
-        const VM linear = VLT(x, VSET(0.0031308));
+        const VM curved = VAND(VGE(x, VSET(0.0031308)), VGE(VSET(FLT_MAX), x)); /* NaN and infinity stay */
         const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
-        VSTORE(out + i, VSEL(linear, VMUL(x, VSET(12.92)), VSUB(power, VSET(0.055))));
-        if (slope) VSTORE(slope + i, VSEL(linear, VSET(12.92), VDIV(power, VMUL(safe, VSET(2.4)))));
+        VSTORE(out + i, VSEL(curved, VSUB(power, VSET(0.055)), VMUL(x, VSET(12.92))));
+        if (slope) VSTORE(slope + i, VSEL(curved, VDIV(power, VMUL(safe, VSET(2.4))), VSET(12.92)));
     }
 }
 
@@ -12941,12 +12978,12 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
         const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
-        VSTORE(out + i, VSEL(VLT(x, VSET(0.04045)), VMUL(x, VSET(1 / 12.92)), power));
+        const VM curved = VAND(VGE(x, VSET(0.04045)), VGE(VSET(FLT_MAX), x)); /* NaN and infinity stay */
+        VSTORE(out + i, VSEL(curved, power, VMUL(x, VSET(1 / 12.92))));
     }
 }
 
-/* The host calls the scalar forms of the above. The kernels that follow have one only where it is asked
-   for. */
+/* Kernels below have a scalar form only with SSDGS_SCALAR, or where SIMD may be missing. */
 #if SSDGS__ISA != SSDGS__ISA_SCALAR || SSDGS__SCALAR
 
 /* ==== >>project_kernel  eq. 1: EWA projection of Gaussians begin .. end ==== */
@@ -12986,8 +13023,8 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     p->a = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
     p->b = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
     p->c = VDOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
-    for (int i = 0; i < 3;
-         i++) { /* difference of products, its rounding error put back by the fused operation */
+    /* difference of products, its rounding error put back by the fused operation */
+    for (int i = 0; i < 3; i++) {
         V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3],
           v1 = p->m[1][(i + 1) % 3];
         V product = VMUL(u1, v1);
@@ -13027,7 +13064,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
                         VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
         if (!k->orthographic) {
-            V back = VSET(0); /* variance along z, of depths */
+            V back = VSET(0); /* variance along z / depth^2 */
             for (int f = 0; f < 3; f++) {
                 V axis =
                     VMUL(VMUL(p.s[f], p.inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]),
@@ -13040,21 +13077,17 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         }
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
-        R lane[SSDGS__VW];
-        VSTORE(lane, VSEL(drawn, VMUL(d, VSET(k->depth_scale)), VSET(-1)));
-        for (int l = 0; l < SSDGS__VW; l++) depth[i + (size_t)l] = lane[l];
+        VSTORE(depth + i, VSEL(drawn, VMUL(d, VSET(k->depth_scale)), VSET(-1)));
         if (!VBITS(drawn)) continue;
-        V field[8];
-        field[0] = x;
-        field[1] = y;
-        field[2] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det));
-        field[3] = VMUL(log2e, VMUL(p.b, inverse_det));
-        field[4] = VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.a, p.h), inverse_det));
-        field[5] = log2_opacity;
-        field[6] = ex;
-        field[7] = ey;
         R fields[8][SSDGS__VW];
-        for (int f = 0; f < 8; f++) VSTORE(fields[f], field[f]);
+        VSTORE(fields[0], x);
+        VSTORE(fields[1], y);
+        VSTORE(fields[2], VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det)));
+        VSTORE(fields[3], VMUL(log2e, VMUL(p.b, inverse_det)));
+        VSTORE(fields[4], VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.a, p.h), inverse_det)));
+        VSTORE(fields[5], log2_opacity);
+        VSTORE(fields[6], ex);
+        VSTORE(fields[7], ey);
 #if SSDGS__VW >= 4
         for (int f = 0; f < 8; f += 4)
             for (int l = 0; l < SSDGS__VW; l += 4)
@@ -13102,8 +13135,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         V du[2][3];
         for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
         /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2
-           u_j.G u_j with u = K m. Of a thin Gaussian K G K and K m as products are differences of large
-           numbers; u = (h m + (m1 x X, X x m0)) / det with X = m0 x m1 is none. */
+           u_j.G u_j with u = K m. G = dL/dK. Products K G K and K m of a thin Gaussian cancel; u = (h m + (m1
+           x X, X x m0)) / det with X = m0 x m1 does not. */
         V dr[9];
         for (int j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
@@ -13178,8 +13211,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
 
 /* ==== >>bin_kernel  which 4x4 micro-tiles an ellipse touches ==== */
 
-/* The instances of the Gaussians from begin to end, from number `at` on. Of a Gaussian's box they are the
-   tiles with pixels where alpha may reach the threshold, row by row, and their micro-tiles (lanes here). Over
+/* Lists the instances of Gaussians begin .. end, numbered from `at` on: the tiles of a Gaussian's box, row by
+   row, where some pixel's alpha may reach the threshold, with a mask of such micro-tiles (lanes). Over
    the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
    the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. */
 SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
@@ -13314,15 +13347,15 @@ SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
 }
 
-/* 0, and not drawn, where something else in the picture is not behind the entry. */
+/* alpha, but 0 and not drawn where the entry is not nearer than scene_depth. */
 SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, R depth, V alpha, VM *drawn) {
     const VM nearer = VLT(VSET(depth), VLOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
     *drawn = VAND(*drawn, nearer);
     return VSEL(nearer, alpha, VSET(0));
 }
 
-/* Within a batch a transmittance runs on below the stop, which keeps the chain of products short; between
-   two, -1 marks it. */
+/* Within a batch transmittance runs on below the stop: no select in the chain of products. Between batches,
+   -1 marks it. */
 SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
 
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
@@ -13375,8 +13408,8 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                         alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
                     const VM blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
-                    if (thrifty && !needed[place]) { /* what is needed anyway takes nothing; a spent budget
-                                                        needs everything */
+                    if (thrifty &&
+                        !needed[place]) { /* what is needed uses no budget; past it all is needed */
                         const V w = VMUL(alpha, t[v]);
                         const VM light = VGE(slight, w);
                         over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
@@ -13410,8 +13443,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     uint32_t applying = 0, sampling = 0;
     unsigned lit = 0xFFFF; /* micro-tiles that are not dark */
     for (int v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
-    R transmittance[16][16], met[16][16],
-        next[16][16]; /* met: sum of blend weight x distance; next: level to fall below */
+    /* met: sum of blend weight x distance; next: level to fall below */
+    R transmittance[16][16], met[16][16], next[16][16];
     for (int micro = 0; micro < 16; micro++)
         for (int v = 0; v < 16; v++) {
             transmittance[micro][v] = 1;
@@ -13440,7 +13473,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             if (sample) {
                 memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
                 taken |= !tile->of_gaussian || tile->of_gaussian[gaussian].count > 1;
-                sums[(size_t)place * 4 + 1] = taken ? 0 : 1; /* else v = 0 / 1 */
+                sums[(size_t)place * 4 + 1] = taken ? 0 : 1; /* else v is 0 */
             }
             if (!taken) continue;
             F(batch_add)(batch, n, tile, place, sample ? mask : mask & lit);
@@ -13457,8 +13490,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         V energy[SSDGS__BATCH][SSDGS__NV];
         for (int i = 0; flux && i < applies; i++)
             for (int v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
-        R history[2][SSDGS__BATCH]
-                 [16]; /* transmittance and met, before the first applied and after each; 63 at most */
+        /* transmittance and met, before the first applied and after each; 63 at most */
+        R history[2][SSDGS__BATCH][16];
         for (int micro = 0; micro < 16; micro++) {
             const uint64_t entries = applied.entries[micro];
             if (!(entries | sampled.entries[micro])) continue;
@@ -13513,8 +13546,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                     V dx, dy, raw;
                     VM drawn;
                     (void)F(alpha)(sampled.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
-                    raw = VSEL(drawn, raw,
-                               VSET(0)); /* opacity x rho: cancels in the ratio, or weighs a cube's faces */
+                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho; in the ratio the opacity cancels */
                     sum[0][v] = VFMA(raw, past, sum[0][v]);
                     sum[1][v] = VADD(sum[1][v], raw);
                     if (cue)
@@ -13632,23 +13664,24 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const 
 #endif
 }
 
-/* pixels: [layer][micro-tile][3 colour gradients, in the first layer the gradients' product with the
-   pixel][16 lanes]; scratch: room for as many. Per entry adds to sums (n, stride) of g = dL/d(ln alpha): g, g
-   dx, g dy, g dx^2, g dx dy, g dy^2, blend weight w of slot 0, 0; from 8 + 4 slot on w dC of each layer,
-   three and one without meaning. layers: all of them, or 1. Walks front to back again: what lies behind an
-   entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
+/* gradient: [layer][micro-tile][3 colours, in the first layer the gradients' product with the pixel][16
+   lanes]; scratch: room for as many, used with all layers. Per entry adds to sums (n, stride), g = dL/d(ln
+   alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, the blend weight w (slot 0 only), 0; from 8 + 4 slot on, w
+   dC of each layer: three values, one unused. layers: all, or 1. Walks front to back again: what lies behind
+   an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color,
-                                            const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
+                                            const R *gradient, R *scratch, R *sums, size_t stride, int slot) {
     const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
-    const int wide = layers == SSDGS__LAYERS,
-              width = 4 * layers; /* all layers: sums over pixels with lanes over their values */
+    /* with all layers sums over pixels have lanes over their values */
+    const int wide = layers == SSDGS__LAYERS, width = 4 * layers;
     F(batch) batch;
     uint32_t from = 0;
     for (int micro = 0; wide && micro < 16; micro++)
         for (int layer = 0; layer < layers; layer++)
-            for (int i = 0; i < 16; i += 4) F(transpose4)
-    (pixels + layer * SSDGS__TILE_LAYER + micro * 64 + i, 16, scratch + (micro * 16 + i) * width + 4 * layer,
-     (size_t)width);
+            for (int i = 0; i < 16; i += 4) {
+                const R *rows = gradient + layer * SSDGS__TILE_LAYER + micro * 64 + i;
+                F(transpose4)(rows, 16, scratch + (micro * 16 + i) * width + 4 * layer, (size_t)width);
+            }
     R passed[16][16], transmittance[16][16];
     for (int micro = 0; micro < 16; micro++)
         for (int v = 0; v < 16; v++) {
@@ -13665,7 +13698,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                        4 * sizeof(R));
         for (int micro = 0; micro < 16; micro++) {
             uint64_t left = batch.entries[micro];
-            const R *pixel = pixels + micro * 64, *rows = scratch + micro * 16 * width;
+            const R *pixel = gradient + micro * 64, *rows = scratch + micro * 16 * width;
             if (!left) continue;
             V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
@@ -13742,9 +13775,9 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
 }
 
 SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const R *const *color,
-                                     const R *pixels, R *scratch, R *sums, size_t stride, int slot) {
-    if (layers == 1) F(composite_layers_backward)(1, tile, color, pixels, scratch, sums, stride, slot);
-    else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, pixels, scratch, sums, stride, slot);
+                                     const R *gradient, R *scratch, R *sums, size_t stride, int slot) {
+    if (layers == 1) F(composite_layers_backward)(1, tile, color, gradient, scratch, sums, stride, slot);
+    else F(composite_layers_backward)(SSDGS__LAYERS, tile, color, gradient, scratch, sums, stride, slot);
 }
 
 /* ==== >>transport_kernel  light that comes through the object ==== */
@@ -13774,11 +13807,11 @@ SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *sc
     }
 }
 
-/* sources (5, SSDGS__SOURCES): x, y, z, flux, mean square radius of count, a multiple of 16. Adds their light
-   around middle, to second order, to series (SSDGS__LENGTHS, SSDGS__SERIES). With u the direction from a
-   source, p = exp(-r / l) / r and a = 1 / l + 1 / r, the slope of p is -a p u and its second derivatives are
-   (a^2 p + (a p + p / r) / r) u u' - a p / r. The light of a ball is a point's times 1 + radius^2 / (6 l^2),
-   as p solves l^2 laplace(p) = p. */
+/* sources (5, SSDGS__SOURCES): x, y, z, flux, mean square radius; count of them, a multiple of 16. Adds their
+   light around middle, to second order, to series (SSDGS__LENGTHS, SSDGS__SERIES). With u the direction from
+   a source, p = exp(-r / l) / r and a = 1 / l + 1 / r, the slope of p is -a p u and its second derivatives
+   are (a^2 p + (a p + p / r) / r) u u' - a p / r. The light of a ball is a point's times 1 + radius^2 / (6
+   l^2), as p solves l^2 laplace(p) = p. */
 SSDGS__FN void F(expand)(const R *sources, int count, const R *middle, const R *scale, R *series) {
     R ux[SSDGS__SOURCES], uy[SSDGS__SOURCES], uz[SSDGS__SOURCES], by_r[SSDGS__SOURCES],
         weight[SSDGS__SOURCES], decay[SSDGS__SOURCES], lanes[SSDGS__SERIES][16];
@@ -13854,26 +13887,11 @@ SSDGS__FN void F(series)(const R *series, const R *middle, const R *x, int lanes
    and the depths listed; a is read as a[row * a_row + k * a_k], so W, its transpose and the gradient of
    the outputs all serve without a copy; lanes run over the columns, a multiple of 16. Tiles of SSDGS__TR
    rows x SSDGS__TV vectors stay in registers. */
-typedef struct F(offsets) {
-    uint32_t a, b;
-} F(offsets); /* of a depth, multiplied out before the inner loop */
-
-/* The body for a tile's number of rows, 6 at most: a constant in it. */
-#define SSDGS__BY_HEIGHT(rows, tile, ...) \
-    switch (rows) { \
-    case 6: tile(6, __VA_ARGS__); break; \
-    case 5: tile(5, __VA_ARGS__); break; \
-    case 4: tile(4, __VA_ARGS__); break; \
-    case 3: tile(3, __VA_ARGS__); break; \
-    case 2: tile(2, __VA_ARGS__); break; \
-    default: tile(1, __VA_ARGS__); \
-    }
-
-SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(offsets) * depth,
+SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const ssdgs__offsets *depth,
                              const int vectors, const uint16_t *row, int column) {
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
-    const F(offsets) *const end = depth + p->depth;
+    const ssdgs__offsets *const end = depth + p->depth;
     VUNROLL for (int i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
         VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
@@ -13909,19 +13927,34 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const F(of
 }
 
 /* All rows over some columns, in tiles of about equal height. */
-SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const F(offsets) * depth, const int vectors,
+SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const ssdgs__offsets *depth, const int vectors,
                                 int column) {
     int left = (p->rows + SSDGS__TR - 1) / SSDGS__TR, row = 0;
     for (; left; left--) {
         const int rows = (p->rows - row + left - 1) / left;
         const uint16_t *list = p->row_list + row;
-        SSDGS__BY_HEIGHT(rows, F(dense_tile), p, depth, vectors, list, column);
+        switch (rows) { /* SSDGS__TR at most */
+        case 6:
+            if (SSDGS__TR > 5) F(dense_tile)(6, p, depth, vectors, list, column);
+            break;
+        case 5:
+            if (SSDGS__TR > 4) F(dense_tile)(5, p, depth, vectors, list, column);
+            break;
+        case 4:
+            if (SSDGS__TR > 3) F(dense_tile)(4, p, depth, vectors, list, column);
+            break;
+        case 3:
+            if (SSDGS__TR > 2) F(dense_tile)(3, p, depth, vectors, list, column);
+            break;
+        case 2: F(dense_tile)(2, p, depth, vectors, list, column); break;
+        default: F(dense_tile)(1, p, depth, vectors, list, column);
+        }
         row += rows;
     }
 }
 
 SSDGS__FN void F(dense)(const ssdgs__product *p) {
-    F(offsets) depth[SSDGS_MAX_WIDTH];
+    ssdgs__offsets depth[SSDGS_MAX_WIDTH];
     SSDGS_ASSERT(p->depth <= SSDGS_MAX_WIDTH && p->columns % 16 == 0);
     int column = 0;
     for (int k = 0; k < p->depth; k++) {
@@ -13930,7 +13963,7 @@ SSDGS__FN void F(dense)(const ssdgs__product *p) {
     }
     for (; column + SSDGS__TV * SSDGS__VW <= p->columns; column += SSDGS__TV * SSDGS__VW)
         F(dense_columns)(p, depth, SSDGS__TV, column);
-    for (; SSDGS__TV > 2 && column + 2 * SSDGS__VW <= p->columns; column += 2 * SSDGS__VW)
+    for (; SSDGS__TV * SSDGS__VW > 16 && column + 2 * SSDGS__VW <= p->columns; column += 2 * SSDGS__VW)
         F(dense_columns)(p, depth, 2, column);
     for (; SSDGS__VW > 8 && column < p->columns; column += SSDGS__VW) F(dense_columns)(p, depth, 1, column);
 }
@@ -13951,20 +13984,19 @@ SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
 
 /* (count, BLOCK) -> (BLOCK, padded) in rows of stride, columns from count on 0; padded is a multiple of 4. */
 SSDGS__FN void F(transpose)(const R *rows, int count, size_t padded, size_t stride, R *out) {
-    const R *end = rows + count * SSDGS__BLOCK;
+    const size_t all = (size_t)count * SSDGS__BLOCK;
     R last[4 * SSDGS__BLOCK];
-    for (size_t i = 0; i < padded; i += 4, rows += 4 * SSDGS__BLOCK) {
-        const R *from = rows;
-        if (end < rows + 4 * SSDGS__BLOCK) {
-            for (size_t s = 0; s < 4 * SSDGS__BLOCK; s++) last[s] = rows + s < end ? rows[s] : 0;
-            from = last;
-        }
+    for (size_t i = 0; i < padded; i += 4) {
+        const size_t first = i * SSDGS__BLOCK;
+        const R *from = first + 4 * SSDGS__BLOCK <= all ? rows + first : last;
+        for (size_t s = 0; from == last && s < 4 * SSDGS__BLOCK; s++)
+            last[s] = first + s < all ? rows[first + s] : 0;
         for (size_t s = 0; s < SSDGS__BLOCK; s += 4)
             F(transpose4)(from + s, SSDGS__BLOCK, out + s * stride + i, stride);
     }
 }
 
-/* sums (16 of every stride, per row) += each listed row of rows (., SSDGS__BLOCK) by sixteenths. */
+/* Adds each listed row of rows (., SSDGS__BLOCK), as 16 partial sums, to sums + row x stride. */
 SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t *list, int count) {
     for (int i = 0; i < count; i++)
         for (int j = 0; j < 16; j += SSDGS__VW) {
@@ -14164,7 +14196,7 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-        V missing2 = VMUL(g.missing, g.missing);
+        const V missing2 = VMUL(g.missing, g.missing);
         const V dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
         V dr[9], dh[3];
         for (int i = 0; i < 3; i++) {
@@ -14176,9 +14208,9 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         /* f_d = max(0, n.wi) */
         const V dcosine =
             VSEL(VLT(VSET(0), g.cosine), VLOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), VSET(0));
-        V radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+        const V along_h = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
         for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
-            const V dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
+            const V dsum = VMUL(VFNMA(g.h[i], along_h, dh[i]), g.inverse_h);
             dwi[i] = VFMA(dcosine, g.r[3 * i + 2], VADD(dwi[i], dsum));
             dwo[i] = VADD(dwo[i], dsum);
             dr[3 * i + 2] = VADD(dr[3 * i + 2], VFMA(dcosine, g.wi[i], dn[i]));
@@ -14190,15 +14222,15 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             VSTORE(out, VADD(VLOAD(out), dq[i]));
         }
         /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
-        radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
+        V along_light = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
         if (!k->directional)
-            radial = VFMA(VMUL(VSET(2), g.irradiance), VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-                          radial);
-        missing2 = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+            along_light = VFMA(VMUL(VSET(2), g.irradiance),
+                               VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), along_light);
+        const V along_eye = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
         for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
-            const V to_light = VMUL(VFNMA(g.wi[i], radial, dwi[i]), g.inverse_light);
-            const V to_eye = VMUL(VFNMA(g.wo[i], missing2, dwo[i]), g.inverse_eye);
+            const V to_light = VMUL(VFNMA(g.wi[i], along_light, dwi[i]), g.inverse_light);
+            const V to_eye = VMUL(VFNMA(g.wo[i], along_eye, dwo[i]), g.inverse_eye);
             VSTORE(out, VSUB(VLOAD(out), k->directional ? to_eye : VADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
             VSTORE(out, VADD(VLOAD(out), to_light));
@@ -14231,12 +14263,12 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
    normal is layer 4's direction, M is layer 5. */
 
 typedef struct F(highlight_geometry) {
-    V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h, missing,
-        fifth, fresnel;
-    V n[3], inverse_n, along, p[2][3], row[2][3],
-        q[2]; /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
-    V cosine, inverse_woh,
-        microfacet; /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
+    V ray[3], inverse_ray, inverse_cover, depth, f0, wi[3], wo[3], inverse_light, h[3], inverse_h;
+    V missing, fifth, fresnel;
+    /* the normal, n.h, p = h - n (n.h) and h, Q p, p.Q p */
+    V n[3], inverse_n, along, p[2][3], row[2][3], q[2];
+    /* max(0, n.wi), 1 / wo.h, n.wi / (wo.h)^2: Kelemen and Szirmay-Kalos */
+    V cosine, inverse_woh, microfacet;
     V to_camera[2]; /* the camera's ray (x, y, 1) */
     VM half;
 } F(highlight_geometry);
@@ -14300,10 +14332,12 @@ SSDGS__FI V F(glow_lobe)(const R *basis, const V q[2]) {
         VMUL(VSET(-basis[9]), VMAX(VSET(0), VFMA(VSET(1 - basis[8]), q[0], VMUL(VSET(basis[8]), q[1])))));
 }
 
-SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2]) {
+SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2], V lobes[SSDGS_ASG_COUNT]) {
     V sum = VSET(0);
-    for (int j = 0; j < SSDGS_ASG_COUNT; j++)
-        sum = VFMA(VSET(k->basis[12 * j + 10]), F(glow_lobe)(k->basis + 12 * j, q), sum);
+    for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
+        lobes[j] = F(glow_lobe)(k->basis + 12 * j, q);
+        sum = VFMA(VSET(k->basis[12 * j + 10]), lobes[j], sum);
+    }
     return sum;
 }
 
@@ -14315,16 +14349,15 @@ SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, V visibility, V answer) {
     return F(sigmoid)(k->residual_shadow ? VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), answer) : answer);
 }
 
-/* dL/dS becomes the visibility's; returns the answer's. */
+/* *d: dL/dS, then dL/dv. Returns dL/d(answer). */
 SSDGS__FI V F(shadow_factor_backward)(const ssdgs__lighting *k, V visibility, V factor, V *d) {
-    const V danswer =
-        VMUL(*d, VFNMA(factor, factor, factor)); /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
+    if (!k->shadow) *d = VSET(0);
+    if (!k->shadow || !k->refined_shadow) return VSET(0);
+    const V danswer = VMUL(*d, VFNMA(factor, factor, factor));
+    /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
     const VM inside = VAND(VLT(VSET(0.01), visibility), VLT(visibility, VSET(0.99)));
-    if (k->shadow && !k->refined_shadow) return VSET(0);
-    *d = VSET(0);
-    if (!k->shadow) return VSET(0);
-    if (k->residual_shadow)
-        *d = VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0));
+    *d = k->residual_shadow ? VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0))
+                            : VSET(0);
     return danswer;
 }
 
@@ -14346,8 +14379,8 @@ SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const 
     a->factor = F(shadow_factor)(k, a->visibility, a->residual);
 }
 
-/* Writes the gradient of the layer with the residual and, as its fourth, dL/dv of the map's v; returns what
-   goes to the cover, times that. */
+/* Writes the gradient of the layer with the residual and, as its fourth, dL/dv of the map's v; returns
+   -A dL/dA, A the cover. */
 SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
@@ -14378,8 +14411,9 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
             if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
-            const V value =
-                VMUL(factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q)), VSET(0)));
+            V lobes[SSDGS_ASG_COUNT];
+            const V value = VMUL(
+                factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q, lobes)), VSET(0)));
             for (int c = 0; c < 3; c++)
                 VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
         }
@@ -14408,7 +14442,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             F(arrival_lanes)(&arrival, k, at, VLOAD(s));
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
-            const V glow = F(glow)(k, g.q);
+            V lobes[SSDGS_ASG_COUNT];
+            const V glow = F(glow)(k, g.q, lobes);
             const V value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
             for (int i = 0; i < 3; i++) {
                 const V pull = VMUL(VLOAD(d + 16 * i), arrival.factor);
@@ -14425,11 +14460,10 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             push = VMUL(push, g.microfacet);
             V dq[2];
             dq[0] = dq[1] = VSET(0);
-            for (int j = 0; j < SSDGS_ASG_COUNT;
-                 j++) { /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
+            /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
+            for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 const R *b = k->basis + 12 * j;
-                const V lobe = VMUL(VMUL(push, g.fresnel), F(glow_lobe)(b, g.q)),
-                        pull = VMUL(VSET(-b[9] * b[10]), lobe);
+                const V lobe = VMUL(VMUL(push, g.fresnel), lobes[j]), pull = VMUL(VSET(-b[9] * b[10]), lobe);
                 V *out = sum[15 + 2 * j] + v;
                 const V fold = VFMA(VSET(1 - b[8]), g.q[0], VMUL(VSET(b[8]), g.q[1]));
                 dq[0] = VFMA(VSET(1 - b[8]), pull, dq[0]);
@@ -14443,54 +14477,56 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             /* F = F0 + (1 - F0) (1 - wo.h)^5 */
             push = VMUL(push, glow);
             const V df0 = VMUL(push, VSUB(VSET(1), g.fifth));
-            V to = VMUL(g.missing, g.missing);
-            V dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(to, to)));
-            to = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
-            dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), to, VSET(0)));
+            const V missing2 = VMUL(g.missing, g.missing);
+            V dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(missing2, missing2)));
+            const V steep = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
+            dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), steep, VSET(0)));
             const V dcosine =
                 VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
             for (int j = 0; j < 2; j++) {
-                to = VMUL(dq[j], g.inverse_cover);
+                const V dlayer_q = VMUL(dq[j], g.inverse_cover);
                 for (int i = 0; i < 3; i++) {
-                    const V twice = VMUL(VMUL(VSET(2), to), g.p[j][i]);
+                    const V twice = VMUL(VMUL(VSET(2), dlayer_q), g.p[j][i]);
                     R *cross = dlayer + SSDGS__TILE_LAYER + 16 * i;
-                    VSTORE(dlayer + 16 * i, VFMA(VMUL(to, g.p[j][i]), g.p[j][i], VLOAD(dlayer + 16 * i)));
+                    VSTORE(dlayer + 16 * i,
+                           VFMA(VMUL(dlayer_q, g.p[j][i]), g.p[j][i], VLOAD(dlayer + 16 * i)));
                     VSTORE(cross, VFMA(twice, g.p[j][(i + 1) % 3], VLOAD(cross)));
                 }
             }
             V dh[3];
             for (int i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
-            V along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
+            const V dh_along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
             V dn[3], dwo[3];
             for (int i = 0; i < 3; i++) { /* p = h - n (n.h) */
-                dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], along))));
-                dh[i] =
-                    VFMA(dwoh, g.wo[i], VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], along, dh[i])));
+                dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], dh_along))));
+                dh[i] = VFMA(dwoh, g.wo[i],
+                             VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], dh_along, dh[i])));
                 dwo[i] = VMUL(dwoh, g.h[i]);
             }
-            V radial = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
+            const V dn_along = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
             for (int i = 0; i < 3; i++) {
                 R *out = dlayer + 3 * SSDGS__TILE_LAYER + 16 * i;
-                VSTORE(out, VFMA(VFNMA(g.n[i], radial, dn[i]), g.inverse_n, VLOAD(out)));
+                VSTORE(out, VFMA(VFNMA(g.n[i], dn_along, dn[i]), g.inverse_n, VLOAD(out)));
             }
-            radial = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+            const V along_h = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
             for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
-                const V dsum = VMUL(VFNMA(g.h[i], radial, dh[i]), g.inverse_h);
+                const V dsum = VMUL(VFNMA(g.h[i], along_h, dh[i]), g.inverse_h);
                 dwo[i] = VADD(dwo[i], dsum);
                 dh[i] = VFMA(dcosine, g.n[i], dsum);
             }
-            radial = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
-            along = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+            const V along_light = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
+            const V along_eye = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
             V ddepth = VSET(0);
             V dat[3];
-            for (int i = 0; i < 3;
-                 i++) { /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
-                dat[i] = VMUL(VSUB(VMUL(g.wi[i], radial), dh[i]), g.inverse_light);
+            /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
+            for (int i = 0; i < 3; i++) {
+                dat[i] = VMUL(VSUB(VMUL(g.wi[i], along_light), dh[i]), g.inverse_light);
                 sum[i][v] = VSUB(sum[i][v], dat[i]);
                 if (k->directional) dat[i] = VSET(0);
                 ddepth = VFMA(dat[i], g.ray[i], ddepth);
                 sum[3 + i][v] = VADD(sum[3 + i][v], dat[i]);
-                const V dray = VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along), dwo[i]), g.inverse_ray));
+                const V dray =
+                    VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along_eye), dwo[i]), g.inverse_ray));
                 sum[6 + i][v] = VFMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */
                 sum[9 + i][v] = VFMA(dray, g.to_camera[1], sum[9 + i][v]);
                 sum[12 + i][v] = VADD(dray, sum[12 + i][v]);
@@ -14498,7 +14534,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             dlayer += 2 * SSDGS__TILE_LAYER;
             VSTORE(dlayer, VFMA(ddepth, g.inverse_cover, VLOAD(dlayer)));
             VSTORE(dlayer + 16, VFMA(df0, g.inverse_cover, VLOAD(dlayer + 16)));
-            /* all of these are over A, A > |N| */
+            /* -A dL/dA: all are divided by A */
             dcover = VFMA(dq[0], g.q[0], VFMA(dq[1], g.q[1], VFMA(ddepth, g.depth, VFMA(df0, g.f0, dcover))));
             VSTORE(dlayer + 32, VFNMA(dcover, g.inverse_cover, VLOAD(dlayer + 32)));
         }
@@ -14543,8 +14579,8 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         const V inverse_q = F(rotation)(raw, q, r);
         V dr[9];
         for (int i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
-        for (int j = 0; j < 2;
-             j++) { /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
+        /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
+        for (int j = 0; j < 2; j++) {
             const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
                     sharp = F(sharpness)(log_sharp);
             R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
@@ -14616,13 +14652,17 @@ SSDGS__FI V F(dipole)(const int printed, V ss, V sa, V r, R virtual_depth, V *d)
 
 /* ==== >>colour_kernel  eqs. 3, 8 and 13: a block's colour from the networks' outputs ==== */
 
-/* sigma_s, sigma_a, r of colour channel c from the network's output rows. */
-SSDGS__FI void F(optics)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3]) {
+/* The dipole of colour channel c, by sigma_s, sigma_a, r of the network's output rows; unit: their sigmoids.
+ */
+SSDGS__FI V F(dipole_of)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3], V *d) {
     const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1,
               separation = k->per_channel_optics ? 6 : 2;
     unit[0] = F(sigmoid)(VLOAD(network + first * SSDGS__BLOCK + s));
     unit[1] = F(sigmoid)(VLOAD(network + absorb * SSDGS__BLOCK + s));
     unit[2] = F(sigmoid)(VLOAD(network + separation * SSDGS__BLOCK + s));
+    return F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
+                     VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth,
+                     d);
 }
 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
@@ -14649,12 +14689,7 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R
             }
             if (k->scattering) {
                 const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
-                if (c == 0 || k->per_channel_optics) {
-                    F(optics)(k, in->optics, c, s, unit);
-                    profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
-                                        VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
-                                        k->virtual_depth, NULL);
-                }
+                if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, NULL);
                 VSTORE(o + (6 + c) * SSDGS__BLOCK,
                        VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power,
                             VLOAD(o + (6 + c) * SSDGS__BLOCK)));
@@ -14682,7 +14717,6 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
           profile = VSET(0), unit[3], d[3], dunit[3];
         for (int i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
         for (int c = 0; c < 3; c++) {
-            const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
             if (k->diffuse) { /* (c_d / pi) f_d S */
                 const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
                 const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067)), surface = VMUL(kd, cosine);
@@ -14706,37 +14740,28 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
                 ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
             }
             if (k->scattering) { /* c_sss f_sss */
+                const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
                 const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s),
                         kss = F(softplus)(raw);
                 R *to = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
                 const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
-                if (c == 0 || k->per_channel_optics) {
-                    F(optics)(k, in->optics, c, s, unit);
-                    profile = F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
-                                        VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)),
-                                        k->virtual_depth, d);
-                }
+                if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, d);
                 VSTORE(to, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(to)));
                 dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
                 if (k->shadow_on_scattering) dfactor = VFMA(VMUL(g, irradiance), VMUL(kss, profile), dfactor);
                 const V dprofile = VMUL(lamp, kss);
                 for (int i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
-                if (k->per_channel_optics)
+                if (k->per_channel_optics || c == 2)
                     for (int i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
-                        VSTORE(doptics + (3 * i + c) * SSDGS__BLOCK + s,
+                        VSTORE(doptics + (k->per_channel_optics ? 3 * i + c : i) * SSDGS__BLOCK + s,
                                VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
                         dunit[i] = VSET(0);
                     }
             }
         }
-        if (k->scattering) {
-            if (!k->per_channel_optics)
-                for (int i = 0; i < 2; i++)
-                    VSTORE(doptics + i * SSDGS__BLOCK + s,
-                           VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
+        if (k->scattering)
             VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
                    VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
-        }
         if (!k->deferred) dfactor = VADD(dfactor, ddirect); /* else S is the pixel's for these two */
         if (k->shadow) {
             VSTORE(dshadow + s, F(shadow_factor_backward)(k, VLOAD(visibility + s), factor, &dfactor));
@@ -14850,9 +14875,9 @@ SSDGS__FN void F(ssim_backward_row)(const ssdgs__ssim_row *at, R by_l1, R by_ssi
 }
 
 /* A row of dL/d(normal, alpha) of L = weight (alpha - normal . n), n the normal of the surface that depth
-   shows, from the nearer neighbours along the row and across it: with u, v the ray (u, v, 1)'s coordinates,
-   (ln depth)_u and (ln depth)_v, n = ((ln d)_u, (ln d)_v, -1 - u (ln d)_u - v (ln d)_v) / |..|, 0 where a
-   depth is (unknown). depth points at the row in a plane with a border of 1 row and 16 columns of 0; out: 4
+   shows, from the nearer neighbours along the row and across it: for depth d along the ray (u, v, 1),
+   n = ((ln d)_u, (ln d)_v, -1 - u (ln d)_u - v (ln d)_v) / |..|. Where a depth is 0 (unknown), so is the
+   gradient. depth points at the row in a plane with a border of 1 row and 16 columns of 0; out: 4
    rows of the stride. */
 SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size_t stride, int y, R weight,
                                 R *out) {
@@ -14903,9 +14928,8 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
 }
 
 /* Adam: m = b1 m + (1 - b1) g, v = b2 v + (1 - b2) g^2, p -= rate m' / (sqrt(v') + eps), ' = bias-corrected.
-   Gradients below 4e-18 count as 0: (1 - b2) g^2 would be subnormal; nor do moments linger so. A CPU that
-   flushes subnormals finds the same. Those beyond 1e18 count as that: no square and no product with a rate
-   overflows. */
+   Gradients below 4e-18 become 0, as (1 - b2) g^2 would be subnormal, and so do tiny moments: CPUs that flush
+   subnormals agree. Gradients are cut at 1e18, so no square and no product with a rate overflows. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square,
                              const ssdgs__adam_rate *rate) {
     V g = VLOAD(gradient);
@@ -15013,7 +15037,6 @@ static const ssdgs__kernels F(kernels) = {F(project),
 #undef VABS
 #undef VDOT3
 #undef F
-#undef SSDGS__BY_HEIGHT
 #undef SSDGS__FN
 #undef SSDGS__TRAINS
 #undef SSDGS__FI

@@ -79,20 +79,16 @@ int main(int argc, char **argv) {
             if (!used || argv[i][used]) return usage();
             circle[numbers++] = value;
         } else if (argv[i][0] == '-') return usage();
-        else images++;
+        else argv[images++] = argv[i];
     }
     if (numbers < 3 || !images || !(circle[2] > 0)) return usage();
-    for (int i = 4; i < argc && !failed; i++) {
+    for (int i = 0; i < images && !failed; i++) {
         char error[512];
-        int width, height;
+        int width = 0, height = 0;
         ssdgs_pixels format;
         void *pixels = NULL;
         double at[2], direction[3];
         const char *problem;
-        if (!strcmp(argv[i], "--focal")) {
-            i++;
-            continue;
-        }
         failed = olat_read_png(argv[i], &width, &height, &format, &pixels, error);
         unsigned char *bytes = failed ? NULL : (unsigned char *)malloc(4 * (size_t)width * (size_t)height);
         for (size_t p = 0; bytes && p < 4 * (size_t)width * (size_t)height; p++)

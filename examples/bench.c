@@ -654,8 +654,8 @@ static void measure_layers(bench *b) {
         if (b->isas[i] == b->best_isa) /* of one thread, all of them */
             add_facts(b,
                       "peak_fma_gflops mlp_fp32_fraction_of_peak mlp_fp32_forward_fraction_of_peak "
-                      "mlp_fp32_backward_fraction_of_peak mlp_bf16_fraction_of_peak",
-                      v[0], v[5], v[3], v[4], none); /* the library has no bf16 networks any more */
+                      "mlp_fp32_backward_fraction_of_peak",
+                      v[0], v[5], v[3], v[4]);
         ssdgs__release(s.context, n.weights);
         ssdgs__release(s.context, n.output_gradient);
         ssdgs__release(s.context, n.gradient);
@@ -820,30 +820,37 @@ static void measure_skipping(bench *b) {
     print_table(t);
 }
 
-/* The session's model becomes one of `count` Gaussians on the same surfaces: copies, the smaller the more
-   they are, each moved within its original, in the order of a trained model. */
-static void replicate(session *s, int count) {
-    ssdgs_model *from = s->model, *to;
-    const double times = (double)count / from->count, shrink = 0.5 * log(times);
-    check(s->context, ssdgs_model_create(s->context, &from->settings, count, &to));
-    memcpy(to->globals, from->globals, from->global_count * sizeof *to->globals);
-    for (size_t i = 0; i < (size_t)count; i++) {
-        ssdgs_real g[SSDGS_CHANNELS];
-        for (int c = 0; c < SSDGS_CHANNELS; c++)
-            g[c] = from->gaussians[(size_t)c * from->capacity + (size_t)((double)i / times)];
-        ssdgs_real q[4], axes[9];
-        ssdgs__rotation_scalar(g + SSDGS_ROTATION, q, axes);
-        for (int k = 0; k < 3; k++) {
-            const double shift =
-                exp((double)g[SSDGS_LOG_SCALE + k]) * (2 * ssdgs__uniform(3, 3 * i + (size_t)k) - 1);
-            for (int c = 0; c < 3; c++) g[SSDGS_POSITION + c] += (ssdgs_real)shift * axes[3 * c + k];
-            g[SSDGS_LOG_SCALE + k] -= (ssdgs_real)shrink;
+/* So many Gaussians on the surfaces of a model: the more they are, the smaller each. */
+static ssdgs_model *crowd(ssdgs_context *context, const ssdgs_model *from, int count) {
+    ssdgs_model *model;
+    check(context, ssdgs_model_create(context, &from->settings, count, &model));
+    memcpy(model->globals, from->globals, from->global_count * sizeof *from->globals);
+    const double parts = (double)count / from->count;
+    for (int i = 0; i < count; i++) {
+        const size_t parent = (size_t)((double)i * from->count / count);
+        ssdgs_real raw[4], q[4], r[9], *to = model->gaussians + i;
+        for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+            to[c * model->capacity] = from->gaussians[c * from->capacity + parent];
+        for (size_t c = 0; c < 4; c++) raw[c] = to[(SSDGS_ROTATION + c) * model->capacity];
+        ssdgs__rotation_scalar(raw, q, r);
+        for (size_t axis = 0; axis < 3; axis++) {
+            ssdgs_real *log_scale = to + (SSDGS_LOG_SCALE + axis) * model->capacity;
+            const double step =
+                3 * exp((double)*log_scale) * (ssdgs__uniform(3, 3 * (uint64_t)i + axis) - 0.5);
+            for (size_t c = 0; c < 3; c++)
+                to[(SSDGS_POSITION + c) * model->capacity] += (ssdgs_real)(step * (double)r[3 * c + axis]);
+            *log_scale -= (ssdgs_real)(0.5 * log(parts));
         }
-        for (int c = 0; c < SSDGS_CHANNELS; c++) to->gaussians[(size_t)c * to->capacity + i] = g[c];
     }
-    check(s->context, ssdgs_model_sort(to));
+    check(context, ssdgs_model_sort(model));
+    return model;
+}
+
+/* The session's model becomes one of so many Gaussians. */
+static void replicate(session *s, int count) {
+    ssdgs_model *from = s->model;
+    s->model = crowd(s->context, from, count);
     ssdgs_model_destroy(from);
-    s->model = to;
 }
 
 /* An allocator that counts; a block's size stands before it. */
@@ -1066,32 +1073,6 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
 }
 
 /* ---- a GPU beside the CPU ---- */
-
-/* So many Gaussians in place of the model's, each of which becomes several that cover as much. */
-static ssdgs_model *crowd(ssdgs_context *context, const ssdgs_model *from, int count) {
-    ssdgs_model *model;
-    check(context, ssdgs_model_create(context, &from->settings, count, &model));
-    memcpy(model->globals, from->globals, from->global_count * sizeof *from->globals);
-    const double parts = (double)count / from->count;
-    for (int i = 0; i < count; i++) {
-        const size_t parent = (size_t)((double)i * from->count / count);
-        ssdgs_real raw[4], q[4], r[9], *to = model->gaussians + i;
-        for (size_t c = 0; c < SSDGS_CHANNELS; c++)
-            to[c * model->capacity] = from->gaussians[c * from->capacity + parent];
-        for (size_t c = 0; c < 4; c++) raw[c] = to[(SSDGS_ROTATION + c) * model->capacity];
-        ssdgs__rotation_scalar(raw, q, r);
-        for (size_t axis = 0; axis < 3 && parts > 1; axis++) {
-            ssdgs_real *log_scale = to + (SSDGS_LOG_SCALE + axis) * model->capacity;
-            const double step =
-                3 * exp((double)*log_scale) * (ssdgs__uniform(3, 3 * (uint64_t)i + axis) - 0.5);
-            for (size_t c = 0; c < 3; c++)
-                to[(SSDGS_POSITION + c) * model->capacity] += (ssdgs_real)(step * (double)r[3 * c + axis]);
-            *log_scale -= (ssdgs_real)(0.5 * log(parts));
-        }
-    }
-    check(context, ssdgs_model_sort(model));
-    return model;
-}
 
 typedef struct stage_times {
     double began, seconds[SSDGS_STAGE_COUNT];

@@ -319,7 +319,7 @@ static int report_training(check *k) {
         say(k, 1, "%s", line);
         line = end + 1;
     }
-    if (result) fail(ssdgs_error_message(k->context));
+    if (result) fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(k->context));
     else
         say(k, 0,
             "%d iterations take %.0f minutes and more here: %.0f ms each at the start, with %d Gaussians",
@@ -418,7 +418,7 @@ static int usage(void) {
     fprintf(stderr,
             "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z]\n"
             "Says what is right and wrong with a capture; lines with an arrow ask for something.\n"
-            "  --out DIR     also draws DIR/photographs.png (clipped: red, black: blue) and DIR/places.svg\n"
+            "  --out DIR     draws into a folder: photographs.png (clipped: red, black: blue), places.svg\n"
             "  --bounds ...  corners of the box that holds the object; -0.5,-0.5,-0.5,0.5,0.5,0.5\n");
     return 2;
 }
@@ -437,12 +437,14 @@ static int run(check *k) {
                  fail("the path is too long");
     FILE *file = failed ? NULL : fopen(test, "rb");
     if (file) fclose(file);
+    if (!failed && k->out &&
+        (olat_guard_folder(&guard, k->dataset, lists[0], error) ||
+         (file && olat_guard_folder(&guard, k->dataset, lists[1], error))))
+        failed = fail(error);
     for (int i = 0; i < 2 && k->out && !failed; i++) {
         if (snprintf(paths[i], sizeof paths[i], "%s/%s", k->out, names[i]) >= (int)sizeof paths[i])
             failed = fail("the path is too long");
-        else if (olat_guard_folder(&guard, k->dataset, lists[0], error) ||
-                 (file && olat_guard_folder(&guard, k->dataset, lists[1], error)) ||
-                 olat_guard_output(&guard, paths[i], error) || olat_check_writable(paths[i], error))
+        else if (olat_guard_output(&guard, paths[i], error) || olat_check_writable(paths[i], error))
             failed = fail(error);
     }
     olat_guard_free(&guard);

@@ -1,7 +1,8 @@
 /* cc -O2 examples/engine.c -o engine -lm -lpthread: how a game engine draws with ssdgs.h. Meshes, a floor and
    a box, and three objects of two models stand in a level, under a spot that moves and a sun. Everything
    hides and shadows everything. usage: engine [--frames N] [--size W H] [--out PREFIX] [MODEL.ply
-   [MODEL.ply]]; writes PREFIX000.png and so on, and PREFIXsheet.png with nine of them. */
+   [MODEL.ply]]; writes PREFIX000.png and so on, and PREFIXsheet.png with nine of them; PREFIX is
+   build/engine_. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
@@ -216,9 +217,7 @@ static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **o
             g.diffuse[c] = shiny ? 0.05f : c ? 0.2f : 0.8f;
             g.specular[c] = shiny ? 3.0f : 0.3f;
         }
-        /* the third axis to the normal: half a turn about what lies between them */
-        g.rotation[0] = 0, g.rotation[1] = normal[0], g.rotation[2] = normal[1],
-        g.rotation[3] = normal[2] + 1;
+        memset(g.rotation, 0, sizeof g.rotation); /* none: the third axis is the normal */
         g.opacity = 0.99f;
         g.sharpness[0] = g.sharpness[1] = shiny ? 20.0f : 4.0f;
         g.f0 = shiny ? 0.6f : 0.04f;

@@ -55,8 +55,9 @@ static ssdgs_result take_colors(void *user, ssdgs_frame *frame) {
     exporter *e = (exporter *)user;
     const size_t plane = 4 * (size_t)frame->count;
     for (int i = 0; e->listening && i < frame->count; i++) {
-        const float *color = frame->color + 4 * (size_t)i, *layer = frame->layers + 4 * (size_t)i;
-        const float shadow = frame->layer_count ? shadow_of(&frame->settings, layer + 6 * plane) : 0;
+        const float *color = frame->color + 4 * (size_t)i,
+                    *layer = frame->layer_count ? frame->layers + 4 * (size_t)i : NULL;
+        const float shadow = layer ? shadow_of(&frame->settings, layer + 6 * plane) : 0;
         double weight = 0, length2 = 0;
         for (int c = 0; c < 3; c++) {
             const double to_eye = (double)(frame->eye[c] - e->splats[i].position[c]);
@@ -139,13 +140,9 @@ static void put_floats(exporter *e, const float *values, int count) {
     }
 }
 
-static uint32_t word_at(const unsigned char *p) {
-    return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
-
 static void floats_at(const unsigned char *p, float *values, int count) {
     for (int i = 0; i < count; i++) {
-        const uint32_t word = word_at(p + 4 * i);
+        const uint32_t word = olat__le32(p + 4 * i);
         memcpy(values + i, &word, 4);
     }
 }
@@ -293,10 +290,11 @@ static int read_splat(const unsigned char *bytes, size_t size, int count, splat 
 static int read_glb(const exporter *e, const unsigned char *bytes, size_t size, splat *out) {
     char json[4096];
     const size_t length = (size_t)glb_json(e, json, sizeof json);
-    if (size != 28 + length + 72 * (size_t)e->count || word_at(bytes) != 0x46546C67 ||
-        word_at(bytes + 4) != 2 || word_at(bytes + 8) != size || word_at(bytes + 12) != length ||
-        word_at(bytes + 16) != 0x4E4F534A || memcmp(bytes + 20, json, length) != 0 ||
-        word_at(bytes + 20 + length) != size - length - 28 || word_at(bytes + 24 + length) != 0x004E4942)
+    if (size != 28 + length + 72 * (size_t)e->count || olat__le32(bytes) != 0x46546C67 ||
+        olat__le32(bytes + 4) != 2 || olat__le32(bytes + 8) != size || olat__le32(bytes + 12) != length ||
+        olat__le32(bytes + 16) != 0x4E4F534A || memcmp(bytes + 20, json, length) != 0 ||
+        olat__le32(bytes + 20 + length) != size - length - 28 ||
+        olat__le32(bytes + 24 + length) != 0x004E4942)
         return 1;
     bytes += 28 + length;
     for (int i = 0; i < ATTRIBUTES; i++)

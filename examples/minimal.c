@@ -1,5 +1,5 @@
-/* cc -O2 examples/minimal.c -o minimal -lm -lpthread: a ball over a floor, made in code, lit, rendered to
-   minimal.png */
+/* cc -O2 examples/minimal.c -o minimal -lm -lpthread: a ball over a floor, made in code, lit, in
+   build/minimal.png */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"

@@ -8,21 +8,32 @@
    if (olat_load("scene", "transforms_train.json", 0, &set, error)) { puts(error); return 1; }
    ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
 
-   KEYS      camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or fl_x fl_y cx cy w h: at
-   the top or in a frame; frames[]: file_path (+ file_ext) or img_path; mask_path (white: keep);
-   transform_matrix (camera to world, OpenGL axes) or R_opt, T_opt; pl_pos or pl_dir; pl_intensity; pl_mu and
-   pl_axis, along which an LED shines that fades as cos^mu; or in place of these pl_lights: a list of objects
-   that have them, where several lights shine. Or a frame is a camera's, with lists of its photographs:
-   light_positions, light_intensities, file_paths, less those that exclude_list.txt names. A frame's own key
-   wins over the top's, one that tells a focal length over all of those. Distorted lenses are refused. IMAGES
-   PNG of any kind, as bytes or words; OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS or ZIP,
-   as halves or floats: the display window, alpha divided out, R G B A or Y of the image or of its first
-   layer. A name without an ending is .png, or .exr where there is no such PNG. ADAPTED   Coordinates far from
-   0 become relative to an origin, photographs whose files say that they are not sRGB become so, masks become
-   alpha. The dataset's notes say what was done. ERRORS    Functions return 0, or 1 and one message that names
-   the file and the key and line, or the byte. Nothing is kept. HOSTILE Every byte of a file may be wrong.
-   Image paths reach only regular files below the folder (or through its links). SYSTEMS   POSIX, MinGW. All
-   functions are static and keep no state. */
+   KEYS  At the top or in a frame: camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or
+   fl_x fl_y cx cy w h. A frame's key wins over the top's, one for a focal length over all such keys of the
+   top.
+
+   In frames[]: file_path (+ file_ext) or img_path. mask_path: white is kept. transform_matrix (camera to
+   world, OpenGL axes), or R_opt and T_opt. pl_pos or pl_dir. pl_intensity. pl_mu and pl_axis: an LED, which
+   fades as cos^mu of the angle to that axis. pl_lights: where several lights shine, a list of objects with
+   pl_ keys.
+
+   Or a frame is a camera's, with lists: light_positions, light_intensities, file_paths, less those that
+   exclude_list.txt names. Distorted lenses are refused.
+
+   IMAGES  PNG of any kind, as bytes or words. OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS
+   or ZIP, halves or floats: the display window, alpha divided out, R G B A or Y of the image or its first
+   layer. A name without an ending is .png, or .exr where there is no such PNG.
+
+   ADAPTED  Coordinates far from 0 become relative to an origin, photographs that say they are not sRGB become
+   so, masks become alpha. The dataset's notes say what was done.
+
+   ERRORS  Functions return 0, or 1 and one message that names the file and the key and line, or the byte.
+   Nothing is kept.
+
+   HOSTILE  Every byte of a file may be wrong. Image paths reach only regular files below the folder, or
+   through its links.
+
+   SYSTEMS  POSIX, MinGW. All functions are static and keep no state. */
 
 #ifndef OLAT_H
 #define OLAT_H
@@ -1003,7 +1014,7 @@ static void olat__exr_channels(olat__exr *e, size_t end) {
 static void olat__exr_window(olat__exr *e, int *window) {
     for (int i = 0; i < 4; i++) {
         window[i] = olat__exr_int(e);
-        if (window[i] < -(1 << 30) || window[i] > 1 << 30) olat__exr_bad(e, "a window is out of range");
+        if (window[i] < -(1 << 29) || window[i] > 1 << 29) olat__exr_bad(e, "a window is out of range");
     }
     for (int i = 0; i < 2; i++)
         if (!e->problem && (window[2 + i] < window[i] || window[2 + i] - window[i] >= OLAT__MAX_SIDE))

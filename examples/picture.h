@@ -170,7 +170,8 @@ OLAT__API ssdgs_result view_arrange(view_show *s) {
         else at = low[0];
         at += (s->count > 1 ? 1.15f : 1) * width;
         for (int c = 1; c < 3; c++) s->radius = fmaxf(s->radius, (high[c] - low[c]) / 2);
-        s->middle[1] = (low[1] + high[1]) / 2;
+        if (!i) s->middle[1] = (low[1] + high[1]) / 2;
+        s->objects[i].to_world[7] = s->middle[1] - (low[1] + high[1]) / 2;
         tallest[0] = fminf(tallest[0], low[2]);
         tallest[1] = fmaxf(tallest[1], high[2]);
         if (i == s->count - 1) {
@@ -180,6 +181,7 @@ OLAT__API ssdgs_result view_arrange(view_show *s) {
         }
     }
     s->middle[2] = (tallest[0] + tallest[1]) / 2;
+    s->radius = fmaxf(s->radius, (tallest[1] - tallest[0]) / 2);
     return SSDGS_OK;
 }
 
@@ -215,6 +217,9 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
     const int width = (int)w->value[VIEW__WIDTH][0], height = (int)w->value[VIEW__HEIGHT][0];
     const size_t pixels = (size_t)width * (size_t)height;
     const float light_scale = ssdgs_model_settings(s->models[0])->light_scale;
+    int lit = 0; /* the first model that is not baked says how colours are stored */
+    while (lit < s->count - 1 && ssdgs_model_settings(s->models[lit])->baked) lit++;
+    const int transfer = ssdgs_model_settings(s->models[lit])->transfer;
     if (!view__room(s, pixels)) return SSDGS_ERR_MEMORY;
     float eye[3], target[3], up[3], *value = s->planes, *alpha = s->planes + 3 * pixels;
     ssdgs_light lights[VIEW__LIGHTS];
@@ -259,7 +264,7 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
         for (size_t i = 0; i < 3 * pixels; i++) value[i] *= (float)w->value[VIEW__EXPOSURE][0];
         memset(&image, 0, sizeof image);
         image.color = value;
-        ssdgs_to_pixels(&image, width, height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, s->bytes, 4 * width);
+        ssdgs_to_pixels(&image, width, height, transfer, SSDGS_RGBA8, s->bytes, 4 * width);
         return SSDGS_OK;
     }
     float depth = 0;

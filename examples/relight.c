@@ -70,6 +70,10 @@ static int fail(const char *message) {
     return 1;
 }
 
+static int fail_with(const ssdgs_context *context, ssdgs_result result) {
+    return fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(context));
+}
+
 static void hear(void *user, ssdgs_result code, const char *message) {
     (void)user;
     if (code == SSDGS_OK) fprintf(stderr, "relight: note: %s\n", message);
@@ -150,6 +154,7 @@ static int parse(job *j, int argc, char **argv) {
     j->ambient = value ? strtod(value, &end) : 1;
     if (value && (*end || end == value || !(j->ambient >= 0 && j->ambient <= 1e6)))
         return usage("--ambient needs a number from 0 to 1000000, not", value);
+    if (value && j->given[FIT]) return usage("--fit takes the room's light as it is, so no --ambient", value);
     value = j->given[ISA];
     while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
@@ -322,7 +327,7 @@ static void find_axes(const olat_dataset *data, double axes[3][3]) {
 static int make_trajectory(job *j) {
     olat_dataset *data = &j->data;
     double intensity[3] = {0, 0, 0};
-    ssdgs_model_view model = ssdgs_model_arrays(j->model);
+    const ssdgs_model_view model = ssdgs_model_peek(j->model);
     int count = 2 * (150 + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
     ssdgs_camera first = data->frames[0].camera;
@@ -457,8 +462,8 @@ static ssdgs_result render(job *j, int index, int components) {
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
     if (i == 3 * pixels) tell_black(j, frame, &stats);
     ssdgs_compose(planes.color, planes.alpha, pixels, settings->transfer, j->background, j->image);
-    if (!frame->has_image) return SSDGS_OK;
     olat_compose(&photo, settings->transfer, j->background, j->photo);
+    if (!frame->has_image) return SSDGS_OK;
     score *s = j->scores[0] + index;
     s->flip = olat_flip(j->image, j->photo, frame->camera.width, frame->camera.height);
     if (s->flip < 0) return SSDGS_ERR_MEMORY;
@@ -630,7 +635,8 @@ static int relight(job *j) {
         const olat_frame *frame = &j->data.frames[i];
         int components = j->given[COMPONENTS] != NULL;
         int on_sheet = row < j->sheet_rows && i == (2 * row + 1) * j->data.count / (2 * j->sheet_rows);
-        if (render(j, i, components || on_sheet)) return fail(ssdgs_error_message(j->context));
+        result = render(j, i, components || on_sheet);
+        if (result) return fail_with(j->context, result);
         for (int output = PHOTO; output < OUTPUT_COUNT; output++) {
             int written = output == IMAGE || (components && output != PHOTO),
                 pasted = on_sheet && output < SHEET_COLUMNS;
@@ -642,7 +648,8 @@ static int relight(job *j) {
         row += on_sheet;
         if (!frame->has_image) continue;
         scored++;
-        if (j->given[FIT] && fit(j, i)) return fail(ssdgs_error_message(j->context));
+        if (j->given[FIT]) result = fit(j, i);
+        if (result) return fail_with(j->context, result);
         for (int k = 0; k < 2; k++) {
             means[k].is.psnr += j->scores[k][i].is.psnr;
             means[k].is.ssim += j->scores[k][i].is.ssim;

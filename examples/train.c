@@ -664,7 +664,7 @@ static int train(job *j) {
                fail(error);
     }
     char text[32];
-    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_arrays(j->model).count,
+    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_peek(j->model).count,
            clock_text(olat_seconds() - start, text));
     print_peak_memory();
     printf("\n");
@@ -679,12 +679,14 @@ static int train(job *j) {
     if (!has_test) return 0;
     j->test_photos = olat_photos(&j->test_set);
     if (!j->test_photos) return fail("out of memory");
-    if (evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test") ||
-        (refines && evaluate(j, j->test_photos, j->test_set.count, 1, 200,
-                             "test (each photograph's pose and light fitted to it)")) ||
-        evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training"))
-        return fail(ssdgs_error_message(j->context));
-    return 0;
+    result = evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test");
+    if (!result && refines)
+        result = evaluate(j, j->test_photos, j->test_set.count, 1, 200,
+                          "test (each photograph's pose and light fitted to it)");
+    if (!result)
+        result = evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training");
+    if (!result) return 0;
+    return fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(j->context));
 }
 
 int main(int argc, char **argv) {

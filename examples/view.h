@@ -1,9 +1,7 @@
 /* view.h - shows models in a browser on this machine. MIT, see ssdgs.h.
 
-   view_server s; ... s.show: models, names, count, context, view_arrange() or middle and radius ...
-   if (view_open(&s, "view.html", error)) ...
-   while (...) view_poll(&s, 1000);
-   view_close(&s);
+   static view_server s; ... s.show: context, models, names, count; then view_arrange(), or middle and radius
+   ... if (view_open(&s, "view.html", error)) ... while (...) view_poll(&s, 1000); view_close(&s);
 
    It serves view.html on 127.0.0.1, and one picture a request, which says all that it is to show: nothing of
    a visitor is kept but what makes the next picture faster. Whoever asks by another host's name, or from
@@ -163,7 +161,10 @@ static int view__is_here(const view_server *s, const char *prefix, const char *t
     for (int i = 0; i < 2; i++) {
         char here[64];
         const int size = snprintf(here, sizeof here, "%s%s:%d", prefix, hosts[i], s->port);
-        if ((size_t)size == length && !memcmp(here, text, length)) return 1;
+        /* browsers leave out :80 */
+        if (((size_t)size == length || (s->port == 80 && length + 3 == (size_t)size)) &&
+            !memcmp(here, text, length))
+            return 1;
     }
     return 0;
 }
@@ -318,10 +319,6 @@ static int view_poll(view_server *s, int milliseconds) {
     FD_SET(s->listener, &in);
     for (view__visitor *v = s->visitors; v < s->visitors + VIEW__VISITORS; v++) {
         if (v->socket == VIEW__NO_SOCKET) continue;
-        if (time(NULL) - v->heard > VIEW__PATIENCE) {
-            view__leave(v);
-            continue;
-        }
         if (v->size) FD_SET(v->socket, &out);
         else FD_SET(v->socket, &in);
         highest = v->socket > highest ? v->socket : highest;
@@ -331,6 +328,7 @@ static int view_poll(view_server *s, int milliseconds) {
         if (v->socket == VIEW__NO_SOCKET) continue;
         if (FD_ISSET(v->socket, &out)) view__transmit(s, v);
         else if (FD_ISSET(v->socket, &in)) view__receive(s, v);
+        else if (time(NULL) - v->heard > VIEW__PATIENCE) view__leave(v);
     }
     if (FD_ISSET(s->listener, &in)) view__welcome(s);
     return 1;

@@ -103,6 +103,7 @@ int web_load(const char *called, const void *bytes, size_t length) {
         show.radius = 0;
         snprintf(name, sizeof name, "%s", called);
         result = view_arrange(&show);
+        if (result) show.count = 0; /* there is no model then */
     }
     if (result) snprintf(note, sizeof note, "%s", ssdgs_error_message(show.context));
     else view__about(&show, note, sizeof note);

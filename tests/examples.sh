@@ -88,6 +88,7 @@ check "as reduced" says 0 "4 images" "$build/relight" "$out/reduced/reduced.ply"
 check "the same picture" cmp "$out/reduced/r_000.png" "$out/reduced2/r_000.png"
 check "another picture" differs "$out/reduced/r_000.png" "$out/relit/r_000.png"
 check "--ambient" says 2 "--ambient needs a number" relight --out "$out/reduced" --ambient -1
+check "--ambient --fit" says 2 "takes the room's light as it is" relight --out "$out/reduced" --ambient 0 --fit
 check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
 # several photographs a step: how far it is, and checkpoints
@@ -245,6 +246,9 @@ check "a set that is not there" says 1 "nothing" "$build/check" "$out/nothing"
 check "a folder that is not there" says 1 "never" "$build/check" "$set" --out "$out/never"
 check "no box" says 2 "^usage: check" "$build/check" "$set" --bounds 1,2,3
 check "no set" says 2 "^usage: check" "$build/check"
+
+# options of ball may stand anywhere
+check "ball" says 1 "r_000.png: " "$build/ball" --focal 500 20 20 10 "$set/test/r_000.png"
 
 rm -rf "$out"
 echo "$passed passed, $failed failed"

@@ -263,6 +263,14 @@ static void test_not_numbers(void) {
             for (i = 0; i < CHUNK && !test_finite((double)out[i]);) i++;
             CHECK(i == CHUNK);
         }
+        for (int map = SRGB_ENCODE; map <= SRGB_DECODE; map++) { /* what is no colour stays none */
+            for (int i = 0; i < CHUNK; i++)
+                in[0][i] = i % 3 == 0 ? from_bits(0x7FC00000u) : i % 3 == 1 ? infinite : -infinite;
+            apply(map);
+            int finite = 0;
+            for (int i = 0; i < CHUNK; i++) finite += test_finite((double)out[i]);
+            CHECK(!finite);
+        }
         for (size_t e = 0; e < sizeof ends / sizeof *ends; e++) {
             for (int i = 0; i < CHUNK; i++) in[0][i] = i & 1 ? ends[e].above : ends[e].below;
             apply(ends[e].map);

@@ -275,6 +275,14 @@ static void test_failures(void) {
     CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_NONFINITE && p.trainer->iteration == BATCH);
     free(total);
     close_process(&p);
+    /* light from all around, found anew before the first photograph, fails alike */
+    memset(&gpu, 0, sizeof gpu);
+    gpu.stage[SSDGS_STAGE_WALK] = shade;
+    open_process(&p, &options, 0, 2, &gpu);
+    fails = 1;
+    CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_LIMIT && p.calls == 1 && p.part[0] == 1);
+    CHECK(!p.trainer->exposed);
+    close_process(&p);
     static const int wrong[5][3] = {
         {0, 0, 2}, {2, 2, 2}, {-1, 2, 2}, {0, 3, 2}, {0, 0, 257}}; /* rank, of, batch */
     for (int i = 0; i < 5; i++) {

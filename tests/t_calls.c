@@ -94,7 +94,8 @@ static int call_everything(void) {
         refused += ssdgs_trainer_run(trainer, NULL, NULL) == SSDGS_ERR_ARGUMENT;
         refused += ssdgs_trainer_save(trainer, FILE_NAME) == SSDGS_ERR_ARGUMENT;
         refused += ssdgs_trainer_load(trainer, FILE_NAME) == SSDGS_ERR_ARGUMENT;
-        all.tries += 4;
+        refused += ssdgs_trainer_refined(trainer, 0, &copy.camera, &copy.light) == SSDGS_ERR_ARGUMENT;
+        all.tries += 5;
     }
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);

@@ -1886,6 +1886,13 @@ static void test_exr(void) {
     large.display[2] = 32768;
     encode_exr(&large), file_size += 0;
     CHECK(exr_refused("side is not within 1 .. 32768"));
+    size_t window = 0;
+    for (encode_exr(exrs); memcmp(file + window, "box2i", 6) != 0;) window++;
+    for (size_t i = 0; i < 4; i++) { /* -2^30 .. 2^30: no int holds the width */
+        static const unsigned char far_apart[2][4] = {{0, 0, 0, 0xC0}, {0, 0, 0, 0x40}};
+        memcpy(file + window + 10 + 4 * i, far_apart[i / 2], 4);
+    }
+    CHECK(exr_refused("a window is out of range"));
     large.display[2] = large.display[3] = 8191;
     encode_exr(&large);
     CHECK(exr_refused("much larger than what the file holds"));

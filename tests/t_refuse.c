@@ -230,6 +230,10 @@ static void test_messages(void) {
     free(floats);
     SAYS(ssdgs_trainer_create(model, NULL, 3, NULL, &trainer), "3 photographs, but the array is NULL");
     SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
+    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image),
+         "light 0: position, of a directional light, is not a unit vector");
+    light = photo.light;
     memcpy(&light.kind, &numbers[1], sizeof numbers[1]);
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");
     SAYS(ssdgs_compare(context, color, NULL, 4, 4, &metrics), "ssdgs_compare: reference is NULL");
@@ -399,6 +403,11 @@ static void test_gaussian(void) {
     CHECK(!ssdgs_model_get(two, 1, &again));
     CHECK_NEAR(again.normal, back.normal, 3, tolerance, 0, "turned about its normal");
     CHECK(!ssdgs_model_set(two, 1, &again) && RAW(SSDGS_FRAME + 3) == (double)(ssdgs_real)turned[3]);
+    for (int i = 0; i < 2; i++) { /* a normal may have any length */
+        for (int c = 0; c < 3; c++) g.normal[c] = (ssdgs_real)((c - 1) * (i ? 1e25 : 1e-25));
+        CHECK(!ssdgs_model_set(two, 1, &g) && !ssdgs_model_get(two, 1, &again));
+        CHECK(again.normal[0] < (ssdgs_real)-0.7 && again.normal[2] > (ssdgs_real)0.7);
+    }
     /* without a rotation the third axis is the normal, without a normal the normal is the third axis */
     for (int down = 0; down < 2; down++) {
         const ssdgs_real normal[3] = {0, 0, (ssdgs_real)(down ? -2 : 2)};

@@ -417,6 +417,14 @@ static void test_baked(void) {
         CHECK(fabs((double)(stored - (ssdgs_real)(0.25 * (c + 1)))) < 1e-5);
         CHECK(fabs((double)(linear - ssdgs_srgb_decode((ssdgs_real)(0.25 * (c + 1))))) < 1e-5);
     }
+#ifndef __FAST_MATH__
+    for (int i = 0; i < 2; i++) { /* not finite: black, as beside no other */
+        ssdgs_model_arrays(plain).gaussians[SSDGS_DIFFUSE * plain->capacity] =
+            (ssdgs_real)(i ? INFINITY : NAN);
+        together(object, 2, &camera, &light, 1, NULL, shot);
+        CHECK(shot->stats.blackened == 1 && shot->value[3 * middle] == 0 && shot->value[3 * middle + 1] == 0);
+    }
+#endif
     ssdgs_model_destroy(plain), ssdgs_model_destroy(lit);
 }
 
@@ -554,8 +562,9 @@ static void test_query(void) {
                 worst = error > worst ? error : worst;
                 mean += error;
             }
-            CHECK(worst < 0.105 && mean < 0.02 * (double)POINTS); /* maps take note once a tenth is gone */
+            CHECK(worst < 0.105 && mean < 0.02 * (double)POINTS); /* between a map's levels */
             CHECK(!ssdgs_scene_shadow(scene, 0, points, 0, NULL));
+            CHECK(ssdgs__chunks(0) == 0 && ssdgs__chunks(2147483647) == 2097152);
             ssdgs_model_destroy(plate);
         }
 }
@@ -793,6 +802,12 @@ static void test_bounds(void) {
     CHECK(!ssdgs_model_bounds(model, low, high));
     CHECK_NEAR(low, want_low, 3, 1e-6, 1e-5, "bounds, low");
     CHECK_NEAR(high, want_high, 3, 1e-6, 1e-5, "bounds, high");
+    ssdgs_model *faint = cloud(&s, 0, 5, 0.3); /* nothing of it is drawn; it still has a box */
+    for (int i = 0; i < 5; i++)
+        ssdgs_model_arrays(faint).gaussians[SSDGS_OPACITY * faint->capacity + (size_t)i] = -9;
+    for (int i = 0; i < 5; i++) ssdgs_model_arrays(faint).gaussians[i] += 5;
+    CHECK(!ssdgs_model_bounds(faint, low, high) && low[0] > 4 && high[0] > low[0] && high[0] < 6);
+    ssdgs_model_destroy(faint);
     ssdgs_model_arrays(model).gaussians[7] = 100; /* a stray */
     CHECK(!ssdgs_model_bounds(model, low, high) && high[0] < 5);
     CHECK(!ssdgs_model_create(context, &s, 0, &empty));
@@ -1114,9 +1129,11 @@ static void test_kept(void) {
 }
 
 static size_t held, most;
+static int fails_after = -1; /* so many allocations, once; -1: none fails */
 static void *count_allocate(void *user, size_t bytes) {
-    size_t *memory = (size_t *)malloc(bytes + 16);
     (void)user;
+    if (fails_after >= 0 && !fails_after--) return NULL;
+    size_t *memory = (size_t *)malloc(bytes + 16);
     if (!memory) return NULL;
     *memory = bytes;
     held += bytes;
@@ -1163,6 +1180,78 @@ static void test_threads_and_memory(void) {
     }
     CHECK(same(shot, shot + 1));
     context = was, scene = was_scene;
+}
+
+/* A frame that any allocation fails leaves no light's map, not that of the frame before either; the next one
+   makes them as a scene that is new does. */
+static void test_failed_frame(void) {
+    enum { LIGHTS = 8 };
+    ssdgs_settings s = small_settings();
+    ssdgs_context *was = context;
+    ssdgs_light lights[LIGHTS];
+    int failed = 0, wrong = 0;
+    for (int k = 0; k < 100; k++) {
+        const ssdgs_real point[3] = {0, 0, -1};
+        ssdgs_scene *scenes[2] = {NULL, NULL};
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.threads = 1;
+        desc.allocator.allocate = count_allocate;
+        desc.allocator.release = count_release;
+        CHECK(!ssdgs_context_create(&desc, &context));
+        for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_create(context, scenes + i));
+        ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
+        const ssdgs_object object = ssdgs_object_default(plate);
+        for (int i = 0; i < LIGHTS; i++) lights[i] = point_light(0.1 * i, 0, 3);
+        CHECK(!ssdgs_scene_light(*scenes, &object, 1, lights, k % 2 ? LIGHTS : 1, NULL));
+        lights[0] = point_light(3, 0, 0.2); /* past the plate's edge */
+        fails_after = k / 2;
+        const ssdgs_result result = ssdgs_scene_light(*scenes, &object, 1, lights, LIGHTS, NULL);
+        fails_after = -1;
+        ssdgs_real fraction[2];
+        failed += result == SSDGS_ERR_MEMORY;
+        for (int i = 0; i < LIGHTS && result; i++)
+            wrong += ssdgs_scene_shadow(*scenes, i, point, 1, fraction) != SSDGS_ERR_ARGUMENT;
+        for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_light(scenes[i], &object, 1, lights, LIGHTS, NULL));
+        for (int i = 0; i < LIGHTS; i++) {
+            for (int j = 0; j < 2; j++) CHECK(!ssdgs_scene_shadow(scenes[j], i, point, 1, fraction + j));
+            wrong += memcmp(fraction, fraction + 1, sizeof *fraction) != 0;
+        }
+        for (int i = 0; i < 2; i++) ssdgs_scene_destroy(scenes[i]);
+        ssdgs_model_destroy(plate);
+        ssdgs_context_destroy(context);
+    }
+    if (!CHECK(held == 0 && failed > 4 && !wrong)) printf("    %d failed, %d wrong\n", failed, wrong);
+    context = was;
+}
+
+/* What a splat's blur spreads into the picture from beside it is drawn, whether one object is there or two.
+ */
+static void test_blurred(void) {
+    ssdgs_settings s = small_settings();
+    s.pixel_variance = 10;
+    const ssdgs_camera camera = camera_from(0, -3, 0);
+    ssdgs_model *model = NULL;
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    CHECK(!ssdgs_model_create(context, &s, 1, &model));
+    for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)1e-4;
+    g.opacity = (ssdgs_real)0.999;
+    CHECK(!ssdgs_model_set(model, 0, &g));
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    double drawn = 0;
+    for (int i = 0; i < 30; i++) {
+        const double beside = -3 - (i < 10 ? i : 2 * i - 10),
+                     at = (beside - SIDE / 2) * 3 / (double)camera.fx;
+        ssdgs_object object[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
+        options.alpha_threshold = (ssdgs_real)(i < 10 ? 1.0 / 255 : 0);
+        object[0].to_world[3] = (ssdgs_real)at;
+        object[1].to_world[3] = 1000;
+        for (int j = 0; j < 2; j++) together(object, 1 + j, &camera, NULL, 0, &options, shot + j);
+        CHECK(same(shot, shot + 1));
+        for (int p = 0; p < PIXELS; p++) drawn += (double)shot->value[15 * PIXELS + p];
+    }
+    CHECK(drawn > 0.5);
+    ssdgs_model_destroy(model);
 }
 
 static void refused(const ssdgs_object *objects, int count, const char *word) {
@@ -1246,6 +1335,20 @@ static void test_moved_over(void) {
     CHECK(!shot[1].stats.camera_cached && !shot[1].stats.lights_cached);
     ssdgs_scene_destroy(kept);
     ssdgs_model_destroy(comes), ssdgs_model_destroy(there);
+    /* nor is what was found in one context of a model that has changed since taken for true in the other */
+    ssdgs_render_options options = ssdgs_render_options_default();
+    for (int c = 0; c < 3; c++) options.ambient[0][c] = (ssdgs_real)0.5;
+    context = one;
+    comes = cloud(&s, 0, 300, 0.5);
+    alone(comes, &camera, &light, 1, &options, shot);
+    ssdgs_model_arrays(comes).gaussians[0] += 1;
+    two->revisions = comes->exposure_revision - 1;
+    CHECK(!ssdgs_model_move(comes, two));
+    alone(comes, &camera, &light, 1, &options, shot);
+    ssdgs_model_arrays(comes);
+    alone(comes, &camera, &light, 1, &options, shot + 1);
+    CHECK(same(shot, shot + 1));
+    ssdgs_model_destroy(comes);
     ssdgs_context_destroy(one), ssdgs_context_destroy(two);
     context = was;
     CHECK(ssdgs_model_move(NULL, context) == SSDGS_ERR_ARGUMENT);
@@ -1408,6 +1511,8 @@ int main(void) {
     TEST_ROW("95", "lights that reach some", test_local_lights());
     test_threads_and_memory();
     test_trim();
+    test_failed_frame();
+    test_blurred();
     test_moved_over();
     test_jobs();
     test_refused();

@@ -267,7 +267,7 @@ static void test_resume(void) {
         CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
               trainer->start_size > 0);
         ssdgs_trainer_destroy(trainer);
-        for (int i = 0; i < 6; i++) { /* another bias, filter, eta, near plane, format, dipole */
+        for (int i = 0; i < 7; i++) { /* another bias, filter, eta, near plane, format, dipole, medium */
             ssdgs_settings changed = settings;
             ssdgs_model *own = NULL;
             ssdgs_photo shots[PHOTOS];
@@ -279,6 +279,7 @@ static void test_resume(void) {
             if (i == 3) shots[2].camera.near_plane = (ssdgs_real)0.02;
             if (i == 4) shots[2].format = SSDGS_PIXELS_RGBA16, shots[2].pixels = wide;
             if (i == 5) changed.dipole = SSDGS_DIPOLE_PRINTED;
+            if (i == 6) changed.medium.absorption[1] = (ssdgs_real)0.5;
             CHECK(!ssdgs_model_create(context, &changed, 0, &own));
             CHECK(!ssdgs_trainer_create(own, shots, PHOTOS, &options, &trainer));
             CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
@@ -1032,6 +1033,8 @@ static void test_ambient(void) {
                            (SSDGS__AMBIENT_RATE * sqrt((double)batch)) -
                        1) < 1e-3);
         CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+        trainer->iteration += 480; /* steps behind the end go on at the last rate, down the slope */
+        for (int i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
         for (int c = 0; c < 3; c++)
             if (!CHECK(fabs((double)(model->settings.ambient[c] / ambient[c]) - 1) < 0.02))
                 printf("    batch %d: ambient %g of %g\n", batch, (double)model->settings.ambient[c],
@@ -1062,6 +1065,34 @@ static void test_ambient(void) {
     }
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
+}
+
+/* A lamp that is dark casts no shadows to learn from: what another training left in the context's memory
+   changes no bit. */
+static void test_dark(void) {
+    ssdgs_photo dark[PHOTOS];
+    ssdgs_train_options options = short_run(PHOTOS);
+    uint64_t hash[2];
+    options.schedule = SSDGS_SCHEDULE_JOINT;
+    options.refine = 0;
+    memcpy(dark, photos, sizeof dark);
+    for (int i = 0; i < PHOTOS; i++) memset(dark[i].light.intensity, 0, sizeof dark[i].light.intensity);
+    for (int before = 0; before < 2; before++) {
+        ssdgs_context *context = NULL;
+        CHECK(!ssdgs_context_create(NULL, &context));
+        for (int i = !before; i < 2; i++) {
+            ssdgs_model *model = NULL;
+            ssdgs_trainer *trainer = NULL;
+            CHECK(!ssdgs_model_create(context, NULL, 0, &model));
+            CHECK(!ssdgs_trainer_create(model, i ? dark : photos, PHOTOS, &options, &trainer));
+            CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
+            hash[before] = hash_values(1, model->globals, model->global_count);
+            ssdgs_trainer_destroy(trainer);
+            ssdgs_model_destroy(model);
+        }
+        ssdgs_context_destroy(context);
+    }
+    CHECK(hash[0] == hash[1]);
 }
 
 /* Photographs of several lights, one of them an LED, are rendered and learnt from with all of them, which
@@ -1586,11 +1617,11 @@ static void test_blur(void) {
    ends, at 5/6 of a run. */
 static void test_resets(void) {
     ssdgs_train_options options = short_run(90);
-    for (int i = 0; i < 90; i++) CHECK(ssdgs__resets(&options, i) == (i == 30 || i == 60));
+    for (int i = 0; i < 90; i++) CHECK((ssdgs__last_reset(&options, i) == i && i) == (i == 30 || i == 60));
     options.iterations = 89;
-    for (int i = 0; i < 89; i++) CHECK(ssdgs__resets(&options, i) == (i == 30));
+    for (int i = 0; i < 89; i++) CHECK((ssdgs__last_reset(&options, i) == i && i) == (i == 30));
     options.opacity_reset_every = 0;
-    CHECK(!ssdgs__resets(&options, 30));
+    CHECK(!ssdgs__last_reset(&options, 30));
 }
 
 /* Gaussians that hardly show go, but neither those never seen nor all of them after opacities were reset. */
@@ -2650,6 +2681,7 @@ int main(void) {
     test_learning();
     test_refinement();
     test_ambient();
+    test_dark();
     test_more_lights();
     test_one_light();
     test_anchor();

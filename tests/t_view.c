@@ -368,6 +368,40 @@ static void test_photographs(void) {
     }
 }
 
+/* A plain splat file's colours are shown as they are stored; models apart stand side by side, in the middle.
+ */
+static void test_plain(void) {
+    static view_show show;
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_scene *scene = NULL;
+    ssdgs_render_stats stats;
+    view__wish wish;
+    char problem[128];
+    settings.baked = 1;
+    settings.transfer = SSDGS_TRANSFER_NONE;
+    show.context = here.show.context;
+    for (int i = 0; i < 2; i++) {
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        CHECK(!ssdgs_model_create(show.context, &settings, 1, show.models + i));
+        for (int c = 0; c < 3; c++) g.scale[c] = 0.2f, g.diffuse[c] = 0.5f;
+        g.position[1] = 7.0f * (float)i, g.position[2] = 3.0f * (float)i;
+        g.opacity = 0.995f;
+        CHECK(!ssdgs_model_set(show.models[i], 0, &g));
+    }
+    show.count = 1;
+    CHECK(!view_arrange(&show) && view__read_wish("w=32&h=32&eye=0,-2,0", &wish, problem, sizeof problem));
+    CHECK(!view__draw(&show, &scene, &wish, &stats));
+    CHECK(abs(show.bytes[4 * (16 * 32 + 16)] - 127) < 3);
+    show.count = 2;
+    show.radius = 0;
+    CHECK(!view_arrange(&show));
+    CHECK(fabsf(show.objects[1].to_world[7] + 7) < 1e-3f && fabsf(show.middle[1]) < 1e-3f);
+    CHECK(show.radius > 2.0f && fabsf(show.middle[2] - 1.5f) < 1e-3f);
+    ssdgs_scene_destroy(scene);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(show.models[i]);
+    free(show.planes), free(show.bytes);
+}
+
 int main(void) {
     static const char page[] = "build/t_view.html";
     char error[512] = "";
@@ -390,6 +424,7 @@ int main(void) {
     test_trouble();
     test_pictures(thread);
     test_photographs();
+    test_plain();
     view_close(&here);
     ssdgs_model_destroy(here.show.models[0]);
     ssdgs_context_destroy(here.show.context);
