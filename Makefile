@@ -42,7 +42,7 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 view: $(BUILD)/view ## a trained model in the browser: prints the address to open
 	$(BUILD)/view examples/data/waxcow.ply
 
-web: $(BUILD)/web.wasm ## one page that needs no server: build/view.html (MODEL=file.ply); needs emscripten
+web: $(BUILD)/web.wasm $(MODEL) ## one page that needs no server: build/view.html (MODEL=file.ply); needs emscripten
 	{ echo '<script type="text/plain" id="code">'; base64 <$(BUILD)/web.wasm; echo '</script>'; \
 	  echo '<script type="text/plain" id="model" data-name="$(notdir $(MODEL))">'; base64 <$(MODEL); echo '</script>'; } >$(BUILD)/web.txt
 	sed -e '/<!-- make web/{r $(BUILD)/web.txt' -e 'd;}' examples/view.html >$(BUILD)/view.html

@@ -97,9 +97,9 @@ THREADS
 
 DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
-  training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2,
-WebAssembly's SIMD128 and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their
-libm does.
+  training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, SIMD128 of
+  WebAssembly and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm
+  does.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
@@ -133,8 +133,9 @@ SCENES, as engines have them: examples/engine.c is one
       ssdgs_scene_render()           with the meshes' depth as image.scene_depth, their shadows on splats
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
-  A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range: they
-cost what they reach, and keep their maps while nothing there moves. Lights without shadow have no map.
+  A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range:
+  they cost what they reach, and keep their maps while nothing there moves. Lights without shadow have no
+  map.
   options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
   An object says how rough, bright and translucent its model is here. In models made in code
   settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: beside path
@@ -273,8 +274,8 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_parallel parallel;          /* threads of the context's own */
     ssdgs_tracer tracer;              /* none */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
-    int threads;   /* how many of its own, the caller counted; 0 = one per CPU, at most 1024. With `parallel`:
-                      how many that   has; 0 = 4. It is given thrice as many tasks at once */
+    int threads;   /* its own, the caller counted, up to 1024; 0 = one per CPU. With `parallel`: how many that
+                      has; 0 = 4. It is given thrice as many tasks at once */
     ssdgs_isa isa; /* the best this CPU has; ERR_ISA where one is missing */
 } ssdgs_context_desc;
 
@@ -294,7 +295,7 @@ SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
 SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
 SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa);
 SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context); /* the one in use */
-SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);   /* how many work */
+SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);   /* how many work; with parallel: its */
 
 /* ---- model ---- */
 
@@ -587,8 +588,8 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options);
 /* What of a light passes the scene's objects on the way to points (count,3), world: fraction (count), 0 .. 1.
-   By the maps of the last ssdgs_scene_light(), which note the first 2 % lost. ERR_ARGUMENT: they are of
-   fewer lights. */
+   By the maps of the last ssdgs_scene_light(), which note the first 2 % lost. ERR_ARGUMENT: there is
+   none of that light, or that frame failed. */
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
 
@@ -1008,7 +1009,7 @@ typedef struct ssdgs_placed {
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
     int moved;                                /* since the last frame */
-    double middle[3], radius; /* world: a ball around what it draws; set only with several objects */
+    double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
     ssdgs_real tint[3], roughness, specular, translucency;
     ssdgs_real medium[15];      /* RGB weights of true transport's lengths, where a medium scatters */
     const unsigned char *mask;  /* as in ssdgs_object */
@@ -3210,7 +3211,8 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
     model->frame = NULL;
     model->context = to;
     model->revision = ++to->revisions;
-    model->box_revision = model->exposure_revision = 0; /* they counted in `from` */
+    model->box_revision = 0; /* they counted in `from` */
+    model->exposure_revision = 0;
     to->references++;
     return SSDGS_OK;
 }
@@ -7603,7 +7605,8 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     if (count < 0 || (count && (!points || !fraction)))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            count < 0 ? "%d points" : "%d points, but an array is NULL", count);
-    if (!m || !m->cache.lights_ready || !m->cache.maps || light < 0 || light >= m->cache.light_count)
+    if (!m || m->cache.objects < 0 || !m->cache.lights_ready || !m->cache.maps || light < 0 ||
+        light >= m->cache.light_count)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
                            light);
     const ssdgs__cached_light *lights = (const ssdgs__cached_light *)m->cached_lights.memory;
@@ -9629,7 +9632,7 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
     return terms;
 }
 
-/* The last iteration up to this one after which opacities are reset; 0: none. */
+/* The last multiple of opacity_reset_every up to an iteration if opacities are reset after it, or 0. */
 static int ssdgs__last_reset(const ssdgs_train_options *o, int iteration) {
     const int every = o->opacity_reset_every, last = every ? iteration - iteration % every : 0;
     return ssdgs__schedule_time(o, last + every / 2) <= o->densify_until ? last : 0;
@@ -9800,7 +9803,7 @@ static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], co
     for (int i = 0; i < 3; i++) moves[11 + i] = (double)frame->ambient_gradient[i];
 }
 
-#define SSDGS__PIXELS 1024               /* of an exposure task */
+#define SSDGS__PIXELS 1024               /* of a store task */
 #define SSDGS__CLIPPED (ssdgs_real)0.999 /* stored values beyond may have been more */
 
 typedef struct ssdgs__store_job {
@@ -11116,7 +11119,7 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     for (int i = 0; !result && i <= photo->more_count; i++)
         if (ssdgs__photo_light(photo, i)->unshadowed)
             result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                 "light %d is unshadowed, but a photograph's lights have shadows", i);
+                                 "a photograph's lights have shadows; one of these is unshadowed");
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && ((int)photo->format < 0 || photo->format > SSDGS_PIXELS_RGBA32F))
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
@@ -12831,7 +12834,7 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 /* The kernels call them; the host calls their scalar forms. */
 
 #ifdef SSDGS_REAL64
-SSDGS__FI V F(exp)(V x) { return exp(VMIN(x, 700.0)); }
+SSDGS__FI V F(exp)(V x) { return exp(VMIN(700.0, x)); }
 SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
 SSDGS__FI V F(log)(V x) { return log(x); }
 SSDGS__FI void F(sincos)(V x, V *s, V *c) {
@@ -12967,7 +12970,7 @@ SSDGS__FI void F(rotation_backward)(V d_raw[4], const V q[4], V inverse, const V
 SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
-        const VM curved = VAND(VGE(x, VSET(0.0031308)), VGE(VSET(FLT_MAX), x)); /* NaN and infinity stay */
+        const VM curved = VAND(VGE(x, VSET(0.0031308)), VLT(VSUB(x, x), VSET(1))); /* NaN and infinity stay */
         const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
         VSTORE(out + i, VSEL(curved, VSUB(power, VSET(0.055)), VMUL(x, VSET(12.92))));
         if (slope) VSTORE(slope + i, VSEL(curved, VDIV(power, VMUL(safe, VSET(2.4))), VSET(12.92)));
@@ -12978,7 +12981,7 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
         const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
         const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
-        const VM curved = VAND(VGE(x, VSET(0.04045)), VGE(VSET(FLT_MAX), x)); /* NaN and infinity stay */
+        const VM curved = VAND(VGE(x, VSET(0.04045)), VLT(VSUB(x, x), VSET(1))); /* NaN and infinity stay */
         VSTORE(out + i, VSEL(curved, power, VMUL(x, VSET(1 / 12.92))));
     }
 }

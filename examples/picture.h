@@ -218,8 +218,8 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
     const size_t pixels = (size_t)width * (size_t)height;
     const float light_scale = ssdgs_model_settings(s->models[0])->light_scale;
     int lit = 0; /* the first model that is not baked says how colours are stored */
-    while (lit < s->count - 1 && ssdgs_model_settings(s->models[lit])->baked) lit++;
-    const int transfer = ssdgs_model_settings(s->models[lit])->transfer;
+    while (lit < s->count && ssdgs_model_settings(s->models[lit])->baked) lit++;
+    const int transfer = ssdgs_model_settings(s->models[lit < s->count ? lit : 0])->transfer;
     if (!view__room(s, pixels)) return SSDGS_ERR_MEMORY;
     float eye[3], target[3], up[3], *value = s->planes, *alpha = s->planes + 3 * pixels;
     ssdgs_light lights[VIEW__LIGHTS];

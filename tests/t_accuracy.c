@@ -229,7 +229,7 @@ static void test_law(const struct law *law, uint64_t step) {
             apply(law->map);
             for (int i = 0; i < CHUNK; i++) {
                 const double error = fabs((double)out[i] - want[i]) * scale[i];
-                most = error > most ? error : most;
+                most = test_most(most, error);
             }
             if (!k->finite(out, CHUNK)) most = 1e300;
             for (int i = 0; most > worst[isa] && i < CHUNK; i++)

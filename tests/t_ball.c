@@ -62,7 +62,7 @@ int main(void) {
             if (!CHECK(!highlight(rgba, W, H, circle, at) && reflected(circle, at, focal, centre, got)))
                 continue;
             const double cosine = got[0] * light[0] - got[1] * light[1] - got[2] * light[2];
-            worst = fmax(worst, acos(fmin(1, cosine)));
+            worst = test_most(worst, acos(cosine < 1 ? cosine : 1));
             if (place) continue;
             CHECK(reflected(circle, at, 0, centre, got)); /* a lens so long hardly matters */
             worst_far =

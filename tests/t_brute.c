@@ -1489,9 +1489,9 @@ static void test_normals(void) {
                         const int known = inside && depth[y * WIDTH + x] > 0 &&
                                           depth[y * WIDTH + x - 1] > 0 && depth[y * WIDTH + x + 1] > 0 &&
                                           depth[(y - 1) * WIDTH + x] > 0 && depth[(y + 1) * WIDTH + x] > 0;
-                        most = fmax(most, fabs((double)got[3 * SIZE] / weight - known));
+                        most = test_most(most, fabs((double)got[3 * SIZE] / weight - known));
                         for (int c = 0; c < 3 && !known; c++)
-                            most = fmax(most, fabs((double)got[c * SIZE]) / weight);
+                            most = test_most(most, fabs((double)got[c * SIZE]) / weight);
                         if (!known) continue;
                         double n[3];
                         if (index < 10)
@@ -1502,7 +1502,7 @@ static void test_normals(void) {
                             const double world = (double)s.camera.view[c] * n[0] +
                                                  (double)s.camera.view[4 + c] * n[1] +
                                                  (double)s.camera.view[8 + c] * n[2];
-                            most = fmax(most, fabs((double)got[c * SIZE] / weight + world));
+                            most = test_most(most, fabs((double)got[c * SIZE] / weight + world));
                         }
                     }
             }

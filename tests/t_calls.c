@@ -592,7 +592,7 @@ static void test_blended(void) {
                     error = (bytes[i] - 255 * (bend ? curve(now) : now)) / 1e4;
                     if (!(a > 0)) CHECK(bytes[i] == bytes_before[i]);
                 }
-                worst = fabs(error) > worst ? fabs(error) : worst;
+                worst = test_most(worst, fabs(error));
             }
             CHECK(worst < (format == SSDGS_RGBA32F ? 1e-6 : 1.1e-4));
         }

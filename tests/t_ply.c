@@ -674,7 +674,8 @@ static void test_versions(void) {
         ssdgs_model *back = NULL, *bare = NULL;
         *setting[0] = cases[i].version;
         if (!cases[i].loads) {
-            CHECK(refused(file.data, file.size) && strstr(ssdgs_error_message(context), "; this library reads 1 to "));
+            CHECK(refused(file.data, file.size) &&
+                  strstr(ssdgs_error_message(context), "; this library reads 1 to "));
             continue;
         }
         CHECK(load(file.data, file.size, &back, NULL) == SSDGS_OK &&

@@ -237,7 +237,7 @@ static void test_looks(void) {
     static ssdgs_real whole[3 * PIXELS], reduced[3 * PIXELS], fewer[3 * PIXELS];
     static const int terms[6] = {SSDGS_DIFFUSE_TERM, 3, 5, 9, 15, 0};
     ssdgs_context *context = open_context(2);
-    for (int i = 0; i < 3; i++) {
+    for (size_t i = 0; i < sizeof terms / sizeof *terms; i++) {
         ssdgs_model *model = striped(context, 4000, 1, terms[i]), *half = striped(context, 4000, 2, terms[i]);
         double power = 0;
         picture(model, whole);
@@ -247,7 +247,7 @@ static void test_looks(void) {
         for (int k = 0; k < 3 * PIXELS; k++) power += (double)whole[k] * (double)whole[k];
         const double left = error_of(whole, reduced) / power, dropped = error_of(whole, fewer) / power;
         if (!CHECK(left < 4e-3 && left < 0.05 * dropped))
-            printf("    %d: %g, every other one %g\n", i, left, dropped);
+            printf("    terms %d: %g, every other one %g\n", terms[i], left, dropped);
         ssdgs_model_destroy(model);
         ssdgs_model_destroy(half);
     }

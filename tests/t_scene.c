@@ -559,7 +559,7 @@ static void test_query(void) {
                 /* a Gaussian's shadow begins at its centre's distance, less the bias */
                 if (fabs(z - 0.5) < 0.15) continue;
                 const double error = fabs((double)fraction[i] - want);
-                worst = error > worst ? error : worst;
+                worst = test_most(worst, error);
                 mean += error;
             }
             CHECK(worst < 0.105 && mean < 0.02 * (double)POINTS); /* between a map's levels */
@@ -1182,15 +1182,17 @@ static void test_threads_and_memory(void) {
     context = was, scene = was_scene;
 }
 
-/* A frame that any allocation fails leaves no light's map, not that of the frame before either; the next one
-   makes them as a scene that is new does. */
+/* A frame in which any one allocation fails leaves no light's map, not that of the frame before either; the
+   next one makes them as a scene that is new does. */
 static void test_failed_frame(void) {
-    enum { LIGHTS = 8 };
+    enum { LIGHTS = 8, OBJECTS = 40 };
     ssdgs_settings s = small_settings();
+    ssdgs_object object[OBJECTS];
     ssdgs_context *was = context;
     ssdgs_light lights[LIGHTS];
     int failed = 0, wrong = 0;
-    for (int k = 0; k < 100; k++) {
+    for (int k = 0; k < 160; k++) {
+        const int many = k / 2 % 2 ? OBJECTS : 1; /* objects of the second frame */
         const ssdgs_real point[3] = {0, 0, -1};
         ssdgs_scene *scenes[2] = {NULL, NULL};
         ssdgs_context_desc desc;
@@ -1201,18 +1203,21 @@ static void test_failed_frame(void) {
         CHECK(!ssdgs_context_create(&desc, &context));
         for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_create(context, scenes + i));
         ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
-        const ssdgs_object object = ssdgs_object_default(plate);
+        for (int i = 0; i < OBJECTS; i++) {
+            object[i] = ssdgs_object_default(plate);
+            object[i].to_world[3] = (ssdgs_real)(5 * i);
+        }
         for (int i = 0; i < LIGHTS; i++) lights[i] = point_light(0.1 * i, 0, 3);
-        CHECK(!ssdgs_scene_light(*scenes, &object, 1, lights, k % 2 ? LIGHTS : 1, NULL));
+        CHECK(!ssdgs_scene_light(*scenes, object, 1, lights, k % 2 ? LIGHTS : 1, NULL));
         lights[0] = point_light(3, 0, 0.2); /* past the plate's edge */
-        fails_after = k / 2;
-        const ssdgs_result result = ssdgs_scene_light(*scenes, &object, 1, lights, LIGHTS, NULL);
+        fails_after = k / 4;
+        const ssdgs_result result = ssdgs_scene_light(*scenes, object, many, lights, LIGHTS, NULL);
         fails_after = -1;
         ssdgs_real fraction[2];
         failed += result == SSDGS_ERR_MEMORY;
         for (int i = 0; i < LIGHTS && result; i++)
             wrong += ssdgs_scene_shadow(*scenes, i, point, 1, fraction) != SSDGS_ERR_ARGUMENT;
-        for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_light(scenes[i], &object, 1, lights, LIGHTS, NULL));
+        for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_light(scenes[i], object, many, lights, LIGHTS, NULL));
         for (int i = 0; i < LIGHTS; i++) {
             for (int j = 0; j < 2; j++) CHECK(!ssdgs_scene_shadow(scenes[j], i, point, 1, fraction + j));
             wrong += memcmp(fraction, fraction + 1, sizeof *fraction) != 0;
@@ -1348,6 +1353,19 @@ static void test_moved_over(void) {
     ssdgs_model_arrays(comes);
     alone(comes, &camera, &light, 1, &options, shot + 1);
     CHECK(same(shot, shot + 1));
+    /* nor its box, by which what is out of sight is left out */
+    CHECK(!ssdgs_scene_create(one, &kept) && !ssdgs_model_move(comes, one));
+    ssdgs_object pair[2] = {ssdgs_object_default(comes), ssdgs_object_default(comes)};
+    pair[1].to_world[11] = 100;
+    CHECK(!ssdgs_scene_render(kept, pair, 2, &camera, &light, 1, NULL, &image, NULL));
+    ssdgs_scene_destroy(kept);
+    for (size_t i = 0; i < 300; i++) ssdgs_model_arrays(comes).gaussians[2 * comes->capacity + i] += 1000;
+    two->revisions = comes->box_revision - 1;
+    pair[0].to_world[11] = -1000;
+    CHECK(!ssdgs_model_move(comes, two) && !ssdgs_scene_create(two, &kept));
+    CHECK(!ssdgs_scene_render(kept, pair, 2, &camera, &light, 1, NULL, &image, &shot[1].stats));
+    CHECK(shot[1].stats.objects == 1);
+    ssdgs_scene_destroy(kept);
     ssdgs_model_destroy(comes);
     ssdgs_context_destroy(one), ssdgs_context_destroy(two);
     context = was;

@@ -428,12 +428,11 @@ static void row_56(void) {
             ssdgs__loss_values values;
             const ssdgs__images images = {image, image, SIDE, SIDE};
             CHECK(!ssdgs__loss(context, &memory, &images, 1, gradient, &values));
-            for (int j = 0; j < 3 * LARGEST; j++)
-                here = fabs((double)gradient[j]) > here ? fabs((double)gradient[j]) : here;
+            for (int j = 0; j < 3 * LARGEST; j++) here = test_most(here, fabs((double)gradient[j]));
             here *= 3 * LARGEST;
             if (!CHECK(fabs(values.ssim - 1) < 1e-7) || !CHECK(here < (i == 3 ? 1e-2 : 6e-4)))
                 printf("    %s, image %d: SSIM - 1 = %g, gradient %g\n", NAME(isa), i, values.ssim - 1, here);
-            worst = fabs(values.ssim - 1) > worst ? fabs(values.ssim - 1) : worst;
+            worst = test_most(worst, fabs(values.ssim - 1));
             steepest = here > steepest ? here : steepest;
             CHECK(values.l1 <= 0 && values.mse <= 0);
             ssdgs__release(context, memory.memory);
@@ -694,9 +693,8 @@ static void row_63(void) {
             double want[9], integral[9];
             exponential(value + 3, want, integral);
             for (int i = 0; i < 9; i++) {
-                worst = fabs(e[i] - want[i]) > worst ? fabs(e[i] - want[i]) : worst;
-                worst = fabs(jacobian[i] - integral[i]) > worst ? fabs(jacobian[i] - integral[i]) : worst;
-                if (!test_finite(e[i]) || !test_finite(jacobian[i])) worst = 1;
+                worst = test_most(worst, fabs(e[i] - want[i]));
+                worst = test_most(worst, fabs(jacobian[i] - integral[i]));
             }
             double d[6];
             ssdgs__correct_backward(&photos[1], value, weight, d);
@@ -713,7 +711,7 @@ static void row_63(void) {
                         (difference[half] - weighted_view(&photos[1], moved, weight)) / (2 * h);
                 }
                 difference[0] = (4 * difference[1] - difference[0]) / 3;
-                slope = fabs(d[i] - difference[0]) > slope ? fabs(d[i] - difference[0]) : slope;
+                slope = test_most(slope, fabs(d[i] - difference[0]));
             }
         }
     printf("figure rotation_series_error %.2g\nfigure pose_gradient_error %.2g\n", worst, slope);

@@ -876,7 +876,7 @@ static void test_refinement(void) {
                 ssdgs_photo now;
                 CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
                 const double factor = log((double)(now.light.intensity[1] / photos[p].light.intensity[1]));
-                if (pass) worst = fmax(worst, fabs(factor - (learns ? mean : 0)));
+                if (pass) worst = test_most(worst, fabs(factor - (learns ? mean : 0)));
                 else {
                     mean += factor / PHOTOS;
                     told += trainer->corrections[p].sure * trainer->corrections[p].value[9];
@@ -1271,7 +1271,7 @@ static void test_one_light(void) {
                              more = (double)(gradient[1][c * MANY + i] - gradient[0][c * MANY + i]);
                 const int doubted = known && c >= SSDGS_SPECULAR && c < SSDGS_SCATTERING + 3;
                 if (doubted) weights += more * (1 + exp(-x)) * SIDE * SIDE / (2 * SSDGS__DOUBT);
-                else worst = fmax(worst, fabs(more));
+                else worst = test_most(worst, fabs(more));
             }
         CHECK(shown > 100 && worst == 0);
         if (!CHECK(fabs(weights - (known ? shown : 0)) < 1e-3 * shown))
@@ -1321,7 +1321,7 @@ static void test_anchor(void) {
         ssdgs__anchor_cameras(trainer);
         for (int p = 0; p < PHOTOS; p++)
             for (int i = 0; i < 6; i++)
-                worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
+                worst = test_most(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
     }
     if (!CHECK(worst < 2e-6)) printf("    off by %g\n", worst);
     memset(trainer->corrections, 0, PHOTOS * sizeof *trainer->corrections);
@@ -1331,7 +1331,7 @@ static void test_anchor(void) {
     int p;
     for (p = 0, worst = 0; p < PHOTOS; p++)
         for (int i = 0; i < 6; i++) {
-            worst = fmax(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
+            worst = test_most(worst, fabs(trainer->corrections[p].value[i] - kept[p].value[i]));
             largest = fmax(largest, fabs(kept[p].value[i]));
         }
     if (!CHECK(largest > 1e-4 &&

@@ -378,10 +378,10 @@ static void test_plain(void) {
     view__wish wish;
     char problem[128];
     settings.baked = 1;
-    settings.transfer = SSDGS_TRANSFER_NONE;
     show.context = here.show.context;
     for (int i = 0; i < 2; i++) {
         ssdgs_gaussian g = ssdgs_gaussian_default();
+        settings.transfer = i ? SSDGS_TRANSFER_SRGB : SSDGS_TRANSFER_NONE; /* the first says */
         CHECK(!ssdgs_model_create(show.context, &settings, 1, show.models + i));
         for (int c = 0; c < 3; c++) g.scale[c] = 0.2f, g.diffuse[c] = 0.5f;
         g.position[1] = 7.0f * (float)i, g.position[2] = 3.0f * (float)i;
@@ -395,6 +395,12 @@ static void test_plain(void) {
     show.count = 2;
     show.radius = 0;
     CHECK(!view_arrange(&show));
+    char place[96];
+    snprintf(place, sizeof place, "w=32&h=32&eye=%g,-3,0&target=%g,0,0", (double)show.objects[0].to_world[3],
+             (double)show.objects[0].to_world[3]);
+    CHECK(view__read_wish(place, &wish, problem, sizeof problem) &&
+          !view__draw(&show, &scene, &wish, &stats));
+    CHECK(abs(show.bytes[4 * (16 * 32 + 16)] - 127) < 6);
     CHECK(fabsf(show.objects[1].to_world[7] + 7) < 1e-3f && fabsf(show.middle[1]) < 1e-3f);
     CHECK(show.radius > 2.0f && fabsf(show.middle[2] - 1.5f) < 1e-3f);
     ssdgs_scene_destroy(scene);

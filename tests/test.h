@@ -34,9 +34,16 @@ static inline double test_uniform(uint64_t key, uint64_t counter) {
     return (double)((x ^ (x >> 32)) >> 11) * (1.0 / 9007199254740992.0);
 }
 
-/* How far got is outside of absolute + relative * |want|: 1 is just inside. */
+/* How far got is outside of absolute + relative * |want|: 1 is just inside. What is not finite is far. */
 static inline double test_error(double got, double want, double absolute, double relative) {
-    return test_finite(got) ? fabs(got - want) / (absolute + relative * fabs(want) + 1e-300) : 1e300;
+    if (!test_finite(got) || !test_finite(want)) return 1e300;
+    return fabs(got - want) / (absolute + relative * fabs(want) + 1e-300);
+}
+
+/* The larger of both; an error that is not finite is the largest. */
+static inline double test_most(double most, double error) {
+    if (!test_finite(error)) error = 1e300;
+    return error > most ? error : most;
 }
 
 /* |got - want|^2 and |want|^2: is that within the bound? */

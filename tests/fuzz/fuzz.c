@@ -1,7 +1,8 @@
-/* Everything that reads what others wrote, and every number a caller may set, under any bytes at all. Two
-   ways to build it: build/fuzz FILE...              runs each file once, as the target that its folder is
-   named after: seeds and past findings -DLIBFUZZER -fsanitize=fuzzer   libFuzzer, as the target that the
-   program is named after (`make fuzz`) A finding ends the program. */
+/* Everything that reads what others wrote, and most numbers that a caller may set, under any bytes at all.
+   Built plainly, it runs each FILE once, as the target that its folder is named after: seeds and past
+   findings. Built with -DLIBFUZZER -fsanitize=fuzzer (`make fuzz`), it is libFuzzer for the target that the
+   program is named after. A finding ends the program. Not drawn: scenes, spots, ranges, ambient light, media,
+   batches. */
 #define SSDGS_IMPLEMENTATION
 #include "../../ssdgs.h"
 #include "../../examples/olat.h"
