@@ -4533,6 +4533,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         for (const int end = j + cached[i].views; j < end; j++) frame->views[j].cached = cached[i].kept;
     }
     m->cache.camera_ready = 0; /* again once the walks are done */
+    memset(m->cache.counts, 0, sizeof m->cache.counts);
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));

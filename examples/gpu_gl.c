@@ -29,10 +29,11 @@
 typedef struct gpu gpu;
 gpu *gpu_create(char *message, size_t size); /* NULL: message says why, as where there is no OpenGL 4.3 */
 void gpu_destroy(gpu *g);                    /* after the contexts that have its hook; NULL is fine */
-ssdgs_gpu_hook gpu_hook(gpu *g);
+ssdgs_gpu_hook gpu_hook(gpu *g);    /* for several contexts, in one call at a time. Once the device fails all
+                                       frames are the CPU's */
 const char *gpu_name(const gpu *g); /* of the device */
-/* 1: a stage ends when the device is done with it, for timing. 0, as at first: all of a frame's start at
- * once. */
+/* 1: each stage ends when the device is done with it, for timing. 0, the default: the device gets a frame's
+   stages all at once. */
 void gpu_wait(gpu *g, int waits);
 
 /* ==== EGL and OpenGL ==== */
@@ -70,8 +71,9 @@ void gpu_wait(gpu *g, int waits);
 enum {
     GPU_GL_OUT_OF_MEMORY = 0x0505,
     GPU_GL_RENDERER = 0x1F01,
-    GPU_GL_MAJOR_VERSION = 0x821B,
-    GPU_GL_MINOR_VERSION = 0x821C,
+    GPU_GL_STORAGE_BLOCKS = 0x90DB, /* of a compute program */
+    GPU_GL_STORAGE_BINDINGS = 0x90DD,
+    GPU_GL_STORAGE_BLOCK_SIZE = 0x90DE,
     GPU_GL_STREAM_READ = 0x88E1,
     GPU_GL_DYNAMIC_DRAW = 0x88E8,
     GPU_GL_UNIFORM_BUFFER = 0x8A11,
@@ -84,7 +86,6 @@ enum {
     GPU_GL_BUFFER_UPDATE_BARRIER_BIT = 0x0200,
     GPU_GL_SHADER_STORAGE_BARRIER_BIT = 0x2000,
     GPU_EGL_DEVICES = 16,
-    GPU_EGL_EXTENSIONS = 0x3055,
     GPU_EGL_READ = 0x305A,
     GPU_EGL_DRAW = 0x3059,
     GPU_EGL_MAJOR_VERSION = 0x3098,
@@ -204,6 +205,7 @@ typedef struct gpu_scratch {
 struct gpu {
     gpu_egl egl;
     gpu_gl gl;
+    int32_t most; /* bytes of a buffer that programs can see */
     gpu_current callers;
     uint32_t program[GPU_PROGRAMS];
     gpu_buffer parameters, staging; /* staging: what downloads go by */
@@ -731,13 +733,13 @@ float dipole(float ss, float sa, float r) {
 }
 /* Of the scattering network's answers. */
 vec3 profile() {
-    vec3 found;
-    for (int c = 0; c < 3; c++) {
+    vec3 found = vec3(0.0);
+    for (int c = 0; c < (on(per_channel_optics) ? 3 : 1); c++) {
         ivec3 at = on(per_channel_optics) ? ivec3(c, 3 + c, 6) : ivec3(0, 1, 2);
         vec3 unit = sigmoid(vec3(answer_of(at.x), answer_of(at.y), answer_of(at.z)));
         found[c] = dipole(2.0 * unit.x + 0.05, 2.0 * unit.y + 0.05, 3.0 * unit.z + 0.1);
     }
-    return found;
+    return on(per_channel_optics) ? found : found.xxx;
 }
 /* Adds a light's; `arrives` of transport's lengths. Deferred ones are without S. */
 void add_colour(vec3 intensity, float shadow, float arrives[lengths]) {
@@ -1491,7 +1493,8 @@ void main() {
     t = inside() ? 1 : -1;
     over = 0;
     if (lane() == 0u) lit = 0u;
-    for (uint from = begin; from < end; from += window) {
+    uint from = begin;
+    for (; from < end && !dark; from += window) {
         uint entries = min(window, end - from);
         barrier();
         if (lane() < 16u * words) blends[lane()] = 0u;
@@ -1500,7 +1503,7 @@ void main() {
         else masks[lane()] = 0u;
         find_covered();
         float before = t;
-        for (uint round = thrifty ? 0u : 1u; round < 2u && !dark; round++) {
+        for (uint round = thrifty ? 0u : 1u; round < 2u; round++) {
             t = before;
             for (uint word = 0u; word < words && t >= stop; word++) {
                 uint rest = covered[words * micro() + word];
@@ -1520,7 +1523,11 @@ void main() {
             tile_seen[from + lane()] = mask;
             if (thrifty) tile_needed[from + lane()] = (heavy[word] | must[word]) >> place & 1u;
         }
-        dark = dark || is_dark(t, ++step);
+        dark = is_dark(t, ++step);
+    }
+    for (uint i = from + lane(); i < end; i += 256u) {
+        tile_seen[i] = 0u;
+        if (thrifty) tile_needed[i] = 0u;
     }
 }
 );
@@ -2015,6 +2022,8 @@ static int gpu_enter_context(gpu *g) {
     return 0;
 }
 
+enum { GPU_MOST_BLOCKS = 11 }; /* storage blocks of a program: SHADE's */
+
 /* Is there OpenGL 4.3 on the display? Then its context is g's. Displays are shared by all of a process, so
    none is ever closed. */
 static int gpu_try_display(gpu *g, void *display) {
@@ -2030,7 +2039,14 @@ static int gpu_try_display(gpu *g, void *display) {
     egl->BindAPI(api);
     if (!egl->context) return 0;
     if (gpu_enter_context(g)) {
-        const int found = gpu_load_gl(g);
+        int found = gpu_load_gl(g);
+        int32_t blocks = 0, bindings = 0;
+        if (found) {
+            g->gl.GetIntegerv(GPU_GL_STORAGE_BLOCKS, &blocks);
+            g->gl.GetIntegerv(GPU_GL_STORAGE_BINDINGS, &bindings);
+            g->gl.GetIntegerv(GPU_GL_STORAGE_BLOCK_SIZE, &g->most);
+        }
+        found = blocks >= GPU_MOST_BLOCKS && bindings >= GPU_MOST_BLOCKS; /* OpenGL promises 8 */
         if (found) snprintf(g->name, sizeof g->name, "%s", (const char *)g->gl.GetString(GPU_GL_RENDERER));
         gpu_leave_context(g);
         if (found) return 1;
@@ -2091,7 +2107,12 @@ static ssdgs_result gpu_leave(gpu *g, const char *stage) {
 static void gpu_reserve(gpu *g, gpu_buffer *b, size_t size) {
     if (g->result || (b->name && b->size >= size)) return;
     const size_t more = b->size + b->size / 2;
-    if (size < more) size = more;
+    if (size < more && more <= (size_t)g->most) size = more;
+    if (size > (size_t)g->most) { /* so that 32 bits count the values of any buffer, too */
+        gpu_fail(g, SSDGS_ERR_MEMORY, "a buffer of %lu bytes, where programs can see %lu",
+                 (unsigned long)size, (unsigned long)g->most);
+        return;
+    }
     g->owner = NULL; /* it may have been something that is kept */
     if (!b->name) g->gl.GenBuffers(1, &b->name);
     g->gl.BindBuffer(GPU_GL_SHADER_STORAGE_BUFFER, b->name);
@@ -2166,7 +2187,9 @@ static void gpu_use(gpu *g, gpu_program which, const void *parameters, size_t si
     g->gl.UseProgram(g->program[which]);
     if (!g->parameters.name) g->gl.GenBuffers(1, &g->parameters.name);
     g->gl.BindBufferBase(GPU_GL_UNIFORM_BUFFER, 0, g->parameters.name);
-    g->gl.BufferData(GPU_GL_UNIFORM_BUFFER, (intptr_t)size, parameters, GPU_GL_DYNAMIC_DRAW);
+    unsigned char block[1024] = {0}; /* a std140 block's size is a multiple of 16; the largest has 800 */
+    memcpy(block, parameters, size);
+    g->gl.BufferData(GPU_GL_UNIFORM_BUFFER, (intptr_t)((size + 15) / 16 * 16), block, GPU_GL_DYNAMIC_DRAW);
 }
 
 static void gpu_bind(gpu *g, uint32_t binding, const gpu_buffer *b) {
@@ -2300,6 +2323,9 @@ static void gpu_axes(const ssdgs_real *raw, double axes[3][3]) {
     }
 }
 
+/* As the CPU's, of what its numbers can hold. */
+static float gpu_exp(double x) { return (float)exp(x > 87 ? 87 : x < -87 ? -87 : x); }
+
 /* The lobes that all Gaussians share. */
 static void gpu_find_basis(const ssdgs_placed *o, float basis[3 * SSDGS_ASG_COUNT][4]) {
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
@@ -2309,9 +2335,9 @@ static void gpu_find_basis(const ssdgs_placed *o, float basis[3 * SSDGS_ASG_COUN
         raw = raw > most ? most : raw < least ? least : raw;
         gpu_axes(o->gaussians.asg_basis + 4 * j, axes);
         for (int i = 0; i < 6; i++) basis[3 * j + i / 3][i % 3] = (float)axes[i / 3][i % 3];
-        for (int i = 0; i < 2; i++) basis[3 * j + i][3] = (float)exp((double)sharpness[i]);
+        for (int i = 0; i < 2; i++) basis[3 * j + i][3] = gpu_exp((double)sharpness[i]);
         basis[3 * j + 2][0] = (float)gpu_sigmoid((double)sharpness[1]);
-        basis[3 * j + 2][1] = (float)exp((double)sharpness[0]);
+        basis[3 * j + 2][1] = gpu_exp((double)sharpness[0]);
         basis[3 * j + 2][2] = (float)(log1p(exp(-fabs(raw))) + (raw > 0 ? raw : 0));
     }
 }
@@ -2441,7 +2467,7 @@ static void gpu_upload_faces(gpu *g, const ssdgs_frame *frame) {
 }
 
 static void gpu_seen_program(gpu *g, gpu_program which, uint32_t count, uint32_t layers, size_t groups) {
-    const uint32_t parameters[4] = {count, layers, 0, 0};
+    const uint32_t parameters[2] = {count, layers};
     gpu_frame *f = &g->frame;
     const gpu_buffer *const buffers[6] = {&f->seen,       &f->tally, &f->shaded,
                                           &f->neighbours, &f->color, &f->layers};
@@ -2652,7 +2678,7 @@ static void gpu_bin_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *t
            (uint32_t)(v->height + 15) / 16,
            (uint32_t)room,
            gpu_log2_threshold(frame)};
-    int bits = 0, end;
+    int bits = 1, end; /* one pass at least: it numbers the instances */
     gpu_reserve_instances(g, frame, v, to);
     gpu_use(g, GPU_BIN_COUNT, &p, sizeof p);
     gpu_bind(g, 0, &g->frame.facts);
@@ -2930,8 +2956,9 @@ static void gpu_run_stages(gpu *g, ssdgs_frame *frame, ssdgs_stage first, ssdgs_
     for (int stage = (int)first; stage <= (int)last; stage++) gpu_run_stage(g, frame, (ssdgs_stage)stage);
 }
 
-/* Reads what the device has counted: 1 where every list had room, else there is more from now on. This and
-   gpu_end_frame() are what waits for the device. What is counted of a view that was kept is its last. */
+/* Reads what the device has counted: 1 where every list had room, else there is more from now on. This,
+   gpu_end_frame() and uploads in mid-frame wait for the device. What is counted of a view that was kept is
+   its last. */
 static int gpu_had_room(gpu *g, ssdgs_frame *frame) {
     const size_t size = (size_t)frame->view_count * sizeof(gpu_fact);
     gpu_fact *facts = (gpu_fact *)gpu_host(g, size);
@@ -2992,11 +3019,11 @@ static int gpu_takes(const gpu *g, const ssdgs_frame *frame) {
     return plain && !o->turned && gpu_is(o->scale, 1) && !o->settings.baked && !o->mask && o->gaussians.count;
 }
 
-/* gpu_leave() for a hook: a failure ends the frame, and later ones are the CPU's. */
+/* gpu_leave() for a hook: a failure ends the frame; where it is the device's later ones are the CPU's. */
 static ssdgs_result gpu_answer(gpu *g, ssdgs_frame *frame, const char *what) {
     const ssdgs_result result = gpu_leave(g, what);
     if (!result) return SSDGS_OK;
-    g->lost = 1;
+    g->lost = result != SSDGS_ERR_LIMIT; /* the device is well: it was this frame */
     g->owner = NULL;
     return ssdgs_stage_fail(frame, result, g->message);
 }

@@ -1225,6 +1225,40 @@ static void without_drivers(void) {
     CHECK(child > 0 && waitpid(child, &status, 0) == child && status == 0);
 }
 
+/* A picture and light maps of one tile, 16 pixels a side. */
+static void one_tile(void) {
+    ssdgs_context *const own = context;
+    static ssdgs_real color[2][16 * 16 * 3];
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    for (int i = 0; i < 2; i++) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.gpu = i ? &hook : NULL;
+        if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+        ssdgs_settings settings = small_settings();
+        settings.light_map.size = 16;
+        ssdgs_model *model = cloud(&settings, 0, 300, 1);
+        ssdgs_camera camera = camera_from(3, 0, 1);
+        const ssdgs_light light = point_light(2, 3, 4);
+        const ssdgs_render_options options = ssdgs_render_options_exact();
+        ssdgs_image image;
+        memset(&image, 0, sizeof image);
+        image.color = color[i];
+        camera.width = camera.height = 16;
+        camera.fx /= 4, camera.fy /= 4, camera.cx /= 4, camera.cy /= 4;
+        CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &image, NULL));
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+    context = own;
+    double light = 0, worst = 0;
+    for (int i = 0; i < 16 * 16 * 3; i++) {
+        light = fmax(light, (double)color[0][i]);
+        worst = test_most(worst, fabs((double)(color[1][i] - color[0][i])));
+    }
+    if (!CHECK(light > 0.01 && worst < 1e-3 * light)) printf("    off by %g of %g\n", worst, light);
+}
+
 int main(void) {
     char message[256] = "";
     without_drivers();
@@ -1237,6 +1271,7 @@ int main(void) {
         trained("examples/data/waxcow.ply", 1);
         trained("examples/data/waxcow.ply", 0);
         sort_nothing();
+        one_tile();
         left_to_the_cpu();
         kept();
         kept_transport();
