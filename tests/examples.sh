@@ -240,7 +240,7 @@ check "its outlines" grep -q "^   all show the object's outline$" "$out/log"
 check "how long it takes" grep -q "20000 iterations take [0-9]* minutes and more here" "$out/log"
 check "its pictures" test -s "$out/checked/photographs.png" -a -s "$out/checked/places.svg"
 check "a place for each camera" test "$(grep -c '<circle' "$out/checked/places.svg")" -gt 20
-check "a box beside it" says 0 "lie outside of the bounds" "$build/check" "$set" --bounds 3,3,3,4,4,4
+check "a box beside it" says 0 "lie outside of bounds_min" "$build/check" "$set" --bounds 3,3,3,4,4,4
 check "a set that is not there" says 1 "nothing" "$build/check" "$out/nothing"
 check "a folder that is not there" says 1 "never" "$build/check" "$set" --out "$out/never"
 check "no box" says 2 "^usage: check" "$build/check" "$set" --bounds 1,2,3
