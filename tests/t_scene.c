@@ -1244,12 +1244,12 @@ static void test_blurred(void) {
     CHECK(!ssdgs_model_set(model, 0, &g));
     ssdgs_render_options options = ssdgs_render_options_exact();
     double drawn = 0;
-    for (int i = 0; i < 30; i++) {
-        const double beside = -3 - (i < 10 ? i : 2 * i - 10),
-                     at = (beside - SIDE / 2) * 3 / (double)camera.fx;
+    for (int i = 0; i < 60; i++) { /* on the left, on the right */
+        const double beside = 3 + (i / 2 < 10 ? i / 2 : i - i % 2 - 10),
+                     at = (beside + SIDE / 2) * 3 / (double)camera.fx;
         ssdgs_object object[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
-        options.alpha_threshold = (ssdgs_real)(i < 10 ? 1.0 / 255 : 0);
-        object[0].to_world[3] = (ssdgs_real)at;
+        options.alpha_threshold = (ssdgs_real)(i < 20 ? 1.0 / 255 : 0);
+        object[0].to_world[3] = (ssdgs_real)(i % 2 ? at : -at);
         object[1].to_world[3] = 1000;
         for (int j = 0; j < 2; j++) together(object, 1 + j, &camera, NULL, 0, &options, shot + j);
         CHECK(same(shot, shot + 1));
