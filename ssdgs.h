@@ -71,8 +71,8 @@ CONVENTIONS
   camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens
           distortion.
   world   right-handed (scenes: either), any unit, the same for cameras, lights and Gaussians. Floats hold
-          seven digits: 1,000 times the scene's size away from 0 subtract a near point from all positions,
-          and give it as settings.origin.
+          seven digits: if a scene lies 1,000 times its size from 0, subtract a nearby point from all
+          positions and set settings.origin to it.
   light   cone, range and focus lessen a point's E; directional and ambient light's is light_scale x
           intensity.
           Intensities have the unit of the photographs': training sets light_scale such that E is 1 at the
@@ -104,8 +104,8 @@ DETERMINISM
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
   parameter. Nothing exits or prints. Cameras, lights, networks and ASG that are not finite are refused.
-  Gaussians that are not finite are not drawn, or black; sizes and opacities clamp. A training step with a
-  gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
+  Gaussians that are not finite are not drawn, or black; infinite sizes and opacities are clamped. A training
+  step with a gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
@@ -138,9 +138,9 @@ SCENES, as engines have them: examples/engine.c is one
   map.
   options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
   An object says how rough, bright and translucent its model is here. In models made in code
-  settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: beside path
-  tracing a ball of wax had 28 dB, 22 lit from the side, balls of metal of roughness 0.15, 0.3 and 0.6 had
-  37, 30 and 17.
+  settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: a ball of
+  wax has 28 dB beside path tracing, 22 lit from the side; balls of metal of roughness 0.15, 0.3 and 0.6
+  have 37, 30 and 17 beside microfacets.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
@@ -295,7 +295,8 @@ SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context);
 SSDGS_API const char *ssdgs_result_string(ssdgs_result result);
 SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa);
 SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context); /* the one in use */
-SSDGS_API int ssdgs_context_threads(const ssdgs_context *context);   /* how many work; with parallel: its */
+SSDGS_API int ssdgs_context_threads(
+    const ssdgs_context *context); /* how many work; with desc.parallel as desc says */
 
 /* ---- model ---- */
 
@@ -372,7 +373,8 @@ SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to);
 /* One Gaussian in physical units. */
 typedef struct ssdgs_gaussian {
     ssdgs_real position[3];   /* world */
-    ssdgs_real rotation[4];   /* quaternion w x y z, of any length; 0: the third axis is the normal */
+    ssdgs_real rotation[4];   /* quaternion w x y z, of any length: its axes in the world; 0: the third is the
+                                 normal */
     ssdgs_real scale[3];      /* standard deviations along them, world units */
     ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
@@ -3686,8 +3688,7 @@ static int ssdgs__limited(const ssdgs_light *light) {
     return ssdgs__aimed(light) || (light->kind == SSDGS_LIGHT_POINT && light->range > 0);
 }
 
-/* Which objects a light (-1: the camera) reaches: its row (objects). NULL, as with one object: all of them.
- */
+/* Which objects a light (-1: the camera) reaches: its row (objects); NULL, as with one object: all. */
 static const unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
     return frame->reach ? frame->reach + (ptrdiff_t)(light + 1) * frame->object_count : NULL;
 }
@@ -3936,9 +3937,10 @@ static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
 }
 
 /* Finds what of the last frame still holds, then notes this one. In training nothing does: the model changes.
-   same: the last frame's objects. stirred: for the camera and each light, whether an object that moved is or
-   was in reach. */
-static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned char *stirred) {
+   same: the last frame's objects. lights_ready: its maps were made. stirred: for the camera and each light,
+   whether an object that moved is or was in reach. */
+static void ssdgs__compare_cache(ssdgs_frame *frame, int same, int lights_ready,
+                                 const unsigned char *stirred) {
     ssdgs__cache *cache = &frame->memory->cache;
     const ssdgs_render_options *now = &frame->options, *old = &cache->options;
     ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
@@ -3960,7 +3962,8 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
     ssdgs_occluder occluder;
     memset(&occluder, 0, sizeof occluder);
     if (frame->occluder) occluder = *frame->occluder;
-    known = known && cache->lights_ready && !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
+    known = known && lights_ready && frame->light_count == cache->light_count &&
+            !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
             occluder.shadow == cache->occluder.shadow && occluder.user == cache->occluder.user &&
             occluder.revision == cache->occluder.revision && frame->maps <= cache->maps &&
             !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
@@ -3992,7 +3995,6 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, const unsigned ch
     cache->options = *now;
     cache->terms = frame->terms;
     cache->light_count = frame->light_count;
-    cache->lights_ready = 0; /* again once the walks are done */
 }
 
 /* ---- the light table: what kernels need of each light, made once a frame ---- */
@@ -4473,6 +4475,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
+    const int lights_ready = m->cache.lights_ready;
+    m->cache.lights_ready = 0; /* again once the walks are done */
     int same, tuned;
     unsigned char *stirred;
     result = ssdgs__place_all(frame, request->objects, request->object_count, light_count, &same, &tuned);
@@ -4483,11 +4487,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     const int needs_light = ssdgs__needs_light(frame, frame->terms);
     ssdgs__cached_light *cached;
-    if (frame->light_count != m->cache.light_count) m->cache.lights_ready = 0;
     SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
     result = ssdgs__find_reach(frame, same, &stirred);
     if (result) return result;
-    ssdgs__compare_cache(frame, same, stirred);
+    ssdgs__compare_cache(frame, same, lights_ready, stirred);
     for (int i = 0; i < frame->light_count; i++) cached[i].transport_ready &= !tuned;
     frame->view_count = 1;
     if (needs_light && frame->light_count) {
@@ -7094,8 +7097,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
         if (!frame->visibility_given)
             ssdgs__place_backward(frame, job->lightings + light, light, &tile, pixels, gradient,
                                   highlight_sums);
-        if (!light) continue;                                    /* its layers are walked below */
-        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++) { /* photographs with several lights are few */
+        if (!light) continue; /* its layers are walked below */
+        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++) {
             const int at = lit + layer * SSDGS__TILE_LAYER;
             *color = ssdgs__layer(frame, first - 1 + layer);
             ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
@@ -7606,8 +7609,7 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     if (count < 0 || (count && (!points || !fraction)))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            count < 0 ? "%d points" : "%d points, but an array is NULL", count);
-    if (!m || m->cache.objects < 0 || !m->cache.lights_ready || !m->cache.maps || light < 0 ||
-        light >= m->cache.light_count)
+    if (!m || !m->cache.lights_ready || !m->cache.maps || light < 0 || light >= m->cache.light_count)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
                            light);
     const ssdgs__cached_light *lights = (const ssdgs__cached_light *)m->cached_lights.memory;

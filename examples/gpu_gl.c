@@ -739,7 +739,7 @@ vec3 profile() {
         vec3 unit = sigmoid(vec3(answer_of(at.x), answer_of(at.y), answer_of(at.z)));
         found[c] = dipole(2.0 * unit.x + 0.05, 2.0 * unit.y + 0.05, 3.0 * unit.z + 0.1);
     }
-    return on(per_channel_optics) ? found : found.xxx;
+    return on(per_channel_optics) ? found : vec3(found.x);
 }
 /* Adds a light's; `arrives` of transport's lengths. Deferred ones are without S. */
 void add_colour(vec3 intensity, float shadow, float arrives[lengths]) {
