@@ -3087,8 +3087,14 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
 
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_adopt");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_adopt(model, original));
+    ssdgs_context *context = model->context, *from = original ? original->context : context;
+    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_adopt");
+    if (result) return result;
+    if (from != context) result = ssdgs__enter(from, "ssdgs_model_adopt");
+    if (result) return ssdgs__leave(context, result);
+    result = ssdgs__model_adopt(model, original);
+    if (from != context) (void)ssdgs__leave(from, SSDGS_OK);
+    return ssdgs__leave(context, result);
 }
 
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in

@@ -1,8 +1,16 @@
-/* Prints a hash of a rendering with every term and network: tests/builds.sh compares builds with and without
-   the trainer. */
+/* Prints hashes of renderings with every term and network, on the best kernels and on scalar ones, these with
+   the program's own parallel: tests/builds.sh compares builds with other options. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
+
+static int calls;
+
+static void backwards(void *user, int count, void (*task)(void *data, int index), void *data) {
+    (void)user;
+    calls++;
+    while (count > 0) task(data, --count);
+}
 
 int main(void) {
     enum { SIDE = 48, COUNT = 500 };
@@ -12,13 +20,18 @@ int main(void) {
     ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0, 0};
     ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_settings settings[2];
-    uint64_t hash = 1;
     settings[0] = ssdgs_settings_default();
     settings[1] = ssdgs_settings_published();
-    for (int kind = 0; kind < 2; kind++) {
+    for (int run = 0; run < 4; run++) {
+        static uint64_t hash;
+        const int kind = run % 2, scalar = run / 2;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
-        if (ssdgs_context_create(NULL, &context) ||
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        if (scalar) desc.isa = SSDGS_ISA_SCALAR, desc.parallel.run = backwards;
+        if (kind == 0) hash = 1;
+        if (ssdgs_context_create(&desc, &context) ||
             ssdgs_model_create(context, &settings[kind], COUNT, &model))
             return 1;
         ssdgs_model_view view = ssdgs_model_arrays(model);
@@ -33,7 +46,9 @@ int main(void) {
             hash = (hash ^ ((const unsigned char *)depth)[i]) * UINT64_C(0x100000001B3);
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
+        if (kind)
+            printf("%08lx%08lx%s", (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffffu),
+                   scalar ? "\n" : " ");
     }
-    printf("%08lx%08lx\n", (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffffu));
-    return 0;
+    return !calls;
 }

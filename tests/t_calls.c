@@ -1,7 +1,7 @@
-/* Calls that the manual does not allow, and what must come of them: from hooks, tasks, the allocator and the
-   log; after a fork; in the wrong order; with NULL; with shared parameters that are not finite. And the bytes
-   that images become. cc -o build/t_calls tests/t_calls.c -lm -lpthread && build/t_calls       (writes under
-   build/) */
+/* Calls that the manual does not allow, and what must come of them: from hooks, tasks, the allocator, the log
+   and other threads; after a fork; in the wrong order; with NULL; with shared parameters that are not finite.
+   And the rows of images, and the bytes that they become. cc -o build/t_calls tests/t_calls.c -lm -lpthread
+   && build/t_calls       (writes under build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* fork, alarm */
 #endif
@@ -12,6 +12,12 @@
 #include <sys/types.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#endif
+#if !defined(_WIN32) && !defined(SSDGS_NO_THREADS)
+#include <pthread.h>
+#define THREADS 1 /* to call from */
+#else
+#define THREADS 0
 #endif
 
 #define FILE_NAME "build/t_calls.ply"
@@ -25,10 +31,15 @@ static ssdgs_photo photo;
 /* What the callbacks below call into. */
 static struct {
     ssdgs_context *context;
+    ssdgs_scene *scene;
     ssdgs_model *model;
     ssdgs_trainer *trainer;
-    int tries, calls, depth; /* how many calls came back, of how many; 1 within one of them */
+    int tries, calls, depth; /* how many calls were refused, of how many; 1 within one of them */
+    int told;                /* 1 while the log hears a message, which stays */
+    int elsewhere;           /* 1: calls come from another thread than the callback's */
 } all;
+static ssdgs_context *home; /* of guest, which no call is at work on */
+static ssdgs_model *guest;
 
 static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
     const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
@@ -43,7 +54,7 @@ static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
     photo.format = SSDGS_PIXELS_RGBA8;
     image.color = color;
     image.alpha = alpha;
-    if (!CHECK(!ssdgs_context_create(desc, &all.context) &&
+    if (!CHECK(!ssdgs_context_create(desc, &all.context) && !ssdgs_scene_create(all.context, &all.scene) &&
                !ssdgs_model_create(all.context, NULL, MANY, &all.model)))
         exit(1);
     const ssdgs_model_view v = ssdgs_model_arrays(all.model);
@@ -60,74 +71,166 @@ static void set_up(const ssdgs_context_desc *desc, int with_trainer) {
 static void tear_down(void) {
     ssdgs_trainer_destroy(all.trainer);
     ssdgs_model_destroy(all.model);
+    ssdgs_scene_destroy(all.scene);
     ssdgs_context_destroy(all.context);
 }
 
-/* Makes every call there is; each must be refused, and nothing may change or crash. Returns how many were. */
-static int call_everything(void) {
+static ssdgs_result render(void) { return ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image); }
+
+/* Of the model, or of nothing. */
+static ssdgs_result render_scene(int objects) {
+    const ssdgs_object object = ssdgs_object_default(all.model);
+    return ssdgs_scene_render(all.scene, objects ? &object : NULL, objects, &photo.camera, &photo.light, 1,
+                              NULL, &image, NULL);
+}
+
+static void count_task(void *data, int index) { ((int *)data)[index]++; }
+
+/* A call has come back, as it must: the message says of this function why. */
+static void refused(ssdgs_result result, const char *function) {
+    const char *message = ssdgs_error_message(all.context);
+    const size_t length = strcspn(message, ":"); /* ssdgs_render_ex is called ssdgs_render */
+    const int named = length > 0 && !strncmp(message, function, length) &&
+                      strstr(message, ": another call on this context is at work") == message + length,
+              good = result == SSDGS_ERR_ARGUMENT && (named || all.told);
+    all.tries++;
+    all.calls += good;
+    if (!good) printf("    %s was not refused\n", function);
+}
+
+/* After one that was not refused nothing is as it should be: no more calls. */
+#define REFUSED(function, ...) (all.calls < all.tries ? (void)0 : refused(function(__VA_ARGS__), #function))
+#define IGNORED(function, ...) \
+    (all.calls < all.tries ? (void)0 : (function(__VA_ARGS__), refused(SSDGS_ERR_ARGUMENT, #function)))
+
+/* Makes every call that may not be made while another is at work (tests/builds.sh looks that none is
+   missing); each must be refused, and nothing may change or crash. */
+static void call_everything(void) {
+    ssdgs_context *context = all.context;
+    ssdgs_scene *scene = all.scene, *stage = NULL;
     ssdgs_model *model = all.model, *other = NULL;
     ssdgs_trainer *trainer = all.trainer, *next = NULL;
-    ssdgs_context *context = all.context;
-    ssdgs_photo copy = photo;
-    int refused = 0;
-    if (all.depth || !context || !model) return 0; /* the log hears none of what follows */
-    all.depth = 1;
-    refused += ssdgs_render(model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_model_sort(model) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_context_run(context, 1, NULL, NULL) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_model_reduce(model, 1) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_model_create(context, NULL, 1, &other) == SSDGS_ERR_ARGUMENT && !other;
-    refused += ssdgs_model_adopt(model, model) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_model_save(model, FILE_NAME) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_model_load(context, FILE_NAME, &other, NULL) == SSDGS_ERR_ARGUMENT && !other;
-    refused += ssdgs_model_load_memory(context, "ply", 3, &other, NULL) == SSDGS_ERR_ARGUMENT && !other;
+    ssdgs_photo copy;
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_gaussian gaussian = ssdgs_gaussian_default();
+    const ssdgs_real rough[2] = {(ssdgs_real)0.3, (ssdgs_real)0.3};
+    ssdgs_real low[3], high[3], matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -1, 0, 0, -1, 0};
     ssdgs_metrics metrics;
-    refused += ssdgs_compare(context, color, color, 4, 4, &metrics) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_evaluate(model, &photo, photo.light.intensity, NULL, &metrics) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_refine_photo(model, &copy, photo.light.intensity, 1) == SSDGS_ERR_ARGUMENT;
-    refused += ssdgs_trainer_create(model, &photo, 1, NULL, &next) == SSDGS_ERR_ARGUMENT && !next;
-    int iteration;
-    refused += ssdgs_checkpoint_iteration(context, FILE_NAME, &iteration) == SSDGS_ERR_ARGUMENT;
-    all.tries += 14;
+    int iteration, done = 0;
+    if (all.depth || !context || !model) return; /* the log hears none of what follows */
+    all.depth = 1;
+    memcpy(&copy, &photo, sizeof copy);
+    IGNORED(ssdgs_context_trim, context);
+    REFUSED(ssdgs_context_run, context, 1, count_task, &done);
+    REFUSED(ssdgs_environment, context, color, 4, 4, NULL, &copy.light, 1, NULL);
+    REFUSED(ssdgs_camera_from_matrices, context, matrix, matrix, 0, 4, 4, &copy.camera);
+    REFUSED(ssdgs_compare, context, color, color, 4, 4, &metrics);
+    REFUSED(ssdgs_checkpoint_iteration, context, FILE_NAME, &iteration);
+    REFUSED(ssdgs_render_ex, model, &photo.camera, &photo.light, 1, NULL, &image, NULL);
+    REFUSED(ssdgs_model_create, context, NULL, 1, &other);
+    REFUSED(ssdgs_render, model, &photo.camera, &photo.light, 1, &image);
+    REFUSED(ssdgs_model_load_memory, context, "ply", 3, &other, NULL);
+    REFUSED(ssdgs_model_load, context, FILE_NAME, &other, NULL);
+    REFUSED(ssdgs_model_save, model, FILE_NAME);
+    REFUSED(ssdgs_model_set, model, 0, &gaussian);
+    REFUSED(ssdgs_model_get, model, 0, &gaussian);
+    REFUSED(ssdgs_gaussian_mirror, model, rough, &gaussian);
+    REFUSED(ssdgs_model_bounds, model, low, high);
+    REFUSED(ssdgs_model_sort, model);
+    REFUSED(ssdgs_model_reduce, model, 1);
+    REFUSED(ssdgs_model_adopt, model, guest);
+    REFUSED(ssdgs_model_move, model, home);
+    REFUSED(ssdgs_model_adopt, guest, model);
+    REFUSED(ssdgs_evaluate, model, &photo, photo.light.intensity, NULL, &metrics);
+    REFUSED(ssdgs_model_move, guest, context);
+    REFUSED(ssdgs_refine_photo, model, &copy, photo.light.intensity, 1);
+    REFUSED(ssdgs_scene_create, context, &stage);
+    REFUSED(ssdgs_scene_render, scene, &object, 1, &photo.camera, &photo.light, 1, NULL, &image, NULL);
+    REFUSED(ssdgs_scene_light, scene, &object, 1, &photo.light, 1, NULL);
+    REFUSED(ssdgs_scene_shadow, scene, 0, gaussian.position, 1, low);
+    IGNORED(ssdgs_scene_occlude, scene, NULL);
+    REFUSED(ssdgs_trainer_create, model, &photo, 1, NULL, &next);
     if (trainer) {
-        refused += ssdgs_trainer_step(trainer, NULL) == SSDGS_ERR_ARGUMENT;
-        refused += ssdgs_trainer_run(trainer, NULL, NULL) == SSDGS_ERR_ARGUMENT;
-        refused += ssdgs_trainer_save(trainer, FILE_NAME) == SSDGS_ERR_ARGUMENT;
-        refused += ssdgs_trainer_load(trainer, FILE_NAME) == SSDGS_ERR_ARGUMENT;
-        refused += ssdgs_trainer_refined(trainer, 0, &copy.camera, &copy.light) == SSDGS_ERR_ARGUMENT;
-        all.tries += 5;
+        REFUSED(ssdgs_trainer_step, trainer, NULL);
+        REFUSED(ssdgs_trainer_run, trainer, NULL, NULL);
+        REFUSED(ssdgs_trainer_save, trainer, FILE_NAME);
+        REFUSED(ssdgs_trainer_load, trainer, FILE_NAME);
+        REFUSED(ssdgs_trainer_refined, trainer, 0, &copy.camera, &copy.light);
+        IGNORED(ssdgs_trainer_destroy, trainer);
     }
-    ssdgs_trainer_destroy(trainer);
-    ssdgs_model_destroy(model);
-    ssdgs_context_destroy(context);
-    all.calls += refused;
+    IGNORED(ssdgs_scene_destroy, scene);
+    IGNORED(ssdgs_model_destroy, model);
+    IGNORED(ssdgs_context_destroy, context);
+    all.tries++;
+    all.calls += !done && !other && !stage && !next && !memcmp(&copy, &photo, sizeof copy);
     all.depth = 0;
-    return refused;
 }
 
 /* ---- where they come from ---- */
 
+static int met, strangers; /* how many callbacks ran; on another thread than the program's */
+
+#if THREADS
+static pthread_t mine;
+
+static void *call_on_thread(void *data) {
+    call_everything();
+    return data;
+}
+#endif
+
+/* A callback runs. */
+static void meet(void) {
+    met++;
+#if THREADS
+    strangers += !pthread_equal(pthread_self(), mine);
+#endif
+}
+
+static void call_back(void) {
+    meet();
+#if THREADS
+    pthread_t thread;
+    if (all.elsewhere && !all.depth) {
+        if (!pthread_create(&thread, NULL, call_on_thread, NULL)) pthread_join(thread, NULL);
+        return;
+    }
+#endif
+    call_everything();
+}
+
 static ssdgs_result hook(void *user, ssdgs_frame *frame) {
     (void)user;
-    call_everything();
+    call_back();
     return ssdgs_stage_cpu(frame, SSDGS_STAGE_SHADE);
+}
+
+static ssdgs_result fetch(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
+    (void)user, (void)frame, (void)stage;
+    call_back();
+    return SSDGS_OK;
+}
+
+static void released(void *user, const void *gone) {
+    (void)user, (void)gone;
+    call_back();
 }
 
 static void run(void *user, int count, void (*task)(void *data, int index), void *data) {
     (void)user;
     for (int i = 0; i < count; i++) task(data, i);
-    call_everything();
+    call_back();
 }
 
 static void *allocate(void *user, size_t bytes) {
     (void)user;
-    call_everything();
+    call_back();
     return malloc(bytes);
 }
 
 static void release(void *user, void *memory) {
     (void)user;
-    call_everything();
+    call_back();
     free(memory);
 }
 
@@ -135,48 +238,58 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     (void)user, (void)code;
     char before[512];
     snprintf(before, sizeof before, "%s", message);
-    call_everything();
+    all.told = 1;
+    call_back();
+    all.told = 0;
     CHECK(!strcmp(before, message)); /* what is being told stays */
 }
 
 static void trace(void *user, const char *name) {
     (void)user, (void)name;
-    call_everything();
+    call_back();
 }
 
+static void test_from(int from, int with_trainer, int elsewhere) {
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 4;
+    ssdgs_gpu_hook gpu;
+    memset(&gpu, 0, sizeof gpu);
+    gpu.stage[SSDGS_STAGE_SHADE] = hook;
+    gpu.fetch = fetch;
+    gpu.released = released;
+    if (from == 0) desc.gpu = &gpu;
+    if (from == 1) desc.parallel.run = run;
+    if (from == 2) desc.allocator.allocate = allocate, desc.allocator.release = release;
+    if (from == 3) desc.logger.write = hear;
+    if (from == 4) desc.tracer.stage = trace;
+    set_up(&desc, with_trainer);
+    all.tries = all.calls = 0;
+    all.elsewhere = elsewhere;
+    if (from == 3) { /* makes the log hear something */
+        const ssdgs_real good = photo.camera.near_plane;
+        photo.camera.near_plane = -1;
+        CHECK(render() == SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(all.context), "near_plane = -1") != NULL);
+        photo.camera.near_plane = good;
+    } else if (with_trainer) CHECK(!ssdgs_trainer_run(all.trainer, NULL, NULL));
+    else CHECK(!render());
+    CHECK(!render_scene(1));
+    if (!CHECK(all.tries > 0 && all.calls == all.tries))
+        printf("    %d: %d of %d refused\n", from, all.calls, all.tries);
+    all.depth = 1;
+    CHECK(!render() && !render_scene(1)); /* all are still there */
+    tear_down();
+}
+
+/* And callbacks run on the caller's thread, whoever works. */
 static void test_from_within(void) {
+    met = strangers = 0;
     for (int from = 0; from < 5; from++)
-        for (int with_trainer = 0; with_trainer < 2; with_trainer++) {
-            ssdgs_context_desc desc;
-            ssdgs_real bad = photo.camera.near_plane;
-            memset(&desc, 0, sizeof desc);
-            desc.threads = 2;
-            ssdgs_gpu_hook gpu;
-            memset(&gpu, 0, sizeof gpu);
-            gpu.stage[SSDGS_STAGE_SHADE] = hook;
-            if (from == 0) desc.gpu = &gpu;
-            if (from == 1) desc.parallel.run = run;
-            if (from == 2) desc.allocator.allocate = allocate, desc.allocator.release = release;
-            if (from == 3) desc.logger.write = hear;
-            if (from == 4) desc.tracer.stage = trace;
-            set_up(&desc, with_trainer);
-            all.tries = all.calls = 0;
-            if (from == 3) { /* makes the log hear something */
-                photo.camera.near_plane = -1;
-                CHECK(ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT);
-                CHECK(strstr(ssdgs_error_message(all.context), "near_plane = -1") != NULL);
-                photo.camera.near_plane = bad;
-            } else if (with_trainer) CHECK(!ssdgs_trainer_run(all.trainer, NULL, NULL));
-            else CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
-            if (!CHECK(all.tries > 0 && all.calls == all.tries))
-                printf("    %d: %d of %d refused\n", from, all.calls, all.tries);
-            CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image)); /* all are still there */
-            if (from < 2 || from == 4)
-                CHECK(strstr(ssdgs_error_message(all.context),
-                             "ssdgs_context_destroy: another call on this context is at work") != NULL);
-            all.depth = 1;
-            tear_down();
-        }
+        for (int with_trainer = 0; with_trainer < 2; with_trainer++)
+            for (int elsewhere = 0; elsewhere <= THREADS; elsewhere++)
+                test_from(from, with_trainer, elsewhere);
+    CHECK(met > 0 && strangers == 0);
 }
 
 /* ---- what a tracer hears ---- */
@@ -197,8 +310,7 @@ static void test_tracer(void) {
     desc.tracer.user = heard;
     set_up(&desc, 1);
     CHECK(!*heard);
-    for (int i = 0; i < 2; i++, *heard = 0)
-        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) && !strcmp(heard, rendered));
+    for (int i = 0; i < 2; i++, *heard = 0) CHECK(!render() && !strcmp(heard, rendered));
     *trained = 0;
     for (int i = 0; i < 3; i++)
         snprintf(trained + strlen(trained), sizeof trained - strlen(trained),
@@ -207,8 +319,11 @@ static void test_tracer(void) {
     tear_down();
 }
 
-/* A program's own tasks. */
-static void count_task(void *data, int index) { ((int *)data)[index]++; }
+/* A program's own tasks, one of which calls. */
+static void calling_task(void *data, int index) {
+    count_task(data, index);
+    if (index == 500) call_everything();
+}
 
 static void test_run(void) {
     static int done[1000];
@@ -216,9 +331,10 @@ static void test_run(void) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = threads;
-        set_up(&desc, 0);
+        set_up(&desc, 1);
         memset(done, 0, sizeof done);
-        CHECK(!ssdgs_context_run(all.context, 1000, count_task, done));
+        CHECK(!ssdgs_context_run(all.context, 1000, calling_task, done));
+        CHECK(all.tries > 0 && all.calls == all.tries);
         for (int i = 0; i < 1000; i++) CHECK(done[i] == 1);
         CHECK(!ssdgs_context_run(all.context, 0, NULL, NULL));
         CHECK(ssdgs_context_run(all.context, 1, NULL, done) == SSDGS_ERR_ARGUMENT);
@@ -233,8 +349,9 @@ static int steps; /* of the trainer */
 
 static int progress(void *user, const ssdgs_train_stats *stats) {
     (void)user;
+    meet();
     steps = stats->iteration;
-    CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+    CHECK(!render());
     ssdgs_metrics metrics;
     CHECK(!ssdgs_evaluate(all.model, &photo, photo.light.intensity, NULL, &metrics));
     CHECK(!ssdgs_model_save(all.model, FILE_NAME));
@@ -242,6 +359,7 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
     CHECK(strstr(ssdgs_error_message(all.context), "ssdgs_trainer_destroy: the trainer runs") != NULL);
     if (all.model && steps == 2) { /* these go with the trainer */
         ssdgs_model_destroy(all.model);
+        ssdgs_scene_destroy(all.scene);
         ssdgs_context_destroy(all.context);
         return 0;
     }
@@ -249,8 +367,13 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
 }
 
 static void test_progress(void) {
-    set_up(NULL, 1);
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = 4;
+    set_up(&desc, 1);
+    met = strangers = 0;
     CHECK(ssdgs_trainer_run(all.trainer, progress, NULL) == SSDGS_ERR_CANCELLED && steps == 2);
+    CHECK(met == 2 && strangers == 0);
     ssdgs_trainer_destroy(all.trainer);
     remove(FILE_NAME);
 }
@@ -278,32 +401,37 @@ static void count_notes(void *user, ssdgs_result code, const char *message) {
                                   strstr(message, "the context goes"));
 }
 
-/* Whatever goes first, everything works as long as it is there, is told, and nothing is left over. */
+/* Whatever goes first, everything else works on, the log hears of what waits for the last of its users, and
+   nothing is left over. The scene has drawn the model, but does not hold it. */
 static void test_order(void) {
-    static const char *const orders[6] = {"tmc", "tcm", "mtc", "mct", "ctm", "cmt"};
-    static const int told[6] = {0, 1, 1, 2, 1, 2};
-    for (int i = 0; i < 6; i++) {
+    for (int order = 0; order < 24; order++) {
+        char left[5] = "tmsc", gone[5] = "";
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 3;
         desc.allocator.allocate = count_in;
         desc.allocator.release = count_out;
         desc.logger.write = count_notes;
-        blocks = notes = 0;
+        blocks = 0;
         set_up(&desc, 1);
+        CHECK(!render_scene(1));
         notes = 0;
-        for (int k = 0; k < 3; k++) {
-            const char gone = orders[i][k];
-            if (gone == 't') ssdgs_trainer_destroy(all.trainer);
-            if (gone == 'm') ssdgs_model_destroy(all.model);
-            if (gone == 'c') ssdgs_context_destroy(all.context);
-            if (k == 0 && gone != 'm')
-                CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
-            if (k == 0 && gone != 't') CHECK(!ssdgs_trainer_step(all.trainer, NULL));
-            if (k == 1 && orders[i][2] == 't') CHECK(!ssdgs_trainer_step(all.trainer, NULL));
+        for (int k = 0, rest = order; k < 4; k++) {
+            char *next = left + rest % (4 - k);
+            rest /= 4 - k;
+            gone[k] = *next;
+            memmove(next, next + 1, strlen(next));
+            if (gone[k] == 't') ssdgs_trainer_destroy(all.trainer);
+            if (gone[k] == 'm') ssdgs_model_destroy(all.model);
+            if (gone[k] == 's') ssdgs_scene_destroy(all.scene);
+            if (gone[k] == 'c') ssdgs_context_destroy(all.context);
+            if (strchr(left, 'm')) CHECK(!render());
+            if (strchr(left, 't')) CHECK(!ssdgs_trainer_step(all.trainer, NULL));
+            if (strchr(left, 's')) CHECK(!render_scene(strchr(left, 'm') != NULL));
         }
-        if (!CHECK(blocks == 0 && notes == told[i]))
-            printf("    %s: %d blocks left, told %d times\n", orders[i], blocks, notes);
+        const int told = (strchr(gone, 'm') < strchr(gone, 't')) + (gone[3] != 'c');
+        if (!CHECK(blocks == 0 && notes == told))
+            printf("    %s: %d blocks left, told %d times\n", gone, blocks, notes);
     }
 }
 
@@ -317,22 +445,21 @@ static void test_fork(void) {
         memset(&desc, 0, sizeof desc);
         desc.threads = 4;
         set_up(&desc, 1);
-        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+        CHECK(!render());
         memcpy(first, color, sizeof first);
         fflush(stdout);
         const pid_t child = fork();
         if (child == 0) {
             alarm(20); /* hangs */
             memset(color, 0, sizeof color);
-            int good = round % 2 || !ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image);
+            int good = round % 2 || !render();
             good = good && (round % 2 || !memcmp(first, color, sizeof first));
             tear_down();
             _exit(good ? 0 : 1);
         }
         CHECK(child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) &&
               WEXITSTATUS(status) == 0);
-        CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) &&
-              !memcmp(first, color, sizeof first));
+        CHECK(!render() && !memcmp(first, color, sizeof first));
         tear_down();
     }
 #endif
@@ -424,7 +551,7 @@ static void test_shared(void) {
     for (int group = 0; group < 5; group++)
         for (int kind = 0; kind < 2; kind++) {
             set_up(NULL, 1);
-            CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+            CHECK(!render());
             ssdgs_model_view view = ssdgs_model_arrays(all.model);
             ssdgs_real *at[5];
             at[0] = view.asg_basis, at[1] = view.asg_sharpness, at[2] = view.asg_sigma,
@@ -432,7 +559,7 @@ static void test_shared(void) {
             at[group][5] = kind ? (ssdgs_real)NAN : (ssdgs_real)INFINITY;
             char text[100];
             snprintf(text, sizeof text, "model: value 5 of %s is not finite", names[group]);
-            CHECK(ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image) == SSDGS_ERR_NONFINITE);
+            CHECK(render() == SSDGS_ERR_NONFINITE);
             if (!CHECK(!strcmp(ssdgs_error_message(all.context), text)))
                 printf("    %s\n", ssdgs_error_message(all.context));
             CHECK(ssdgs_trainer_run(all.trainer, NULL, NULL) == SSDGS_ERR_NONFINITE);
@@ -441,7 +568,7 @@ static void test_shared(void) {
                   !strcmp(ssdgs_error_message(all.context), text));
             view = ssdgs_model_arrays(all.model);
             at[group][5] = 0;
-            CHECK(!ssdgs_render(all.model, &photo.camera, &photo.light, 1, &image));
+            CHECK(!render());
             tear_down();
         }
 }
@@ -651,10 +778,128 @@ static void test_pixels(void) {
     }
 }
 
+/* Rows farther apart than they are long: all planes, of which scene_depth is read, asked for together or one
+   by one, are the packed picture's, and what lies between rows stays. */
+static void test_rows(void) {
+    enum { W = 37, H = 21, STRIDE = W + 5, COUNT = 9 };
+    static ssdgs_real packed[COUNT][3 * W * H], apart[COUNT][3 * STRIDE * H], hidden[W * H],
+        hidden_apart[STRIDE * H];
+    static const int channels[COUNT] = {3, 3, 3, 3, 3, 1, 1, 1, 1};
+    const ssdgs_real eye[3] = {0, -2, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    unsigned char padding[5 * 3 * sizeof(ssdgs_real)];
+    memset(padding, 77, sizeof padding);
+    set_up(NULL, 0);
+    for (int i = 0; i < MANY; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(all.model, i, &g));
+        g.opacity = (ssdgs_real)0.5;
+        g.normal[0] = g.normal[1] = g.normal[2] = -1; /* towards the light and the eye */
+        for (int c = 0; c < 3; c++) g.diffuse[c] = g.specular[c] = g.scattering[c] = (ssdgs_real)(c + 1) / 4;
+        CHECK(!ssdgs_model_set(all.model, i, &g));
+    }
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, W, H);
+    for (int y = 0; y < H; y++)
+        for (int x = 0; x < STRIDE; x++) { /* a mesh in the left half, and one between rows */
+            const ssdgs_real depth = (ssdgs_real)(x < W / 2 ? 2 : x < W ? 1e30 : 0.01);
+            hidden_apart[y * STRIDE + x] = depth;
+            if (x < W) hidden[y * W + x] = depth;
+        }
+    for (int asked = -1; asked <= COUNT; asked++) { /* -1: packed; COUNT: all; else one */
+        ssdgs_real *plane[COUNT];
+        memset(apart, 77, sizeof apart);
+        for (int i = 0; i < COUNT; i++)
+            plane[i] = asked < 0 ? packed[i] : asked == i || asked == COUNT ? apart[i] : NULL;
+        const ssdgs_image to = {asked < 0 ? 0 : STRIDE,
+                                plane[0],
+                                plane[5],
+                                plane[6],
+                                plane[1],
+                                plane[2],
+                                plane[3],
+                                plane[4],
+                                plane[7],
+                                plane[8],
+                                asked < 0 ? hidden : hidden_apart};
+        CHECK(!ssdgs_render(all.model, &camera, &photo.light, 1, &to));
+        for (int i = 0; i < COUNT; i++) {
+            const size_t row = (size_t)channels[i] * W, step = (size_t)channels[i] * STRIDE;
+            int wrong = 0, something = 0;
+            for (size_t y = 0; y < H; y++) {
+                const ssdgs_real *want = packed[i] + y * row, *got = apart[i] + y * step;
+                for (size_t x = 0; x < row; x++) something |= want[x] > 0 || want[x] < 0;
+                if (asked < 0 || !plane[i]) continue;
+                wrong += memcmp(got, want, row * sizeof *got) != 0;
+                wrong += memcmp(got + row, padding, (step - row) * sizeof *got) != 0;
+            }
+            if (!CHECK(something && !wrong)) printf("    plane %d, asked for %d: %d rows\n", i, asked, wrong);
+        }
+    }
+    tear_down();
+}
+
+/* A framebuffer's rows may be far apart, or stored the last one first, in every format. Floats hold the
+   straight colour as it is. Where alpha is 0 no bit changes, not even of what is no number. */
+static void test_pitch(void) {
+    enum { W = 5, H = 4, STRIDE = 7, PITCH = 16 * W + 12 };
+    static const int sizes[4] = {4, 4, 8, 16};
+    static ssdgs_real colors[3 * STRIDE * H], alphas[STRIDE * H], none[STRIDE * H];
+    unsigned char packed[16 * W * H], apart[PITCH * H], before[PITCH * H];
+    ssdgs_image from;
+    memset(&from, 0, sizeof from);
+    from.stride = STRIDE, from.color = colors;
+    for (int i = 0; i < STRIDE * H; i++) {
+        alphas[i] = (ssdgs_real)(i % 5) / 4;
+        for (int c = 0; c < 3; c++)
+            colors[3 * i + c] = alphas[i] * (ssdgs_real)(3 * test_uniform(9, (uint64_t)(3 * i + c)));
+    }
+    for (int format = SSDGS_RGBA8; format <= SSDGS_RGBA32F; format++)
+        for (int up = 0; up < 2; up++)
+            for (int transfer = 0; transfer < 2; transfer++) {
+                const int size = sizes[format];
+                unsigned char *first = up ? apart + (H - 1) * PITCH : apart;
+                memset(apart, 77, sizeof apart);
+                for (int blend = 0; blend < 2; blend++) { /* over what the first round has written */
+                    void (*write)(const ssdgs_image *, int, int, int, ssdgs_format, void *, ptrdiff_t) =
+                        blend ? ssdgs_blend_pixels : ssdgs_to_pixels;
+                    int wrong = 0;
+                    from.alpha = alphas;
+                    write(&from, W, H, transfer, (ssdgs_format)format, packed, W * size);
+                    write(&from, W, H, transfer, (ssdgs_format)format, first, up ? -PITCH : PITCH);
+                    for (int y = 0; y < H; y++) {
+                        const unsigned char *row = apart + (up ? H - 1 - y : y) * PITCH;
+                        wrong += memcmp(row, packed + y * W * size, (size_t)(W * size)) != 0;
+                        for (int x = W * size; x < PITCH; x++) wrong += row[x] != 77;
+                    }
+                    CHECK(wrong == 0);
+                    for (int i = 0; format == SSDGS_RGBA32F && !blend && i < W * H; i++) {
+                        const int at = i / W * STRIDE + i % W;
+                        const double a = (double)alphas[at];
+                        float rgba[4];
+                        double want[4] = {0, 0, 0, a};
+                        memcpy(rgba, packed + 16 * i, sizeof rgba);
+                        for (int c = 0; c < 3; c++)
+                            if (a > 0) want[c] = (double)colors[3 * at + c] / a;
+                        CHECK_NEAR(rgba, want, 4, 1e-30, 1e-6, "floats of a straight colour");
+                    }
+                }
+                for (int i = 0; i < PITCH * H; i++)
+                    apart[i] = before[i] = (unsigned char)(256 * test_uniform(10, (uint64_t)i));
+                from.alpha = none;
+                ssdgs_blend_pixels(&from, W, H, transfer, (ssdgs_format)format, first, up ? -PITCH : PITCH);
+                CHECK(!memcmp(apart, before, sizeof before));
+            }
+}
+
 int main(void) {
+#if THREADS
+    mine = pthread_self();
+#endif
+    if (!CHECK(!ssdgs_context_create(NULL, &home) && !ssdgs_model_create(home, NULL, 1, &guest))) return 1;
     test_from_within();
     test_tracer();
     test_run();
+    ssdgs_model_destroy(guest);
+    ssdgs_context_destroy(home);
     test_progress();
     test_order();
     test_fork();
@@ -662,5 +907,7 @@ int main(void) {
     test_shared();
     test_bytes();
     test_pixels();
+    test_rows();
+    test_pitch();
     TEST_END();
 }
