@@ -376,7 +376,8 @@ typedef struct ssdgs_gaussian {
     ssdgs_real rotation[4];   /* quaternion w x y z, of any length: its axes in the world; 0: the third is the
                                  normal */
     ssdgs_real scale[3];      /* standard deviations along them, world units */
-    ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis */
+    ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis. Highlights lie along the
+                                 other two, turned with the third to the normal */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
     ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
     ssdgs_real specular[3];   /* c_s; deferred, its lobe's height: see ssdgs_gaussian_mirror(). 0 = none */
@@ -389,7 +390,7 @@ typedef struct ssdgs_gaussian {
 
 SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void); /* grey, opacity 0.1, 0.02 wide, at 0 */
 /* Gives a Gaussian, of a model made in code, the highlight of a mirror of microfacets: roughness, along its
-   first and second axis across the normal, is Beckmann's alpha. Sets sharpness and specular, and gives the
+   first and second axis, is Beckmann's alpha. Sets sharpness and specular, and gives the
    model the one lobe that this needs, for all its Gaussians. For metals let f0 be 0.9 and multiply specular
    by their colour. ERR_ARGUMENT: highlights are not deferred, or a roughness is not 0.01 .. 1. */
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
@@ -2776,16 +2777,28 @@ static double ssdgs__logit(double x) {
     return raw < -SSDGS__MOST_RAW ? -SSDGS__MOST_RAW : raw > SSDGS__MOST_RAW ? SSDGS__MOST_RAW : raw;
 }
 
-/* A quaternion, of any length, that turns the z axis into a direction; the identity for 0 0 0. */
-static void ssdgs__turn_to(const ssdgs_real direction[3], double q[4]) {
-    const double x = (double)direction[0], y = (double)direction[1], z = (double)direction[2];
-    const double length = sqrt(x * x + y * y + z * z);
-    q[0] = length + z;
-    q[1] = -y;
-    q[2] = x;
-    q[3] = 0;
-    if (!(length > 0)) q[0] = 1;
-    else if (q[0] <= 1e-9 * length) q[1] = 1, q[0] = q[2] = 0; /* straight down */
+/* The axes of a quaternion, turned the shortest way that brings the third to a direction: a quaternion of any
+   length. As they are for 0 0 0. to may be from. */
+static void ssdgs__turn_to(const ssdgs_real direction[3], const double from[4], double to[4]) {
+    ssdgs_real raw[4], q[4], r[9];
+    double v[3], length = 0; /* the direction in those axes */
+    for (int i = 0; i < 4; i++) raw[i] = (ssdgs_real)from[i];
+    ssdgs__rotation_scalar(raw, q, r);
+    for (int i = 0; i < 3; i++) {
+        v[i] = 0;
+        for (int j = 0; j < 3; j++) v[i] += (double)r[3 * j + i] * (double)direction[j];
+        length += v[i] * v[i];
+    }
+    length = sqrt(length);
+    double w = length + v[2], x = -v[1], y = v[0];
+    if (!(length > 0)) w = 1;
+    else if (w <= 1e-9 * length) x = 1, w = y = 0; /* straight back */
+    const double b = (double)q[1], c = (double)q[2], d = (double)q[3];
+    const double a = fabs((double)q[0]) + fabs(b) + fabs(c) + fabs(d) > 0 ? (double)q[0] : 1; /* r is 1 */
+    to[0] = a * w - b * x - c * y;
+    to[1] = a * x + b * w - d * y;
+    to[2] = a * y + c * w + d * x;
+    to[3] = b * y - c * x + d * w;
 }
 
 static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
@@ -2831,20 +2844,22 @@ static void ssdgs__specular_store(const ssdgs_real specular[3], int deferred, ss
             (ssdgs_real)ssdgs__softplus_inverse((double)specular[i] / height);
 }
 
-/* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that has
-   the normal already stays, as a new one would lose its tangents. */
+/* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that
+   already has the normal stays unless the Gaussian turns: training has found its tangents. */
 static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
     double raw[SSDGS_CHANNELS], size = 0;
     const int flat = g->normal[0] == 0 && g->normal[1] == 0 && g->normal[2] == 0;
-    double along = 0, length = 0;
+    double along = 0, length = 0, dot = 0, was = 0;
     for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)plane[(size_t)i * stride];
     ssdgs_real old[4];
     for (int i = 0; i < 4; i++) {
-        raw[SSDGS_ROTATION + i] = (double)g->rotation[i];
-        size += fabs((double)g->rotation[i]);
+        const double before = raw[SSDGS_ROTATION + i], now = (double)g->rotation[i];
+        raw[SSDGS_ROTATION + i] = now;
+        dot += before * now, was += before * before, size += now * now;
         old[i] = plane[(size_t)(SSDGS_FRAME + i) * stride];
     }
-    if (!(size > 0)) ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION);
+    const int turned = !(dot * dot > 0.999999 * was * size);
+    if (!(size > 0)) ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION, raw + SSDGS_ROTATION);
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(old, q, r);
     for (int i = 0; i < 3; i++) {
@@ -2856,7 +2871,8 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
         raw[SSDGS_SCATTERING + i] = ssdgs__softplus_inverse((double)g->scattering[i]);
     }
     if (flat) memcpy(raw + SSDGS_FRAME, raw + SSDGS_ROTATION, 4 * sizeof *raw);
-    else if (!(along > 0.999999 * sqrt(length))) ssdgs__turn_to(g->normal, raw + SSDGS_FRAME);
+    else if (turned || !(along > 0.999999 * sqrt(length)))
+        ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION, raw + SSDGS_FRAME);
     raw[SSDGS_OPACITY] = ssdgs__logit((double)g->opacity);
     if (deferred) {
         raw[SSDGS_ASG_WEIGHT] = log((double)g->sharpness[0]);

@@ -166,6 +166,7 @@ static unsigned char pixels[PHOTOS][SIDE * SIDE * 4];
 static ssdgs_photo photos[PHOTOS], refined;
 static ssdgs_context *context;
 static ssdgs_model *model, *made;
+static ssdgs_scene *scene;
 static ssdgs_trainer *trainer;
 static ssdgs_train_options options;
 static ssdgs_metrics metrics;
@@ -290,6 +291,11 @@ static void with_frame(void) {
     CHECK(!frame(0));
 }
 
+static void with_scene(void) {
+    with_model();
+    if (!CHECK(!ssdgs_scene_create(context, &scene))) exit(1);
+}
+
 static void with_empty_model(void) {
     const ssdgs_settings settings = small_settings(8);
     with_context();
@@ -320,10 +326,12 @@ static void after_control(void) { with_steps(DENSE + 1); }
 
 static void end_world(void) {
     ssdgs_trainer_destroy(trainer);
+    ssdgs_scene_destroy(scene);
     ssdgs_model_destroy(made);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
     trainer = NULL;
+    scene = NULL;
     model = made = NULL;
     context = NULL;
     options.opacity_reset_every = RESETS;
@@ -391,6 +399,32 @@ static ssdgs_result do_save(void) { return ssdgs_model_save(model, file_path); }
 static ssdgs_result do_sort(void) { return ssdgs_model_sort(model); }
 static ssdgs_result do_reduce(void) { return ssdgs_model_reduce(model, 20); }
 static ssdgs_result do_frame(void) { return frame(1); }
+static ssdgs_result do_scene(void) {
+    ssdgs_object objects[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = planes[0];
+    image.specular = planes[1];
+    objects[1].to_world[3] = (ssdgs_real)0.4;
+    objects[1].roughness = 2;
+    return ssdgs_scene_render(scene, objects, 2, &photos[0].camera, &photos[1].light, 1, NULL, &image, NULL);
+}
+static ssdgs_result do_environment(void) { /* of a picture */
+    ssdgs_light lights[3];
+    ssdgs_real ambient[9][3];
+    const ssdgs_result result = ssdgs_environment(context, pair[0], SIDE, SIDE, NULL, lights, 3, ambient);
+    if (result) return result;
+    memcpy(planes[0], lights, sizeof lights);
+    memcpy(planes[1], ambient, sizeof ambient);
+    return SSDGS_OK;
+}
+static ssdgs_result do_bounds(void) { return ssdgs_model_bounds(model, planes[0], planes[0] + 3); }
+static ssdgs_result do_iteration(void) {
+    int iteration = -1;
+    const ssdgs_result result = ssdgs_checkpoint_iteration(context, run_path, &iteration);
+    planes[0][0] = (ssdgs_real)(result ? 0 : iteration);
+    return result;
+}
 static ssdgs_result do_compare(void) {
     return ssdgs_compare(context, pair[0], pair[1], SIDE, SIDE, &metrics);
 }
@@ -445,6 +479,10 @@ static const operation operations[] = {{"model_create", with_context, do_create,
                                        {"model_reduce", with_model, do_reduce, 1},
                                        {"render", with_model, do_frame, 1},
                                        {"render more", with_frame, do_frame, 1},
+                                       {"scene_render", with_scene, do_scene, 1},
+                                       {"environment", with_context, do_environment, 0},
+                                       {"model_bounds", with_model, do_bounds, 1},
+                                       {"checkpoint_iteration", with_context, do_iteration, 0},
                                        {"compare", with_frame, do_compare, 0},
                                        {"evaluate", with_frame, do_evaluate, 1},
                                        {"refine_photo", with_frame, do_refine, 1},

@@ -1,5 +1,5 @@
 /* What makes no sense is refused and named: every setting and option just outside of its range, and NaN;
-   every argument that is missing. The ends of the ranges are taken. */
+   every argument that is missing. The ends of the ranges are taken. The presets are what comments say. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -46,8 +46,21 @@ static const field settings_fields[] = {
     R(ambient[2], 0, 1e30),
     R(centre[0], -1e30, 1e30),
     R(centre[1], -1e30, 1e30),
-    R(centre[2], -1e30, 1e30)
+    R(centre[2], -1e30, 1e30),
+    R(origin[0], -1e30, 1e30),
+    R(origin[1], -1e30, 1e30),
+    R(origin[2], -1e30, 1e30)
 #undef I
+#undef R
+};
+static const field medium_fields[] = {/* of settings, where no network scatters light */
+#define R(name, low) REAL(ssdgs_settings, medium.name, low, 1e12)
+                                      R(scattering[0], 1e-12),
+                                      R(scattering[1], 1e-12),
+                                      R(scattering[2], 1e-12),
+                                      R(absorption[0], 0),
+                                      R(absorption[1], 0),
+                                      R(absorption[2], 0)
 #undef R
 };
 static const field render_fields[] = {
@@ -153,6 +166,150 @@ static void check_ranges(const field *f, size_t count, void *options, ssdgs_resu
     }
 }
 
+/* Forms of earlier versions are refused as such. */
+static void test_gone(void) {
+    static const char *const names[3] = {"the released form", "Burley's profile",
+                                         "the released angular form"};
+    for (int i = 0; i < 3; i++) {
+        const ssdgs_settings kept = settings;
+        if (i < 2) settings.dipole = 2 + i;
+        else settings.asg = 1;
+        CHECK(make_model() == SSDGS_ERR_ARGUMENT && strstr(ssdgs_error_message(context), names[i]) &&
+              strstr(ssdgs_error_message(context), "gone"));
+        settings = kept;
+    }
+}
+
+/* A field and what its comment says that it is in each preset; NONE where it does not. */
+#define NONE -1e9
+typedef struct preset {
+    const char *name;
+    size_t at;
+    int real;
+    double value[4];
+} preset;
+#define PRESET(type, real, name, ...) \
+    { \
+#name, offsetof(type, name), real, { __VA_ARGS__ } \
+    }
+
+static const preset settings_presets[] = {/* default, published */
+#define I(...) PRESET(ssdgs_settings, 0, __VA_ARGS__)
+#define R(...) PRESET(ssdgs_settings, 1, __VA_ARGS__)
+                                          I(version, SSDGS_VERSION, SSDGS_VERSION),
+                                          I(terms, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS),
+                                          I(baked, 0, 0),
+                                          I(transfer, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE),
+                                          I(asg, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC),
+                                          I(transport, 1, 0),
+                                          I(shadow_on_scattering, 0, 0),
+                                          R(light_scale, 1, 1),
+                                          R(ambient[0], 0, 0),
+                                          R(ambient[1], 0, 0),
+                                          R(ambient[2], 0, 0),
+                                          R(origin[0], 0, 0),
+                                          R(origin[1], 0, 0),
+                                          R(origin[2], 0, 0)
+#undef I
+#undef R
+};
+static const preset render_presets[] = {/* default, exact, fast, preview */
+#define I(...) PRESET(ssdgs_render_options, 0, __VA_ARGS__)
+#define R(...) PRESET(ssdgs_render_options, 1, __VA_ARGS__)
+                                        I(version, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION,
+                                          SSDGS_VERSION),
+                                        I(terms, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS,
+                                          SSDGS_ALL_TERMS),
+                                        I(antialias, 0, 0, 0, 0),
+                                        R(background[0], 0, 0, 0, 0),
+                                        R(background[1], 0, 0, 0, 0),
+                                        R(background[2], 0, 0, 0, 0),
+                                        R(stop, 1.0 / 1024, NONE, 1.0 / 256, 1.0 / 64),
+                                        R(alpha_threshold, NONE, NONE, NONE, 2.0 / 255),
+                                        R(max_error, 1.0 / 16, 0, 1.0 / 4, 1.0 / 2),
+                                        R(light_detail, 1, 1, 0.7, 0.6),
+                                        R(transport_detail, 0.7, 1, 0.6, 0.4)
+#undef I
+#undef R
+};
+static const preset train_presets[] = {/* default, published */
+#define I(...) PRESET(ssdgs_train_options, 0, __VA_ARGS__)
+#define R(...) PRESET(ssdgs_train_options, 1, __VA_ARGS__)
+                                       I(version, SSDGS_VERSION, SSDGS_VERSION),
+                                       I(iterations, 20000, 60000),
+                                       I(schedule, SSDGS_SCHEDULE_MERGED, SSDGS_SCHEDULE_PROGRESSIVE),
+                                       I(random_background, 1, NONE),
+                                       I(initial_points, 10000, NONE),
+                                       I(max_gaussians, 0, NONE),
+                                       I(densify_every, 100, NONE),
+                                       I(densify_from, 200, NONE),
+                                       I(densify_until, 50000, NONE),
+                                       I(opacity_reset_every, 3000, NONE),
+                                       I(batch, 1, 1),
+                                       I(refine, 0, 0),
+                                       R(background[0], 0, 0),
+                                       R(background[1], 0, 0),
+                                       R(background[2], 0, 0),
+                                       R(dssim, 0.2, NONE),
+                                       R(normal_weight, 0.05, 0),
+                                       R(bounds_min[0], -0.5, -0.5),
+                                       R(bounds_min[1], -0.5, -0.5),
+                                       R(bounds_min[2], -0.5, -0.5),
+                                       R(bounds_max[0], 0.5, 0.5),
+                                       R(bounds_max[1], 0.5, 0.5),
+                                       R(bounds_max[2], 0.5, 0.5),
+                                       R(densify_gradient, 4e-4, NONE),
+                                       R(densify_shadow, 0.5, 0),
+                                       R(prune_weight, 0.05, 0),
+                                       R(prune_outside, 0.02, 0),
+                                       R(adam_epsilon, 0.1, 0),
+                                       R(finish, 0.3, 1)
+#undef I
+#undef R
+};
+
+static void check_presets(const preset *p, size_t count, int column, const void *options) {
+    for (; count--; p++) {
+        const unsigned char *at = (const unsigned char *)options + p->at;
+        ssdgs_real real = (ssdgs_real)p->value[column];
+        int whole = 0;
+        if (p->value[column] <= NONE) continue;
+        memcpy(p->real ? (void *)&real : (void *)&whole, at, p->real ? sizeof real : sizeof whole);
+        const double got = p->real ? (double)real : whole;
+        if (!CHECK(fabs(got - p->value[column]) <= 1e-7 * fabs(p->value[column])))
+            printf("    %s = %g, not %g\n", p->name, got, p->value[column]);
+    }
+}
+
+static void test_presets(void) {
+    const ssdgs_settings settings_of[2] = {ssdgs_settings_default(), ssdgs_settings_published()};
+    const ssdgs_render_options render_of[4] = {ssdgs_render_options_default(), ssdgs_render_options_exact(),
+                                               ssdgs_render_options_fast(), ssdgs_render_options_preview()};
+    const ssdgs_train_options train_of[2] = {ssdgs_train_options_default(), ssdgs_train_options_published()};
+#define EACH(table, of) \
+    for (int i = 0; i < (int)(sizeof of / sizeof *of); i++) \
+    check_presets(table, sizeof table / sizeof *table, i, of + i)
+    EACH(settings_presets, settings_of);
+    EACH(render_presets, render_of);
+    EACH(train_presets, train_of);
+#undef EACH
+    for (int i = 0; i < 27; i++) CHECK(!(fabs((double)render_of[0].ambient[i / 3][i % 3]) > 0));
+    for (int i = 0; i < 2; i++) CHECK(train_of[i].seed == 1 && !train_of[i].sum.add); /* no int, no number */
+    CHECK(settings_of[0].scattering.width < settings_of[1].scattering.width &&
+          settings_of[0].scattering.layers < settings_of[1].scattering.layers);
+    const ssdgs_gaussian g = ssdgs_gaussian_default(); /* grey, opacity 0.1, 0.02 wide, at 0 */
+    for (int c = 0; c < 3; c++)
+        CHECK(!(fabs((double)g.position[c]) > 0) && fabs((double)g.scale[c] - 0.02) < 0.005 &&
+              fabs((double)g.diffuse[c] - (double)g.diffuse[0]) < 1e-6);
+    CHECK(fabs((double)g.opacity - 0.1) < 1e-6);
+    const ssdgs_object object = ssdgs_object_default(model);
+    CHECK(object.model == model && !object.mask);
+    const ssdgs_real ones[6] = {object.tint[0],   object.tint[1],  object.tint[2],
+                                object.roughness, object.specular, object.translucency};
+    for (int i = 0; i < 12; i++) CHECK(!(fabs((double)object.to_world[i] - (i % 5 == 0)) > 0));
+    for (int i = 0; i < 6; i++) CHECK(!(fabs((double)ones[i] - 1) > 0));
+}
+
 static void test_bounds(void) {
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 4; k++) {
@@ -249,6 +406,26 @@ static void test_messages(void) {
     CHECK(!trainer);
 }
 
+/* How far a checkpoint's run had come; what is none. */
+static void test_checkpoint(ssdgs_trainer *trainer) {
+    static const char path[] = "build/t_refuse.run";
+    int iteration = 7;
+    MISSING(ssdgs_checkpoint_iteration(NULL, path, &iteration));
+    MISSING(ssdgs_checkpoint_iteration(context, NULL, &iteration));
+    MISSING(ssdgs_checkpoint_iteration(context, path, NULL));
+    for (int i = 0; i < 3; i++) {
+        CHECK(!ssdgs_trainer_save(trainer, path));
+        CHECK(!ssdgs_checkpoint_iteration(context, path, &iteration) && iteration == i);
+        CHECK(!ssdgs_trainer_step(trainer, NULL));
+    }
+    CHECK(!ssdgs_model_save(model, path));
+    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration) == SSDGS_ERR_FORMAT);
+    CHECK(strstr(ssdgs_error_message(context), path) != NULL);
+    remove(path);
+    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration) == SSDGS_ERR_IO);
+    CHECK(strstr(ssdgs_error_message(context), path) != NULL);
+}
+
 static void test_missing(void) {
     static unsigned char byte = 0;
     static const ssdgs_real nowhere[3] = {0, (ssdgs_real)INFINITY, 0};
@@ -335,6 +512,7 @@ static void test_missing(void) {
     MISSING(ssdgs_trainer_save(trainer, NULL));
     MISSING(ssdgs_trainer_load(NULL, "build/none"));
     MISSING(ssdgs_trainer_load(trainer, NULL));
+    test_checkpoint(trainer);
     ssdgs_trainer_destroy(trainer);
     settings.baked = 1;
     CHECK(!ssdgs_model_create(context, &settings, 0, &made));
@@ -396,13 +574,21 @@ static void test_gaussian(void) {
     CHECK(fabs(exp(RAW(SSDGS_ASG_WEIGHT)) - 30) < 1e-4 && fabs(exp(RAW(SSDGS_ASG_WEIGHT + 1)) - 0.5) < 1e-6);
     CHECK(fabs(1 / (1 + exp(3.1780538303479458 - RAW(SSDGS_ASG_WEIGHT + 2))) - 0.08) < 1e-6);
     /* a frame that has the normal stays, whichever way it turns about it */
-    const double w = RAW(SSDGS_FRAME), x = RAW(SSDGS_FRAME + 1), y = RAW(SSDGS_FRAME + 2);
-    const double turned[4] = {0.8 * w, 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x, 0.6 * w};
+    const double w = RAW(SSDGS_FRAME), x = RAW(SSDGS_FRAME + 1), y = RAW(SSDGS_FRAME + 2),
+                 z = RAW(SSDGS_FRAME + 3);
+    const double turned[4] = {0.8 * w - 0.6 * z, 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x, 0.8 * z + 0.6 * w};
     for (size_t i = 0; i < 4; i++) v.gaussians[(SSDGS_FRAME + i) * v.stride + 1] = (ssdgs_real)turned[i];
     ssdgs_gaussian again;
     CHECK(!ssdgs_model_get(two, 1, &again));
     CHECK_NEAR(again.normal, back.normal, 3, tolerance, 0, "turned about its normal");
     CHECK(!ssdgs_model_set(two, 1, &again) && RAW(SSDGS_FRAME + 3) == (double)(ssdgs_real)turned[3]);
+    /* and turns where the Gaussian does */
+    ssdgs_gaussian quarter = ssdgs_gaussian_default();
+    quarter.normal[2] = 1;
+    CHECK(!ssdgs_model_set(two, 1, &quarter));
+    quarter.rotation[0] = quarter.rotation[3] = 1;
+    CHECK(!ssdgs_model_set(two, 1, &quarter) && RAW(SSDGS_FRAME) > 0 &&
+          fabs(RAW(SSDGS_FRAME + 3) / RAW(SSDGS_FRAME) - 1) < 1e-6);
     for (int i = 0; i < 2; i++) { /* a normal may have any length */
         for (int c = 0; c < 3; c++) g.normal[c] = (ssdgs_real)((c - 1) * (i ? 1e25 : 1e-25));
         CHECK(!ssdgs_model_set(two, 1, &g) && !ssdgs_model_get(two, 1, &again));
@@ -454,6 +640,12 @@ int main(void) {
     check_ranges(settings_fields, sizeof settings_fields / sizeof *settings_fields, &settings, make_model);
     check_ranges(render_fields, sizeof render_fields / sizeof *render_fields, &render_options, render);
     check_ranges(train_fields, sizeof train_fields / sizeof *train_fields, &train_options, make_trainer);
+    settings.scattering.layers = 0;
+    for (int c = 0; c < 3; c++) settings.medium.scattering[c] = 1;
+    check_ranges(medium_fields, sizeof medium_fields / sizeof *medium_fields, &settings, make_model);
+    settings = ssdgs_settings_default();
+    test_gone();
+    test_presets();
     test_bounds();
     test_curve();
     test_missing();

@@ -817,7 +817,65 @@ static void test_bounds(void) {
     ssdgs_model_destroy(model), ssdgs_model_destroy(empty);
 }
 
-/* ---- cameras of engines ---- */
+/* ---- cameras ---- */
+
+/* A camera at eye looks at target, as wide as fov_x, upright by up; any up makes a camera. */
+static void test_look_at(void) {
+    enum { W = 80, H = 50 };
+    for (int i = 0; i < 100; i++) {
+        const uint64_t at = 16 * (uint64_t)i;
+        const double fov = 0.1 + 2.5 * draw(at + 9);
+        ssdgs_real eye[3], target[3], up[3];
+        double distance = 0, length = 0, upright = 0, level = 0, error = 0;
+        for (uint64_t c = 0; c < 3; c++) {
+            eye[c] = (ssdgs_real)(8 * draw(at + c) - 4);
+            target[c] = (ssdgs_real)(8 * draw(at + 3 + c) - 4);
+            const double ahead = (double)(target[c] - eye[c]);
+            up[c] = (ssdgs_real)(i < 60   ? 2 * draw(at + 6 + c) - 1
+                                 : i < 70 ? 0.0
+                                 : i < 80 ? ahead
+                                 : i < 90 ? -3 * ahead
+                                          : (i & 1 ? 1e30 : 1e-30) * (draw(at + 6 + c) - 0.5));
+            distance += ahead * ahead;
+            length += (double)up[c] * (double)up[c];
+        }
+        distance = sqrt(distance), length = sqrt(length);
+        const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)fov, W, H);
+        CHECK(camera.width == W && camera.height == H && !(camera.near_plane > 0));
+        double point[3][3]; /* the eye, the target, what is beside it: seen by the camera */
+        for (int k = 0; k < 3; k++)
+            for (int r = 0; r < 3; r++) {
+                point[k][r] = (double)camera.view[4 * r + 3];
+                for (int c = 0; c < 3; c++)
+                    point[k][r] +=
+                        (double)camera.view[4 * r + c] *
+                        (k == 0   ? (double)eye[c]
+                         : k == 1 ? (double)target[c]
+                                  : (double)target[c] + (double)camera.view[c] * distance * tan(fov / 2));
+            }
+        for (int r = 0; r < 3; r++) error = test_most(error, fabs(point[0][r]));
+        CHECK(error < 1e-5 && fabs(point[1][2] - distance) < 1e-5 && fabs(point[2][2] - distance) < 1e-4);
+        for (int k = 1; k < 3; k++) {
+            const double x = (double)camera.fx * point[k][0] / point[k][2] + (double)camera.cx,
+                         y = (double)camera.fy * point[k][1] / point[k][2] + (double)camera.cy;
+            CHECK(fabs(x - (k == 1 ? W / 2 : W)) < 2e-3 && fabs(y - H / 2) < 2e-3);
+        }
+        const ssdgs_real *v = camera.view;
+        for (int r = 0; r < 9; r++) {
+            double dot = 0;
+            for (int c = 0; c < 3; c++) dot += (double)v[4 * (r / 3) + c] * (double)v[4 * (r % 3) + c];
+            CHECK(fabs(dot - (r / 3 == r % 3)) < 1e-6);
+        }
+        CHECK(v[0] * (v[5] * v[10] - v[6] * v[9]) - v[1] * (v[4] * v[10] - v[6] * v[8]) +
+                  v[2] * (v[4] * v[9] - v[5] * v[8]) >
+              (ssdgs_real)0.999);
+        for (int c = 0; c < 3; c++) {
+            level += (double)v[c] * (double)up[c] / length;
+            upright -= (double)v[4 + c] * (double)up[c] / length; /* y points down */
+        }
+        if (i < 60 || i >= 90) CHECK(fabs(level) < 1e-5 && upright > 0);
+    }
+}
 
 /* Engines' matrices, made from a camera by their books, give the camera back: right-handed and looking along
    -z, left-handed and along z, rows or columns, any range of depths, y up or down. */
@@ -1129,6 +1187,7 @@ static void test_kept(void) {
 }
 
 static size_t held, most;
+static long allocations;
 static int fails_after = -1; /* so many allocations, once; -1: none fails */
 static void *count_allocate(void *user, size_t bytes) {
     (void)user;
@@ -1136,6 +1195,7 @@ static void *count_allocate(void *user, size_t bytes) {
     size_t *memory = (size_t *)malloc(bytes + 16);
     if (!memory) return NULL;
     *memory = bytes;
+    allocations++;
     held += bytes;
     most = held > most ? held : most;
     return memory + 16 / sizeof *memory;
@@ -1147,8 +1207,8 @@ static void count_release(void *user, void *memory) {
     free(from);
 }
 
-/* Any number of threads; nothing allocated from the second frame on, though things move; a model that stands
-   in many places is there once. */
+/* Any number of threads; nothing allocated from the second frame on, once it has been where things move to; a
+   model that stands in many places is there once. */
 static void test_threads_and_memory(void) {
     ssdgs_settings s = small_settings();
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
@@ -1172,6 +1232,16 @@ static void test_threads_and_memory(void) {
         for (int i = 0; i < 6; i++) object[i].tint[0] = (ssdgs_real)0.5;
         together(object, 6, &camera, &light, 1, NULL, shot + 2);
         CHECK(held == after && most == after && models > 0);
+        long before = 0;
+        for (int frame = 0; frame < 8; frame++) { /* all move to and fro between two places */
+            const ssdgs_camera from = frame & 1 ? camera_from(-1.3, -1.6, 0.3) : camera;
+            const ssdgs_light by = frame & 1 ? point_light(-1.5, -2, 1) : light;
+            if (frame == 2) before = allocations;
+            object[0] = placed(model[0], frame & 1, 0.5, 0, 0.3 * (frame & 1), 0, 0);
+            together(object, 6, &from, &by, 1, NULL, shot + 2);
+            CHECK(!shot[2].stats.camera_cached && !shot[2].stats.lights_cached);
+        }
+        if (!CHECK(allocations == before)) printf("    %ld allocations\n", allocations - before);
         ssdgs_scene_destroy(scene);
         ssdgs_model_destroy(model[0]), ssdgs_model_destroy(model[1]);
         ssdgs_context_destroy(context);
@@ -1522,6 +1592,7 @@ int main(void) {
     test_ahead();
     test_spot();
     test_bounds();
+    test_look_at();
     test_matrices();
     test_left_handed();
     test_kept();

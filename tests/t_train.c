@@ -609,7 +609,7 @@ static void test_allocation(void) {
     printf("%ld allocations, each failed once\n", calls);
 }
 
-/* After the first frame of a size nothing is allocated. */
+/* After the first frame of a size nothing is allocated, nor where things move to and fro. */
 static void test_steady(void) {
     static ssdgs_real color[SIDE * SIDE * 3];
     counter c;
@@ -630,6 +630,17 @@ static void test_steady(void) {
     const long calls = c.calls;
     for (int i = 0; i < 5; i++) CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
     CHECK(c.calls == calls);
+    long before = 0;
+    for (int i = 0; i < 8; i++) {
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
+        for (int j = 0; j < 100; j++)
+            for (size_t k = 0; k < 3; k++)
+                v.gaussians[(SSDGS_POSITION + k) * v.stride + (size_t)j] =
+                    (ssdgs_real)(0.6 * test_uniform(5 + (uint64_t)(i & 1), 3 * (uint64_t)j + k) - 0.3);
+        if (i == 2) before = c.calls;
+        CHECK(!ssdgs_render(model, &photos[i & 1].camera, &photos[i & 1].light, 1, &image));
+    }
+    CHECK(c.calls == before);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
     CHECK(c.live == 0);
