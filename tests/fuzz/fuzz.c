@@ -1,8 +1,7 @@
 /* Everything that reads what others wrote, and most numbers that a caller may set, under any bytes at all.
    Built plainly, it runs each FILE once, as the target that its folder is named after: seeds and past
    findings. Built with -DLIBFUZZER -fsanitize=fuzzer (`make fuzz`), it is libFuzzer for the target that the
-   program is named after. A finding ends the program. Not drawn: scenes, spots, ranges, ambient light, media,
-   batches. */
+   program is named after. A finding ends the program. Not drawn: threads, processes that share a batch. */
 #define SSDGS_IMPLEMENTATION
 #include "../../ssdgs.h"
 #include "../../examples/olat.h"
@@ -70,6 +69,18 @@ static ssdgs_real draw_real(input *in, double otherwise, double range) {
     return (ssdgs_real)value;
 }
 
+static ssdgs_real draw_size(input *in, double otherwise, double range) {
+    const ssdgs_real value = draw_real(in, otherwise, range);
+    return value < 0 ? -value : value;
+}
+
+/* Whether it was done; a failure has a message of its own. */
+static int done(ssdgs_context *context, ssdgs_result result) {
+    HOLDS(!result || context->message[0]);
+    context->message[0] = 0;
+    return !result;
+}
+
 static ssdgs_context *draw_context(input *in) {
     ssdgs_context *context = NULL;
     ssdgs_context_desc desc;
@@ -110,10 +121,25 @@ static ssdgs_settings draw_settings(input *in) {
     return s;
 }
 
-/* NULL where the settings are refused. */
-static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most) {
-    const ssdgs_settings settings = draw_settings(in);
+/* What joined later is drawn last, by more_ functions: older inputs have no bytes left there. */
+static void more_settings(input *in, ssdgs_settings *s) {
+    const int flags = draw(in);
+    if (flags & 1) s->scattering.layers = 0, s->transport = 1;
+    if (flags & 2) s->octaves.view = draw_below(in, 9);
+    if (flags & 4) s->octaves.light = draw_below(in, 9);
+    for (int i = 0; i < 3; i++) {
+        s->medium.scattering[i] = draw_size(in, 3, 20);
+        s->medium.absorption[i] = draw_size(in, 0.1, 1);
+        s->ambient[i] = draw_size(in, 0, 1);
+        s->origin[i] = draw_real(in, 0, 2);
+    }
+}
+
+/* NULL where the settings are refused. more: where the rest of them is drawn, or NULL. */
+static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most, input *more) {
+    ssdgs_settings settings = draw_settings(in);
     ssdgs_model *model = NULL;
+    if (more) more_settings(more, &settings);
     if (ssdgs_model_create(context, &settings, draw_below(in, most + 1), &model)) return NULL;
     for (int i = 0; i < model->count; i++)
         for (int c = 0; c < SSDGS_CHANNELS; c++) {
@@ -126,6 +152,14 @@ static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most) {
         model->globals[at % model->global_count] = draw_real(in, 0, 6);
     }
     return model;
+}
+
+/* Draws the model again, with more settings where the input has them. */
+static ssdgs_model *redraw_model(ssdgs_model *model, input from, int most, input *more) {
+    if (!model || more->at == more->end) return model;
+    ssdgs_context *context = model->context;
+    ssdgs_model_destroy(model);
+    return draw_model(&from, context, most, more);
 }
 
 static ssdgs_camera draw_camera(input *in, int side) {
@@ -144,20 +178,37 @@ static ssdgs_camera draw_camera(input *in, int side) {
     return camera;
 }
 
+static void make_unit(ssdgs_real v[3]) {
+    double length = 0;
+    for (int i = 0; i < 3; i++) length += (double)v[i] * (double)v[i];
+    for (int i = 0; length > 0 && i < 3; i++) v[i] = (ssdgs_real)((double)v[i] / sqrt(length));
+}
+
 static ssdgs_light draw_light(input *in) {
     ssdgs_light light;
-    double length = 0;
     int kind = draw(in) & 3; /* 1: directional; 3: so, and of whatever length it was given */
     memset(&light, 0, sizeof light);
     light.kind = kind & 1 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
     for (int i = 0; i < 3; i++) {
         light.position[i] = draw_real(in, i - 1, 3);
         light.intensity[i] = draw_real(in, 9, 10);
-        length += (double)light.position[i] * (double)light.position[i];
     }
-    for (int i = 0; kind == 1 && length > 0 && i < 3; i++)
-        light.position[i] = (ssdgs_real)((double)light.position[i] / sqrt(length));
+    if (kind == 1) make_unit(light.position);
     return light;
+}
+
+/* A spot shines at the middle unless it is told otherwise. */
+static void more_light(input *in, ssdgs_light *light) {
+    const int flags = draw(in);
+    if (!flags) return;
+    if (flags & 1) light->kind = SSDGS_LIGHT_SPOT;
+    light->unshadowed = flags >> 1 & 1;
+    for (int i = 0; i < 3; i++) light->direction[i] = draw_real(in, -(double)light->position[i], 1);
+    if (!(flags & 4)) make_unit(light->direction);
+    light->cone[0] = draw_size(in, 0.2, 1);
+    light->cone[1] = light->cone[0] + draw_size(in, 0.3, 2);
+    light->range = draw_size(in, 0, 5);
+    light->focus = draw_size(in, 0, 20);
 }
 
 static int all_finite(const ssdgs_real *values, size_t count) {
@@ -167,7 +218,7 @@ static int all_finite(const ssdgs_real *values, size_t count) {
 }
 
 static int model_finite(const ssdgs_model *model) {
-    int finite = all_finite(model->globals, model->global_count);
+    int finite = all_finite(model->globals, model->global_count) && all_finite(model->settings.ambient, 3);
     for (int c = 0; c < SSDGS_CHANNELS; c++)
         finite &= all_finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
     return finite;
@@ -175,6 +226,7 @@ static int model_finite(const ssdgs_model *model) {
 
 static uint64_t model_hash(const ssdgs_model *model) {
     uint64_t hash = ssdgs__fold(1, model->globals, model->global_count * sizeof(ssdgs_real));
+    hash = ssdgs__fold(hash, model->settings.ambient, sizeof model->settings.ambient);
     for (int c = 0; c < SSDGS_CHANNELS; c++)
         hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity,
                            (size_t)model->count * sizeof(ssdgs_real));
@@ -184,15 +236,18 @@ static uint64_t model_hash(const ssdgs_model *model) {
 /* ---- rendering: no NaN from tame numbers, coverage within 0 and 1, the same bits from a context that kept
    results ---- */
 
-#define PLANES 8
-static const int plane_channels[PLANES] = {3, 1, 1, 3, 3, 3, 3, 1}; /* of ssdgs_image, in order */
+enum { PLANES = 9, MOST_SIDE = 40, MOST_STRIDE = MOST_SIDE + 3, MOST_LIGHTS = 4, MOST_OBJECTS = 3 };
+static const int plane_channels[PLANES] = {3, 1, 1, 3, 3, 3, 3, 1, 1}; /* of ssdgs_image, in order */
 
 typedef struct picture {
     ssdgs_camera camera;
-    ssdgs_light lights[2];
+    ssdgs_light lights[MOST_LIGHTS];
     ssdgs_render_options options;
-    ssdgs_real *planes[PLANES];
-    int light_count, stride, wanted;
+    ssdgs_real *planes[PLANES], depth[MOST_SIDE * MOST_STRIDE]; /* depth: the scene's, where `hidden` */
+    int light_count, stride, wanted, hidden;
+    ssdgs_scene *scene; /* NULL: of a model alone */
+    ssdgs_object objects[MOST_OBJECTS];
+    int object_count, passes; /* passes: what an occluder lets pass, of 255 */
 } picture;
 
 static size_t plane_values(const picture *p, int plane) {
@@ -202,9 +257,9 @@ static size_t plane_values(const picture *p, int plane) {
 static void draw_picture(input *in, picture *p) {
     ssdgs_render_options *o = &p->options;
     memset(p, 0, sizeof *p);
-    p->camera = draw_camera(in, 40);
+    p->camera = draw_camera(in, MOST_SIDE);
     p->stride = p->camera.width + draw_below(in, 4);
-    p->wanted = ~draw(in);
+    p->wanted = ~draw(in) & 255;
     p->light_count = (1 + draw(in)) % 3;
     for (int i = 0; i < p->light_count; i++) p->lights[i] = draw_light(in);
     *o = draw(in) & 1 ? ssdgs_render_options_exact() : ssdgs_render_options_default();
@@ -216,6 +271,20 @@ static void draw_picture(input *in, picture *p) {
     o->light_detail = draw_real(in, 1, 1);
     if (o->light_detail > 1) o->light_detail = 1; /* larger maps cost time alone */
     for (int i = 0; i < 3; i++) o->background[i] = draw_real(in, 0.5, 1);
+}
+
+static void more_picture(input *in, picture *p) {
+    ssdgs_render_options *o = &p->options;
+    ssdgs_real depth[5];
+    const int flags = draw(in);
+    for (int i = 0; i < p->light_count; i++) more_light(in, p->lights + i);
+    o->transport_detail = draw_size(in, (double)o->transport_detail, 1);
+    if (o->transport_detail > 1) o->transport_detail = 1; /* as light_detail */
+    for (int i = 0; flags & 1 && i < 27; i++) o->ambient[i / 3][i % 3] = draw_real(in, 0, 1);
+    p->wanted |= (flags & 2) << 7;
+    p->hidden = flags >> 2 & 1;
+    for (int i = 0; p->hidden && i < 5; i++) depth[i] = draw_size(in, HUGE_VAL, 6);
+    for (int i = 0; p->hidden && i < MOST_SIDE * MOST_STRIDE; i++) p->depth[i] = depth[i % 5];
 }
 
 static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
@@ -233,7 +302,12 @@ static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
     image.specular = p->planes[5];
     image.scattering = p->planes[6];
     image.shadow = p->planes[7];
+    image.median_depth = p->planes[8];
+    if (p->hidden) image.scene_depth = p->depth;
     ssdgs_render_stats stats;
+    if (p->scene)
+        return ssdgs_scene_render(p->scene, p->objects, p->object_count, &p->camera, p->lights,
+                                  p->light_count, &p->options, &image, &stats);
     return ssdgs_render_ex(model, &p->camera, p->lights, p->light_count, &p->options, &image, &stats);
 }
 
@@ -251,18 +325,27 @@ static void check_picture(const picture *p, int tame) {
         }
 }
 
+static void check_same(const picture *p, const picture *other) {
+    for (int i = 0; i < PLANES; i++)
+        if (p->planes[i])
+            HOLDS(!memcmp(p->planes[i], other->planes[i], plane_values(p, i) * sizeof(ssdgs_real)));
+}
+
 static void fuzz_render(const unsigned char *data, size_t size) {
+    static picture pictures[3];
     input in = {data, data + size, 1};
     ssdgs_context *context = draw_context(&in), *other = NULL;
-    ssdgs_model *model = draw_model(&in, context, 12), *twin = NULL;
-    int frames = model ? 1 + draw_below(&in, 3) : 0;
-    for (int i = 0; i < frames; i++) {
-        picture p;
-        draw_picture(&in, &p);
-        picture again = p;
-        const ssdgs_result result = take_picture(model, &p);
-        if (!result) check_picture(&p, in.tame);
-        if (!result && i == frames - 1 && i > 0) {
+    const input from = in;
+    ssdgs_model *model = draw_model(&in, context, 12, NULL), *twin = NULL;
+    const int frames = model ? 1 + draw_below(&in, 3) : 0;
+    for (int i = 0; i < frames; i++) draw_picture(&in, pictures + i);
+    for (int i = 0; i < frames; i++) more_picture(&in, pictures + i);
+    model = redraw_model(model, from, 12, &in);
+    for (int i = 0; model && i < frames; i++) {
+        picture *p = pictures + i, again = *p;
+        const int taken = done(context, take_picture(model, p));
+        if (taken) check_picture(p, in.tame);
+        if (taken && i == frames - 1 && i > 0) {
             ssdgs_context_desc desc;
             memset(&desc, 0, sizeof desc);
             desc.threads = 1;
@@ -272,17 +355,177 @@ static void fuzz_render(const unsigned char *data, size_t size) {
             memcpy(twin->globals, model->globals, model->global_count * sizeof(ssdgs_real));
             memcpy(twin->gaussians, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof(ssdgs_real));
             HOLDS(!take_picture(twin, &again));
-            for (i = 0; i < PLANES; i++)
-                if (p.planes[i])
-                    HOLDS(!memcmp(p.planes[i], again.planes[i], plane_values(&p, i) * sizeof(ssdgs_real)));
+            check_same(p, &again);
             drop_picture(&again);
-            i = frames;
         }
-        drop_picture(&p);
+        drop_picture(p);
     }
     ssdgs_model_destroy(twin);
     ssdgs_context_destroy(other);
     ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* ---- scenes: pictures as those of models alone, the same bits from a scene that kept results and a new one,
+   shadows within 0 and 1; models edited in between ---- */
+
+static void occlude(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    const picture *p = (const picture *)user;
+    HOLDS(light >= 0 && light < p->light_count);
+    for (int i = 0; i < count; i++)
+        if (points[3 * i] > 0) fraction[i] *= (ssdgs_real)p->passes / 255;
+}
+
+static void draw_rotation(input *in, ssdgs_real r[9]) {
+    ssdgs_real raw[4], q[4];
+    for (int i = 0; i < 4; i++) raw[i] = draw_real(in, i == 0, 1);
+    ssdgs__rotation_scalar(raw, q, r);
+}
+
+static ssdgs_object draw_object(input *in, ssdgs_model *const models[2]) {
+    static const unsigned char mask[8] = {255, 0, 128, 1, 254, 255, 0, 64};
+    const int flags = draw(in);
+    ssdgs_object o = ssdgs_object_default(models[flags & 1]);
+    ssdgs_real r[9];
+    draw_rotation(in, r);
+    const ssdgs_real scale = draw_real(in, 1, 2);
+    for (int i = 0; i < 9; i++)
+        o.to_world[i / 3 * 4 + i % 3] = flags & 2 && i % 3 ? -scale * r[i] : scale * r[i];
+    for (int i = 0; i < 3; i++) {
+        o.to_world[4 * i + 3] = draw_real(in, 0, 2);
+        o.tint[i] = draw_size(in, 1, 2);
+    }
+    const int changed = flags & 4 ? draw_below(in, 12) : 0;
+    if (flags & 4) o.to_world[changed] = draw_real(in, 0, 2);
+    o.roughness = draw_size(in, 1, 4);
+    o.specular = draw_size(in, 1, 4);
+    o.translucency = draw_size(in, 1, 4);
+    if (flags & 8) o.mask = mask;
+    return o;
+}
+
+/* The camera as an engine's matrices, some of their elements drawn. */
+static void draw_matrices(input *in, ssdgs_context *context, ssdgs_camera *camera) {
+    const int flags = draw(in), width = camera->width, height = camera->height;
+    ssdgs_real m[2][16], passed[2][16];
+    memset(m, 0, sizeof m);
+    for (int i = 0; i < 12; i++) m[0][i] = i < 4 && !(flags & 4) ? camera->view[i] : -camera->view[i];
+    m[1][0] = 2 * camera->fx / (ssdgs_real)width;
+    m[1][2] = 1 - 2 * camera->cx / (ssdgs_real)width;
+    m[1][5] = 2 * camera->fy / (ssdgs_real)height;
+    m[1][6] = 2 * camera->cy / (ssdgs_real)height - 1;
+    m[0][15] = 1;
+    m[1][14] = -1;
+    for (int i = draw_below(in, 4); i > 0; i--) {
+        const int at = draw_below(in, 32);
+        m[at / 16][at % 16] = draw_real(in, 0, 2);
+    }
+    for (int i = 0; i < 32; i++)
+        passed[i / 16][i % 16] = m[i / 16][flags & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i % 16 / 4 : i % 16];
+    done(context,
+         ssdgs_camera_from_matrices(context, passed[0], passed[1], flags & 11, width, height, camera));
+}
+
+static void draw_sky(input *in, ssdgs_context *context, picture *p) {
+    ssdgs_real pixels[8 * 4 * 3], turn[9];
+    const int flags = draw(in), width = 1 + draw_below(in, 8), height = 1 + draw_below(in, 4);
+    const int count = draw_below(in, MOST_LIGHTS + 1);
+    for (int i = 0; i < 8 * 4 * 3; i++) pixels[i] = i < 5 ? draw_size(in, 1, 2) : pixels[i * i % 11 % 5];
+    draw_rotation(in, turn);
+    ssdgs_real(*ambient)[3] = flags & 2 ? p->options.ambient : NULL;
+    if (!done(context, ssdgs_environment(context, pixels, width, height, flags & 1 ? turn : NULL, p->lights,
+                                         count, ambient)))
+        return;
+    p->light_count = count;
+    if (in->tame)
+        HOLDS(!ssdgs__lights_check(context, p->lights, count) && all_finite(p->options.ambient[0], 27));
+}
+
+/* A Gaussian is set, and read back; Gaussians are merged, sorted, and their box taken. */
+static void edit_model(input *in, ssdgs_model *model) {
+    ssdgs_context *context = model->context;
+    const int flags = draw(in), index = draw_below(in, 10), before = model->count;
+    ssdgs_gaussian g = ssdgs_gaussian_default(), back;
+    ssdgs_real v[sizeof g / sizeof(ssdgs_real)], roughness[2], low[3], high[3];
+    memcpy(v, &g, sizeof g);
+    for (size_t i = 0; flags & 1 && i < sizeof v / sizeof *v; i++) /* position, rotation, normal have signs */
+        v[i] = i < 7 || (i > 9 && i < 13) ? draw_real(in, (double)v[i], 1) : draw_size(in, (double)v[i], 1);
+    memcpy(&g, v, sizeof g);
+    for (int i = 0; flags & 2 && i < 2; i++) roughness[i] = draw_size(in, 0.3, 1);
+    if (flags & 2) done(context, ssdgs_gaussian_mirror(model, roughness, &g));
+    if (done(context, ssdgs_model_set(model, index, &g))) {
+        HOLDS(done(context, ssdgs_model_get(model, index, &back)));
+        memcpy(v, &back, sizeof back);
+        for (size_t i = 0; i < sizeof v / sizeof *v; i++) /* highlights are set where they are deferred */
+            HOLDS(!is_nan(v[i]) || (i > 22 && i < 27 && model->settings.asg != SSDGS_ASG_DEFERRED));
+        HOLDS(!memcmp(g.position, back.position, sizeof back.position) &&
+              fabs((double)(g.opacity - back.opacity)) < 1e-4);
+    }
+    if (flags & 4) {
+        const int most = draw_below(in, 10), finite = model_finite(model);
+        if (done(context, ssdgs_model_reduce(model, most)))
+            HOLDS(before <= most ? model->count == before : model->count <= most);
+        if (finite) HOLDS(model_finite(model));
+    }
+    if (flags & 8) HOLDS(done(context, ssdgs_model_sort(model)));
+    if (flags & 16) HOLDS(done(context, ssdgs_model_bounds(model, low, high)));
+    for (int i = 0; flags & 16 && in->tame && i < 3; i++) HOLDS(low[i] <= high[i]);
+}
+
+static void check_shadow(input *in, const picture *p) {
+    ssdgs_context *context = p->scene->context;
+    ssdgs_real points[4 * 3], fraction[4];
+    const int light = draw_below(in, MOST_LIGHTS + 1) - 1;
+    for (int i = 0; i < 4 * 3; i++) points[i] = draw_real(in, i % 3 - 1, 2);
+    const int lit = done(context, ssdgs_scene_light(p->scene, p->objects, p->object_count, p->lights,
+                                                    p->light_count, &p->options));
+    if (!done(context, ssdgs_scene_shadow(p->scene, light, points, 4, fraction))) return;
+    HOLDS(lit && light >= 0 && light < p->light_count);
+    for (int i = 0; i < 4; i++)
+        if (all_finite(points + 3 * i, 3)) HOLDS(fraction[i] >= 0 && fraction[i] <= 1);
+}
+
+static void fuzz_scene(const unsigned char *data, size_t size) {
+    static picture p, again;
+    input in = {data, data + size, 1};
+    ssdgs_context *context = draw_context(&in);
+    ssdgs_model *models[2];
+    ssdgs_scene *scene = NULL;
+    for (int i = 0; i < 2; i++) {
+        models[i] = draw_model(&in, context, 8, &in);
+        HOLDS(models[i] || done(context, ssdgs_model_create(context, NULL, 2, models + i)));
+    }
+    HOLDS(done(context, ssdgs_scene_create(context, &scene)));
+    for (int frames = 1 + draw_below(&in, 3); frames > 0; frames--) {
+        draw_picture(&in, &p);
+        more_picture(&in, &p);
+        const int flags = draw(&in);
+        p.scene = scene;
+        p.object_count = (1 + draw(&in)) % (MOST_OBJECTS + 1);
+        for (int i = 0; i < p.object_count; i++) p.objects[i] = draw_object(&in, models);
+        if (flags & 2) draw_matrices(&in, context, &p.camera);
+        if (flags & 4) draw_sky(&in, context, &p);
+        if (flags & 8) edit_model(&in, models[flags & 1]);
+        p.passes = draw(&in);
+        ssdgs_occluder occluder = {occlude, &p, 0};
+        occluder.revision = (uint64_t)p.passes;
+        ssdgs_scene_occlude(scene, flags & 16 ? &occluder : NULL);
+        if (flags & 32) check_shadow(&in, &p);
+        again = p;
+        if (done(context, take_picture(NULL, &p))) {
+            check_picture(&p, in.tame);
+            occluder.user = &again;
+            HOLDS(!ssdgs_scene_create(context, &again.scene));
+            ssdgs_scene_occlude(again.scene, flags & 16 ? &occluder : NULL);
+            HOLDS(done(context, take_picture(NULL, &again)));
+            check_same(&p, &again);
+            drop_picture(&again);
+            ssdgs_scene_destroy(again.scene);
+        }
+        drop_picture(&p);
+    }
+    ssdgs_scene_destroy(scene);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(models[i]);
     ssdgs_context_destroy(context);
 }
 
@@ -328,7 +571,14 @@ static ssdgs_train_options draw_options(input *in) {
     return o;
 }
 
-static void draw_photo(input *in, ssdgs_photo *photo, uint16_t pixels[SIDE * SIDE * 4]) {
+static void more_options(input *in, ssdgs_train_options *o) {
+    o->refine |= draw_below(in, 4) << 2;
+    o->batch = 1 + draw_below(in, 3);
+    o->adam_epsilon = draw_size(in, (double)o->adam_epsilon, 1);
+    o->finish = draw_size(in, (double)o->finish, 1);
+}
+
+static void draw_photo(input *in, ssdgs_photo *photo, uint32_t pixels[SIDE * SIDE * 4]) {
     unsigned char *bytes = (unsigned char *)pixels;
     memset(photo, 0, sizeof *photo);
     photo->camera = draw_camera(in, SIDE);
@@ -337,33 +587,58 @@ static void draw_photo(input *in, ssdgs_photo *photo, uint16_t pixels[SIDE * SID
     photo->pixels = pixels;
     unsigned pattern[4];
     for (size_t i = 0; i < 4; i++) pattern[i] = (unsigned)draw(in);
-    const size_t size =
-        (size_t)(photo->camera.width * photo->camera.height) * (photo->format == SSDGS_PIXELS_RGBA16 ? 8 : 4);
-    for (size_t i = 0; i < size; i++) bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
+    for (size_t i = 0; i < SIDE * SIDE * 4 * sizeof *pixels; i++)
+        bytes[i] = (unsigned char)(pattern[i & 3] + i * (pattern[1] & 15));
+}
+
+/* Halves and floats are within -2 .. 2, alphas within 0 .. 1, unless the pattern's bytes shall stay. */
+static void more_photo(input *in, ssdgs_photo *photo, uint32_t *pixels, ssdgs_light more[2]) {
+    const int flags = draw(in);
+    more_light(in, &photo->light);
+    photo->more = more;
+    photo->more_count = draw_below(in, 3);
+    for (int i = 0; i < photo->more_count; i++) {
+        more[i] = draw_light(in);
+        more_light(in, more + i);
+    }
+    if (flags & 1) photo->format = flags & 2 ? SSDGS_PIXELS_RGBA32F : SSDGS_PIXELS_RGBA16F;
+    for (size_t i = 0; (flags & 5) == 1 && i < SIDE * SIDE * 4; i++) {
+        uint16_t half;
+        memcpy(&half, (unsigned char *)pixels + 2 * i, sizeof half);
+        half = (uint16_t)(half & (i % 4 == 3 ? 0x3BFF : 0xBFFF));
+        if (flags & 2) pixels[i] &= i % 4 == 3 ? 0x3F7FFFFF : 0xBFFFFFFF;
+        else memcpy((unsigned char *)pixels + 2 * i, &half, sizeof half);
+    }
 }
 
 static void step_holds(ssdgs_trainer *trainer) {
     const int finite = model_finite(trainer->model);
     const uint64_t before = model_hash(trainer->model);
     ssdgs_train_stats stats;
-    const ssdgs_result result = ssdgs_trainer_step(trainer, &stats);
-    if (result) HOLDS(model_hash(trainer->model) == before);
+    if (!done(trainer->context, ssdgs_trainer_step(trainer, &stats)))
+        HOLDS(model_hash(trainer->model) == before);
     else if (finite) HOLDS(model_finite(trainer->model));
 }
 
 static void fuzz_train(const unsigned char *data, size_t size) {
-    static uint16_t pixels[2][SIDE * SIDE * 4];
+    static uint32_t pixels[2][SIDE * SIDE * 4];
+    static ssdgs_light more[2][2];
     input in = {data, data + size, 1};
     ssdgs_context *context = draw_context(&in);
-    const ssdgs_train_options options = draw_options(&in);
+    ssdgs_train_options options = draw_options(&in);
     const int photo_count = 1 + draw_below(&in, 2);
     ssdgs_trainer *trainer = NULL;
     ssdgs_photo photos[2];
     int steps = 1 + draw_below(&in, 3);
     for (int i = 0; i < photo_count; i++) draw_photo(&in, photos + i, pixels[i]);
-    ssdgs_model *model = draw_model(&in, context, 8);
-    if (model && !ssdgs_trainer_create(model, photos, photo_count, &options, &trainer)) {
-        trainer->iteration = draw_below(&in, options.iterations); /* each term joins at its time */
+    const input from = in;
+    ssdgs_model *model = draw_model(&in, context, 8, NULL);
+    const int start = draw_below(&in, options.iterations); /* each term joins at its time */
+    more_options(&in, &options);
+    for (int i = 0; i < photo_count; i++) more_photo(&in, photos + i, pixels[i], more[i]);
+    model = redraw_model(model, from, 8, &in);
+    if (model && done(context, ssdgs_trainer_create(model, photos, photo_count, &options, &trainer))) {
+        trainer->iteration = start;
         while (steps-- > 0) step_holds(trainer);
         HOLDS(model->count <= (options.max_gaussians > 40 ? options.max_gaussians : 40));
     }
@@ -376,7 +651,7 @@ static void fuzz_train(const unsigned char *data, size_t size) {
    lengthened ---- */
 
 static void fuzz_checkpoint(const unsigned char *data, size_t size) {
-    static uint16_t pixels[SIDE * SIDE * 4];
+    static uint32_t pixels[SIDE * SIDE * 4];
     static unsigned char *saved, *bytes;
     static size_t saved_size;
     input in = {data, data + size, 1}, defaults = defaults_only();
@@ -947,7 +1222,8 @@ static const target targets[] = {
     {"png", fuzz_png},         {"exr", fuzz_exr},     {"unfilter", fuzz_unfilter},
     {"inflate", fuzz_inflate}, {"json", fuzz_json},   {"json_string", fuzz_json_string},
     {"dataset", fuzz_dataset}, {"ply", fuzz_ply},     {"checkpoint", fuzz_checkpoint},
-    {"render", fuzz_render},   {"train", fuzz_train}, {"hooks", fuzz_hooks}};
+    {"render", fuzz_render},   {"scene", fuzz_scene}, {"train", fuzz_train},
+    {"hooks", fuzz_hooks}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
