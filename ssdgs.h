@@ -64,7 +64,7 @@ WHAT IT COMPUTES
   f_sss  a dipole (eq. 5) of the optical parameters that the scattering network predicts (eq. 4)
   ssdgs_settings_published() is the paper's model. ssdgs_settings_default() differs in what measured as
   better: it shades in linear light, highlights and shadows' edges are found per pixel from what Gaussians
-  blend to (deferred), networks are smaller, and the scattering network also sees what true dipole transport
+  blend to (deferred), and the scattering network is smaller and also sees what true dipole transport
   brings.
 
 CONVENTIONS
@@ -7583,7 +7583,10 @@ static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request 
     ssdgs_frame frame;
     ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
-    if (result) return result;
+    if (result) {
+        if (scene->frame) scene->frame->cache.lights_ready = 0; /* those of an earlier frame */
+        return result;
+    }
     const int kept = frame.views[0].cached;
     frame.views[0].cached = 1;
     result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);

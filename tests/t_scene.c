@@ -716,7 +716,13 @@ static void test_ahead(void) {
         CHECK(ssdgs_scene_shadow(ahead, wrong[i], i < 2 ? point : NULL, 1, &fraction) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_scene_shadow(NULL, 0, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_scene_light(NULL, &object, 1, lights, 2, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(ssdgs_scene_light(ahead, &object, 1, NULL, 2, NULL) == SSDGS_ERR_ARGUMENT);
+    for (int i = 0; i < 2; i++) { /* where one is refused there are none of an earlier frame */
+        CHECK(!ssdgs_scene_light(ahead, &object, 1, lights, 2, NULL));
+        CHECK(!ssdgs_scene_shadow(ahead, 1, point, 1, &fraction));
+        CHECK(ssdgs_scene_light(ahead, i ? &object : NULL, 1, i ? NULL : lights, 2, NULL) ==
+              SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_scene_shadow(ahead, 1, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    }
     ssdgs_scene_occlude(NULL, NULL);
     ssdgs_scene_destroy(ahead);
     ssdgs_model_destroy(model);

@@ -121,7 +121,7 @@ static ssdgs_settings draw_settings(input *in) {
     return s;
 }
 
-/* What joined later is drawn last, by more_ functions: older inputs have no bytes left there. */
+/* What joined later is drawn last, where older inputs have no bytes left: here and in all named more_. */
 static void more_settings(input *in, ssdgs_settings *s) {
     const int flags = draw(in);
     if (flags & 1) s->scattering.layers = 0, s->transport = 1;
@@ -447,8 +447,8 @@ static void edit_model(input *in, ssdgs_model *model) {
     const int flags = draw(in), index = draw_below(in, 10), before = model->count;
     ssdgs_gaussian g = ssdgs_gaussian_default(), back;
     ssdgs_real v[sizeof g / sizeof(ssdgs_real)], roughness[2], low[3], high[3];
-    memcpy(v, &g, sizeof g);
-    for (size_t i = 0; flags & 1 && i < sizeof v / sizeof *v; i++) /* position, rotation, normal have signs */
+    memcpy(v, &g, sizeof g); /* position, rotation and normal are of any sign */
+    for (size_t i = 0; flags & 1 && i < sizeof v / sizeof *v; i++)
         v[i] = i < 7 || (i > 9 && i < 13) ? draw_real(in, (double)v[i], 1) : draw_size(in, (double)v[i], 1);
     memcpy(&g, v, sizeof g);
     for (int i = 0; flags & 2 && i < 2; i++) roughness[i] = draw_size(in, 0.3, 1);
