@@ -123,6 +123,12 @@ static void test_kept(void) {
     FIRST();
     options.alpha_threshold = (ssdgs_real)0.02;
     check_same(model, &a, lights, 2, &options, 0, 0, "another alpha_threshold");
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
+    v.gaussians[(SSDGS_POSITION + 2) * v.stride] *= (ssdgs_real)1.2; /* the topmost, and faint */
+    v.gaussians[SSDGS_OPACITY * v.stride] = -3;
+    FIRST();
+    options.alpha_threshold = (ssdgs_real)0.1;
+    check_same(model, &a, lights, 2, &options, 0, 0, "one that the topmost is below");
     options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
     FIRST();
     options.terms = SSDGS_ALL_TERMS;

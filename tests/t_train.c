@@ -267,7 +267,7 @@ static void test_resume(void) {
         CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
               trainer->start_size > 0);
         ssdgs_trainer_destroy(trainer);
-        for (int i = 0; i < 7; i++) { /* another bias, filter, eta, near plane, format, dipole, medium */
+        for (int i = 0; i < 8; i++) { /* bias, filter, eta, near plane, format, dipole, medium, octaves */
             ssdgs_settings changed = settings;
             ssdgs_model *own = NULL;
             ssdgs_photo shots[PHOTOS];
@@ -280,6 +280,10 @@ static void test_resume(void) {
             if (i == 4) shots[2].format = SSDGS_PIXELS_RGBA16, shots[2].pixels = wide;
             if (i == 5) changed.dipole = SSDGS_DIPOLE_PRINTED;
             if (i == 6) changed.medium.absorption[1] = (ssdgs_real)0.5;
+            if (i == 7) {
+                changed.octaves.view = settings.octaves.light;
+                changed.octaves.light = settings.octaves.view;
+            }
             CHECK(!ssdgs_model_create(context, &changed, 0, &own));
             CHECK(!ssdgs_trainer_create(own, shots, PHOTOS, &options, &trainer));
             CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
@@ -2531,10 +2535,9 @@ static void test_half_shadow(void) {
         trainer->screen_count[i] = 3;
         trainer->contribution[i] = 100;
         trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
-        for (int c = 0; c < SSDGS_CHANNELS; c++)
-            trainer->mean[(size_t)c * trainer->stride + (size_t)i] =
-                trainer->square[(size_t)c * trainer->stride + (size_t)i] = 1;
     }
+    for (size_t i = 0; i < SSDGS_CHANNELS * trainer->stride; i++) /* of Gaussians that were dropped, too */
+        trainer->mean[i] = trainer->square[i] = 1;
     trainer->iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 3);
     p = model->gaussians;
