@@ -2202,6 +2202,7 @@ static void test_light_notes(void) {
         ssdgs_model *model = NULL;
         ssdgs_trainer *trainer = NULL;
         int l, total = 0;
+        memset(shots, 0, sizeof shots);
         for (int k = 0; k < SHOTS; k++) {
             const double turn = 2.4 * k, rise = cases[i].above ? 0.95 : 1 - (2 * k + 1.0) / SHOTS,
                          out = sqrt(1 - rise * rise);
