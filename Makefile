@@ -134,7 +134,7 @@ size: ## what including ssdgs.h costs: seconds of compiling and bytes of code
 fuzz: $(BUILD)/fuzzers/all ## fuzzes each target for FUZZ_SECONDS (1800); needs clang's libFuzzer; findings go to build/fuzzers
 	sh tests/fuzz/run.sh $(BUILD)/fuzzers $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
-mutants: ## changes the backward passes in each of the places that tests/mutants.txt lists: do the tests notice (an hour)
+mutants: ## changes the backward passes in each of the places that tests/mutants.txt lists: do the tests notice (hours)
 	sh tests/mutants.sh $(BUILD)
 
 figures: $(TESTS) ## every test at its longest, mutants, fuzzing, coverage, compilers (a day) into tests/FIGURES.md
