@@ -390,9 +390,9 @@ typedef struct ssdgs_gaussian {
 
 SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void); /* grey, opacity 0.1, 0.02 wide, at 0 */
 /* Gives a Gaussian, of a model made in code, the highlight of a mirror of microfacets: roughness, along its
-   first and second axis, is Beckmann's alpha. Sets sharpness and specular, and gives the
-   model the one lobe that this needs, for all its Gaussians. For metals let f0 be 0.9 and multiply specular
-   by their colour. ERR_ARGUMENT: highlights are not deferred, or a roughness is not 0.01 .. 1. */
+   first and second axis, is Beckmann's alpha. Sets sharpness and specular, and gives the model the one lobe
+   that this needs, for all its Gaussians. For metals let f0 be 0.9 and multiply specular by their colour.
+   ERR_ARGUMENT: highlights are not deferred, or a roughness is not 0.01 .. 1. */
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                              ssdgs_gaussian *gaussian);
 /* Writes and reads Gaussian `index`. ERR_ARGUMENT: no such Gaussian, or a value out of range. */
@@ -2777,8 +2777,8 @@ static double ssdgs__logit(double x) {
     return raw < -SSDGS__MOST_RAW ? -SSDGS__MOST_RAW : raw > SSDGS__MOST_RAW ? SSDGS__MOST_RAW : raw;
 }
 
-/* The axes of a quaternion, turned the shortest way that brings the third to a direction: a quaternion of any
-   length. As they are for 0 0 0. to may be from. */
+/* Turns axes the shortest way that brings the third to a direction; 0 0 0 turns nothing. Both are quaternions
+   of any length. to may be from. */
 static void ssdgs__turn_to(const ssdgs_real direction[3], const double from[4], double to[4]) {
     ssdgs_real raw[4], q[4], r[9];
     double v[3], length = 0; /* the direction in those axes */
@@ -7584,7 +7584,7 @@ static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request 
     ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
     if (result) {
-        if (scene->frame) scene->frame->cache.lights_ready = 0; /* those of an earlier frame */
+        if (scene->frame) scene->frame->cache.lights_ready = 0; /* maps of an earlier frame */
         return result;
     }
     const int kept = frame.views[0].cached;

@@ -22,15 +22,15 @@ int main(void) {
     ssdgs_settings settings[2];
     settings[0] = ssdgs_settings_default();
     settings[1] = ssdgs_settings_published();
+    uint64_t hash = 0;
     for (int run = 0; run < 4; run++) {
-        static uint64_t hash;
         const int kind = run % 2, scalar = run / 2;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         if (scalar) desc.isa = SSDGS_ISA_SCALAR, desc.parallel.run = backwards;
-        if (kind == 0) hash = 1;
+        if (kind == 0) hash = 1; /* of both kinds together */
         if (ssdgs_context_create(&desc, &context) ||
             ssdgs_model_create(context, &settings[kind], COUNT, &model))
             return 1;
