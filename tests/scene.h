@@ -5,6 +5,7 @@
 
 enum { SIDE = 64, PIXELS = SIDE * SIDE, PLANES = 18, VALUES = PLANES * PIXELS };
 static const int real64 = sizeof(ssdgs_real) == 8;
+static const double pi = 3.14159265358979323846;
 static ssdgs_context *context;
 static ssdgs_scene *scene;
 
@@ -16,6 +17,14 @@ typedef struct picture {
 static picture shot[4];
 
 static inline double draw(uint64_t counter) { return test_uniform(34, counter); }
+
+/* One of many directions, spread evenly. */
+static inline void direction_of(int i, int many, double d[3]) {
+    const double z = 1 - 2 * (i + 0.5) / many, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
+    d[0] = across * cos(turn);
+    d[1] = across * sin(turn);
+    d[2] = z;
+}
 
 static inline ssdgs_image planes_of(picture *p) {
     ssdgs_image image = {0,

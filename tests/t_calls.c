@@ -380,20 +380,7 @@ static void test_progress(void) {
 
 /* ---- the order of destroying ---- */
 
-static int blocks, notes;
-
-static void *count_in(void *user, size_t bytes) {
-    void *memory = malloc(bytes);
-    (void)user;
-    blocks += memory != NULL;
-    return memory;
-}
-
-static void count_out(void *user, void *memory) {
-    (void)user;
-    blocks -= memory != NULL;
-    free(memory);
-}
+static int notes;
 
 static void count_notes(void *user, ssdgs_result code, const char *message) {
     (void)user;
@@ -409,10 +396,10 @@ static void test_order(void) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 3;
-        desc.allocator.allocate = count_in;
-        desc.allocator.release = count_out;
+        test_meter memory;
+        memset(&memory, 0, sizeof memory);
+        TEST_METER(desc, &memory);
         desc.logger.write = count_notes;
-        blocks = 0;
         set_up(&desc, 1);
         CHECK(!render_scene(1));
         notes = 0;
@@ -430,8 +417,8 @@ static void test_order(void) {
             if (strchr(left, 's')) CHECK(!render_scene(strchr(left, 'm') != NULL));
         }
         const int told = (strchr(gone, 'm') < strchr(gone, 't')) + (gone[3] != 'c');
-        if (!CHECK(blocks == 0 && notes == told))
-            printf("    %s: %d blocks left, told %d times\n", gone, blocks, notes);
+        if (!CHECK(memory.live == 0 && notes == told))
+            printf("    %s: %lu bytes left, told %d times\n", gone, (unsigned long)memory.live, notes);
     }
 }
 

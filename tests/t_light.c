@@ -4,7 +4,6 @@
 #include "../ssdgs.h"
 #include "scene.h"
 
-static const double pi = 3.14159265358979323846;
 static double exactly(double floats) { return real64 ? 1e-11 : floats; }
 
 /* One large Gaussian at `at`, which faces `normal`. */
@@ -199,14 +198,6 @@ static void test_range(ssdgs_model *model) {
 }
 
 /* ---- from all around ---- */
-
-/* One of many directions, spread evenly. */
-static void direction_of(int i, int many, double d[3]) {
-    const double z = 1 - 2 * (i + 0.5) / many, across = sqrt(1 - z * z), turn = pi * (3 - sqrt(5.0)) * i;
-    d[0] = across * cos(turn);
-    d[1] = across * sin(turn);
-    d[2] = z;
-}
 
 /* The irradiance, written out. */
 static double even(const double sky[9], const double n[3]) {

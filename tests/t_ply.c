@@ -13,28 +13,7 @@
 #include <sys/stat.h>
 #endif
 
-/* ---- memory that counts and fails on demand ---- */
-
-typedef struct meter {
-    long live, calls, fail_at;
-    int for_ever;
-} meter;
-
-static void *meter_allocate(void *user, size_t bytes) {
-    meter *m = (meter *)user;
-    m->calls++;
-    if (m->fail_at && (m->calls == m->fail_at || (m->for_ever && m->calls > m->fail_at))) return NULL;
-    void *memory = malloc(bytes);
-    if (memory) m->live++;
-    return memory;
-}
-
-static void meter_release(void *user, void *memory) {
-    if (memory) ((meter *)user)->live--;
-    free(memory);
-}
-
-static meter memory;
+static test_meter memory;
 static ssdgs_context *context;
 
 /* ---- models ---- */
@@ -149,7 +128,7 @@ static ssdgs_result load(const void *data, size_t size, ssdgs_model **model, ssd
 
 /* Must be refused, with a message, and leave nothing behind. */
 static int refused(const void *data, size_t size) {
-    const long live = memory.live;
+    const size_t live = memory.live;
     ssdgs_model *model = NULL;
     const ssdgs_result result = load(data, size, &model, NULL);
     const int good = (result == SSDGS_ERR_FORMAT || result == SSDGS_ERR_LIMIT) && !model &&
@@ -520,7 +499,7 @@ static void test_edited(void) {
     bytes file = saved(model);
     document d = parse(&file), cut = d;
     variant v = {LITTLE, "\n", 0, 0, 0, NULL};
-    const long live = memory.live;
+    const size_t live = memory.live;
     CHECK(tells(&file, &stats, NULL) && !stats.untrained);
     cut.tables = 1;
     bytes other = emit(&cut, &v);
@@ -950,7 +929,7 @@ static void test_damage(void) {
     bytes file = saved(model);
     document d = parse(&file);
     variant v = {ASCII, "\r\n", 0, 1, 1, NULL};
-    const long live = memory.live;
+    const size_t live = memory.live;
     int bad = 0;
     for (size_t k = 0; k < file.size; k++) bad += !refused(file.data, k);
     CHECK(bad == 0);
@@ -991,7 +970,7 @@ static int temporaries(void) {
 static void test_memory(void) {
     ssdgs_model *model = make_model(10), *back;
     bytes file = saved(model);
-    const long live = memory.live;
+    const size_t live = memory.live;
     for (int what = 0; what < 6;
          what++) { /* load from memory, from a file, save; one failure, failing from then on */
         int n, done = 0;
@@ -1022,7 +1001,7 @@ static void test_memory(void) {
 
 static void test_disk(void) {
     ssdgs_model *model = make_model(2000), *old = make_model(3), *back = NULL;
-    const long live = memory.live;
+    const size_t live = memory.live;
     CHECK(ssdgs_model_save(old, path) == SSDGS_OK);
     CHECK(ssdgs_model_save(model, "build/t_ply.none/t_ply.ply") == SSDGS_ERR_IO);
     CHECK(strstr(ssdgs_error_message(context), "build/t_ply.none/t_ply.ply"));
@@ -1142,9 +1121,7 @@ int main(void) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.threads = 1;
-    desc.allocator.allocate = meter_allocate;
-    desc.allocator.release = meter_release;
-    desc.allocator.user = &memory;
+    TEST_METER(desc, &memory);
 #ifndef _WIN32
     mkdir("build", 0777);
 #endif

@@ -1192,26 +1192,7 @@ static void test_kept(void) {
     CHECK(shot->stats.gaussians == 0 && shot->value[15 * PIXELS] == 0);
 }
 
-static size_t held, most;
-static long allocations;
-static int fails_after = -1; /* so many allocations, once; -1: none fails */
-static void *count_allocate(void *user, size_t bytes) {
-    (void)user;
-    if (fails_after >= 0 && !fails_after--) return NULL;
-    size_t *memory = (size_t *)malloc(bytes + 16);
-    if (!memory) return NULL;
-    *memory = bytes;
-    allocations++;
-    held += bytes;
-    most = held > most ? held : most;
-    return memory + 16 / sizeof *memory;
-}
-static void count_release(void *user, void *memory) {
-    size_t *from = (size_t *)memory - 16 / sizeof *from;
-    (void)user;
-    held -= *from;
-    free(from);
-}
+static test_meter memory;
 
 /* Any number of threads; nothing allocated from the second frame on, once it has been where things move to; a
    model that stands in many places is there once. */
@@ -1225,34 +1206,33 @@ static void test_threads_and_memory(void) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = threads;
-        desc.allocator.allocate = count_allocate;
-        desc.allocator.release = count_release;
+        TEST_METER(desc, &memory);
         CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene));
         ssdgs_model *model[2] = {cloud(&s, 0, 1500, 0.3), cloud(&s, 200, 100, 0.3)};
-        const size_t models = held;
+        const size_t models = memory.live;
         ssdgs_object object[6];
         for (int i = 0; i < 6; i++)
             object[i] = placed(model[i % 2], i, 0.3 + 0.1 * i, i & 1, 0.2 * i - 0.5, 0.1 * i, 0);
         together(object, 6, &camera, &light, 1, NULL, shot + threads / 5);
-        const size_t after = held;
+        const size_t after = memory.live;
         for (int i = 0; i < 6; i++) object[i].tint[0] = (ssdgs_real)0.5;
         together(object, 6, &camera, &light, 1, NULL, shot + 2);
-        CHECK(held == after && most == after && models > 0);
+        CHECK(memory.live == after && memory.peak == after && models > 0);
         long before = 0;
         for (int frame = 0; frame < 8; frame++) { /* all move to and fro between two places */
             const ssdgs_camera from = frame & 1 ? camera_from(-1.3, -1.6, 0.3) : camera;
             const ssdgs_light by = frame & 1 ? point_light(-1.5, -2, 1) : light;
-            if (frame == 2) before = allocations;
+            if (frame == 2) before = memory.calls;
             object[0] = placed(model[0], frame & 1, 0.5, 0, 0.3 * (frame & 1), 0, 0);
             together(object, 6, &from, &by, 1, NULL, shot + 2);
             CHECK(!shot[2].stats.camera_cached && !shot[2].stats.lights_cached);
         }
-        if (!CHECK(allocations == before)) printf("    %ld allocations\n", allocations - before);
+        if (!CHECK(memory.calls == before)) printf("    %ld allocations\n", memory.calls - before);
         ssdgs_scene_destroy(scene);
         ssdgs_model_destroy(model[0]), ssdgs_model_destroy(model[1]);
         ssdgs_context_destroy(context);
-        CHECK(held == 0);
-        most = 0;
+        CHECK(memory.live == 0);
+        memory.peak = 0;
     }
     CHECK(same(shot, shot + 1));
     context = was, scene = was_scene;
@@ -1274,8 +1254,7 @@ static void test_failed_frame(void) {
         ssdgs_context_desc desc;
         memset(&desc, 0, sizeof desc);
         desc.threads = 1;
-        desc.allocator.allocate = count_allocate;
-        desc.allocator.release = count_release;
+        TEST_METER(desc, &memory);
         CHECK(!ssdgs_context_create(&desc, &context));
         for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_create(context, scenes + i));
         ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
@@ -1286,9 +1265,9 @@ static void test_failed_frame(void) {
         for (int i = 0; i < LIGHTS; i++) lights[i] = point_light(0.1 * i, 0, 3);
         CHECK(!ssdgs_scene_light(*scenes, object, 1, lights, k % 2 ? LIGHTS : 1, NULL));
         lights[0] = point_light(3, 0, 0.2); /* past the plate's edge */
-        fails_after = k / 4;
+        memory.fail_at = memory.calls + 1 + k / 4;
         const ssdgs_result result = ssdgs_scene_light(*scenes, object, many, lights, LIGHTS, NULL);
-        fails_after = -1;
+        memory.fail_at = 0;
         ssdgs_real fraction[2];
         failed += result == SSDGS_ERR_MEMORY;
         for (int i = 0; i < LIGHTS && result; i++)
@@ -1302,7 +1281,7 @@ static void test_failed_frame(void) {
         ssdgs_model_destroy(plate);
         ssdgs_context_destroy(context);
     }
-    if (!CHECK(held == 0 && failed > 4 && !wrong)) printf("    %d failed, %d wrong\n", failed, wrong);
+    if (!CHECK(memory.live == 0 && failed > 4 && !wrong)) printf("    %d failed, %d wrong\n", failed, wrong);
     context = was;
 }
 
@@ -1347,29 +1326,27 @@ static void refused(const ssdgs_object *objects, int count, const char *word) {
 static void test_trim(void) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.allocator.allocate = count_allocate;
-    desc.allocator.release = count_release;
+    TEST_METER(desc, &memory);
     ssdgs_settings s = small_settings();
     ssdgs_context *was = context;
-    held = most = 0;
     CHECK(!ssdgs_context_create(&desc, &context));
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
     const ssdgs_light light = point_light(2, -2, 2);
     ssdgs_model *model = cloud(&s, 0, 300, 0.5);
-    const size_t before = held;
+    const size_t before = memory.live;
     alone(model, &camera, &light, 1, NULL, shot);
-    const size_t grown = held;
+    const size_t grown = memory.live;
     ssdgs_context_trim(context);
-    const size_t kept = held; /* what the model keeps */
+    const size_t kept = memory.live; /* what the model keeps */
     CHECK(kept > before && kept < grown);
     alone(model, &camera, &light, 1, NULL, shot + 1);
-    CHECK(same(shot, shot + 1) && shot[1].stats.camera_cached && held > kept && held <= grown);
+    CHECK(same(shot, shot + 1) && shot[1].stats.camera_cached && memory.live > kept && memory.live <= grown);
     ssdgs_model_destroy(model);
     ssdgs_context_trim(context);
-    CHECK(held < before);
+    CHECK(memory.live < before);
     ssdgs_context_trim(NULL);
     ssdgs_context_destroy(context);
-    CHECK(held == 0);
+    CHECK(memory.live == 0);
     context = was;
 }
 
@@ -1381,8 +1358,7 @@ static void test_moved_over(void) {
     ssdgs_context *was = context, *loader = NULL, *counted = NULL;
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.allocator.allocate = count_allocate;
-    desc.allocator.release = count_release;
+    TEST_METER(desc, &memory);
     CHECK(!ssdgs_context_create(NULL, &loader) && !ssdgs_context_create(&desc, &counted));
     context = loader;
     ssdgs_model *model = cloud(&s, 0, 300, 0.5);
@@ -1449,7 +1425,7 @@ static void test_moved_over(void) {
     CHECK(ssdgs_model_move(model, NULL) == SSDGS_ERR_ARGUMENT);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(counted);
-    CHECK(held == 0);
+    CHECK(memory.live == 0);
 }
 
 /* A job system is given few tasks, and the picture of any other number of them. */

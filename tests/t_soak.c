@@ -84,40 +84,14 @@ static double largest_parameter(ssdgs_model *model) {
 #define NAME(isa) ssdgs_isa_string((ssdgs_isa)(isa))
 #define ALL_FINITE(model) (largest_parameter(model) < 1e30)
 
-typedef struct meter {
-    size_t live, peak, calls;
-} meter;
-
-static void *metered_allocate(void *user, size_t bytes) {
-    meter *m = (meter *)user;
-    size_t *block = (size_t *)malloc(bytes + 64);
-    if (!block) return NULL;
-    *block = bytes;
-    m->calls++;
-    m->live += bytes;
-    m->peak = m->live > m->peak ? m->live : m->peak;
-    return (char *)block + 64;
-}
-
-static void metered_release(void *user, void *memory) {
-    if (!memory) return;
-    size_t *block = (size_t *)(void *)((char *)memory - 64);
-    ((meter *)user)->live -= *block;
-    free(block);
-}
-
-static ssdgs_context *new_context(int isa, int threads, meter *m, const ssdgs_gpu_hook *hook) {
+static ssdgs_context *new_context(int isa, int threads, test_meter *m, const ssdgs_gpu_hook *hook) {
     ssdgs_context_desc desc;
     ssdgs_context *context = NULL;
     memset(&desc, 0, sizeof desc);
     desc.isa = (ssdgs_isa)isa;
     desc.threads = threads;
     desc.gpu = hook;
-    if (m) {
-        desc.allocator.allocate = metered_allocate;
-        desc.allocator.release = metered_release;
-        desc.allocator.user = m;
-    }
+    if (m) TEST_METER(desc, m);
     ssdgs_context_create(&desc, &context); /* NULL: an instruction set this machine lacks */
     return context;
 }
@@ -539,7 +513,7 @@ static void row_59(void) {
     ssdgs_settings settings = ssdgs_settings_default();
     int most = 0;
     for (int side = 16; side <= SIDE; side += SIDE - 16) {
-        meter m;
+        test_meter m;
         memset(&m, 0, sizeof m);
         make_photos(side);
         o.densify_gradient = 0;
@@ -592,7 +566,7 @@ static void row_60(void) {
 static void row_61(void) {
     ssdgs_train_options o = short_run(full ? 100000 : 2000 / SLOW);
     ssdgs_settings settings = ssdgs_settings_default();
-    meter m;
+    test_meter m;
     memset(&m, 0, sizeof m);
     make_photos(16);
     settings.light_map.size = 64; /* else it grows as Gaussians shrink */
@@ -604,12 +578,12 @@ static void row_61(void) {
     steps(&t, o.iterations / 4);
     const size_t live = m.live;
     for (int i = 1; i < 4; i++) {
-        const size_t calls = m.calls;
+        const long calls = m.calls;
         steps(&t, o.iterations / 4);
-        CHECK(m.live <=
-              live + live / 10); /* buffers still meet larger frames; 8 bytes a step would be more */
-        CHECK(m.calls - calls <=
-              (size_t)o.iterations / 4 / 5); /* density control's own and what grows, nothing a step */
+        /* buffers still meet larger frames; 8 bytes a step would be more */
+        CHECK(m.live <= live + live / 10);
+        /* density control's own and what grows, nothing a step */
+        CHECK(m.calls - calls <= o.iterations / 4 / 5);
     }
     printf("    %d Gaussians, %lu bytes live, largest parameter %g\n", t.model->count, (unsigned long)m.live,
            largest_parameter(t.model));

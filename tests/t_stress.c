@@ -10,6 +10,7 @@ enum { W = 64, H = 48, PIXELS = W * H, GOOD = 1000, CENTRE = H / 2 * W + W / 2 }
 static const double white = 0.54132485461291810; /* softplus of it is 1 */
 static const double centre[3] = {0, 0, 2}; /* of every scene; the camera is at the origin and looks along z */
 static ssdgs_context *context;
+static test_meter memory;
 static uint64_t digest; /* of all that a row has rendered */
 
 typedef struct picture {
@@ -20,27 +21,6 @@ typedef struct picture {
 } picture;
 enum { PLANES = offsetof(picture, stats) / sizeof(ssdgs_real) };
 static picture a, b, c;
-
-/* ---- the allocator's meter: what is held, the most there was, and a limit ---- */
-
-static size_t held, most, limit = (size_t)-1;
-
-static void *metered(void *user, size_t bytes) {
-    size_t *memory = bytes > limit || held + bytes > limit ? NULL : (size_t *)malloc(bytes + 16);
-    (void)user;
-    if (!memory) return NULL;
-    *memory = bytes;
-    held += bytes;
-    most = held > most ? held : most;
-    return (char *)memory + 16;
-}
-
-static void released(void *user, void *memory) {
-    size_t *block = (size_t *)(void *)((char *)memory - 16);
-    (void)user;
-    held -= *block;
-    free(block);
-}
 
 /* ---- scenes ---- */
 
@@ -256,10 +236,10 @@ static double peak(const picture *p) {
 static void refused(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights, int count,
                     const ssdgs_render_options *options, ssdgs_result code, const char *word) {
     look(model, &a);
-    const size_t before = held;
-    most = held;
+    const size_t before = memory.live;
+    memory.peak = memory.live;
     if (!CHECK(shoot(model, camera, lights, count, options, &b) == code)) return;
-    CHECK(held == before && most == before);
+    CHECK(memory.live == before && memory.peak == before);
     if (!CHECK(strstr(ssdgs_error_message(context), word)))
         printf("    %s: %s\n", word, ssdgs_error_message(context));
     CHECK(same(&a, look(model, &b)));
@@ -679,11 +659,11 @@ static void row_18(void) { /* more pairs of tile and splat than the allocator gr
     look(small, &a);
     for (int i = 0; i < 2; i++) {
         ssdgs_model *model = curtains(i ? 70000 : 20000);
-        most = held;
-        limit = grants;
+        memory.peak = memory.live;
+        memory.limit = grants;
         CHECK(ssdgs_render(model, &camera, NULL, 0, &nothing) == (i ? SSDGS_ERR_LIMIT : SSDGS_ERR_MEMORY));
-        CHECK(most <= grants && strstr(ssdgs_error_message(context), i ? "3840 x 2160" : "bytes"));
-        limit = (size_t)-1;
+        CHECK(memory.peak <= grants && strstr(ssdgs_error_message(context), i ? "3840 x 2160" : "bytes"));
+        memory.limit = 0;
         CHECK(same(&a, look(small, &b)));
         ssdgs_model_destroy(model);
     }
@@ -697,8 +677,7 @@ static void row_19(void) { /* what lies behind the camera costs a record, whatev
     ssdgs_context *shared = context;
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.allocator.allocate = metered;
-    desc.allocator.release = released;
+    TEST_METER(desc, &memory);
     desc.threads = 1;
     if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
     ssdgs_model *model = curtains(BEHIND);
@@ -707,10 +686,10 @@ static void row_19(void) { /* what lies behind the camera costs a record, whatev
         for (int i = 0; i < BEHIND; i++)
             v.gaussians[(size_t)(SSDGS_POSITION + 2) * v.stride + (size_t)i] = -1;
     }
-    const size_t before = held;
-    most = held;
+    const size_t before = memory.live;
+    memory.peak = memory.live;
     look(model, &a);
-    const double bytes = (double)(most - before) / BEHIND;
+    const double bytes = (double)(memory.peak - before) / BEHIND;
     CHECK(a.stats.visible == 0 && a.stats.instances == 0 && peak(&a) <= 0);
     CHECK(bytes < 250); /* records, depths, keys, colours, components: 8 planes of 4 values in all */
     bytes_behind = bytes;
@@ -1463,8 +1442,7 @@ int main(int count, char **argument) {
     ssdgs_context_desc desc;
     int ran = 0;
     memset(&desc, 0, sizeof desc);
-    desc.allocator.allocate = metered;
-    desc.allocator.release = released;
+    TEST_METER(desc, &memory);
     for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
         for (int eight = 0; eight < 2; eight++) {
             desc.isa = (ssdgs_isa)isa;
@@ -1474,13 +1452,13 @@ int main(int count, char **argument) {
             if (!CHECK(!result)) return 1;
             for (int r = 0; r < ROWS; r++) {
                 const int failed = test_failed;
-                const size_t before = held;
+                const size_t before = memory.live;
                 if ((ran && rows[r].once) || (only && rows[r].number != only)) continue;
                 digest = 0;
                 rows[r].run();
                 if (eight) CHECK(digest == rows[r].digest || rows[r].once);
                 rows[r].digest = digest;
-                CHECK(held >= before); /* frames keep their memory */
+                CHECK(memory.live >= before); /* frames keep their memory */
                 if (test_failed == failed) continue;
                 printf("row %d: %s, %d threads\n", rows[r].number, ssdgs_isa_string((ssdgs_isa)isa),
                        desc.threads);
@@ -1488,7 +1466,7 @@ int main(int count, char **argument) {
             }
             ran++;
             ssdgs_context_destroy(context);
-            CHECK(held == 0);
+            CHECK(memory.live == 0);
         }
     CHECK(ran > 0);
     for (int r = 0; r < ROWS; r++) {

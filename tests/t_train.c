@@ -554,23 +554,7 @@ static void test_refusals(void) {
 
 /* ---- every allocation fails once ---- */
 
-typedef struct counter {
-    long live, calls, fail_at;
-} counter;
-
-static void *counting_allocate(void *user, size_t bytes) {
-    counter *c = (counter *)user;
-    void *p = ++c->calls == c->fail_at ? NULL : malloc(bytes);
-    if (p) c->live++;
-    return p;
-}
-
-static void counting_release(void *user, void *memory) {
-    ((counter *)user)->live--;
-    free(memory);
-}
-
-static ssdgs_result whole_life(counter *c) {
+static ssdgs_result whole_life(test_meter *memory) {
     static ssdgs_real color[SIDE * SIDE * 3];
     ssdgs_train_options options = short_run(12);
     ssdgs_context_desc desc;
@@ -580,9 +564,7 @@ static ssdgs_result whole_life(counter *c) {
     ssdgs_real background[3] = {0, 0, 0};
     memset(&desc, 0, sizeof desc);
     desc.threads = 2;
-    desc.allocator.allocate = counting_allocate;
-    desc.allocator.release = counting_release;
-    desc.allocator.user = c;
+    TEST_METER(desc, memory);
     options.initial_points = 60;
     options.max_gaussians = 200;
     ssdgs_result result = ssdgs_context_create(&desc, &context);
@@ -598,16 +580,16 @@ static ssdgs_result whole_life(counter *c) {
 }
 
 static void test_allocation(void) {
-    counter c;
+    test_meter memory;
     long failed = 0;
-    memset(&c, 0, sizeof c);
-    CHECK(whole_life(&c) == SSDGS_OK && c.live == 0);
-    const long calls = c.calls;
+    memset(&memory, 0, sizeof memory);
+    CHECK(whole_life(&memory) == SSDGS_OK && memory.live == 0);
+    const long calls = memory.calls;
     for (long n = 1; n <= calls; n++) {
-        memset(&c, 0, sizeof c);
-        c.fail_at = n;
-        failed += whole_life(&c) == SSDGS_ERR_MEMORY;
-        CHECK(c.live == 0);
+        memset(&memory, 0, sizeof memory);
+        memory.fail_at = n;
+        failed += whole_life(&memory) == SSDGS_ERR_MEMORY;
+        CHECK(memory.live == 0);
     }
     CHECK(failed == calls);
     printf("%ld allocations, each failed once\n", calls);
@@ -616,24 +598,22 @@ static void test_allocation(void) {
 /* After the first frame of a size nothing is allocated, nor where things move to and fro. */
 static void test_steady(void) {
     static ssdgs_real color[SIDE * SIDE * 3];
-    counter c;
+    test_meter memory;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
-    memset(&c, 0, sizeof c);
+    memset(&memory, 0, sizeof memory);
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = color;
-    desc.allocator.allocate = counting_allocate;
-    desc.allocator.release = counting_release;
-    desc.allocator.user = &c;
+    TEST_METER(desc, &memory);
     CHECK(!ssdgs_context_create(&desc, &context));
     CHECK(!ssdgs_model_create(context, NULL, 100, &model));
     CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
-    const long calls = c.calls;
+    const long calls = memory.calls;
     for (int i = 0; i < 5; i++) CHECK(!ssdgs_render(model, &photos[0].camera, &photos[0].light, 1, &image));
-    CHECK(c.calls == calls);
+    CHECK(memory.calls == calls);
     long before = 0;
     for (int i = 0; i < 8; i++) {
         const ssdgs_model_view v = ssdgs_model_arrays(model);
@@ -641,13 +621,13 @@ static void test_steady(void) {
             for (size_t k = 0; k < 3; k++)
                 v.gaussians[(SSDGS_POSITION + k) * v.stride + (size_t)j] =
                     (ssdgs_real)(0.6 * test_uniform(5 + (uint64_t)(i & 1), 3 * (uint64_t)j + k) - 0.3);
-        if (i == 2) before = c.calls;
+        if (i == 2) before = memory.calls;
         CHECK(!ssdgs_render(model, &photos[i & 1].camera, &photos[i & 1].light, 1, &image));
     }
-    CHECK(c.calls == before);
+    CHECK(memory.calls == before);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
-    CHECK(c.live == 0);
+    CHECK(memory.live == 0);
 }
 
 /* A short run learns the ball; refinement of a disturbed photograph brings its error down. */

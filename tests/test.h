@@ -100,6 +100,40 @@ static inline void test_row(int before, const char *rows, const char *name) {
         test_row(test_before, rows, name); \
     } while (0)
 
+/* ---- memory that counts, and fails on demand ---- */
+
+typedef struct test_meter {
+    size_t live, peak, limit; /* bytes, the most there were, how many there may be (0: any number) */
+    long calls, fail_at;      /* the call that fails (0: none), and with for_ever all that come after it */
+    int for_ever;
+} test_meter;
+
+static inline void *test_allocate(void *user, size_t bytes) {
+    test_meter *meter = (test_meter *)user;
+    meter->calls++;
+    if (meter->fail_at &&
+        (meter->calls == meter->fail_at || (meter->for_ever && meter->calls > meter->fail_at)))
+        return NULL;
+    if (meter->limit && (bytes > meter->limit || meter->live > meter->limit - bytes)) return NULL;
+    size_t *memory = (size_t *)malloc(bytes + 16); /* the size, and what keeps the rest aligned */
+    if (!memory) return NULL;
+    *memory = bytes;
+    meter->live += bytes;
+    if (meter->live > meter->peak) meter->peak = meter->live;
+    return (char *)memory + 16;
+}
+
+static inline void test_release(void *user, void *memory) {
+    size_t *block = (size_t *)(void *)((char *)memory - 16);
+    ((test_meter *)user)->live -= *block;
+    free(block);
+}
+
+/* Sets an ssdgs_context_desc's allocator. */
+#define TEST_METER(desc, meter) \
+    ((desc).allocator.allocate = test_allocate, (desc).allocator.release = test_release, \
+     (desc).allocator.user = (meter))
+
 #define TEST_END() \
     do { \
         printf("%d passed, %d failed\n", test_passed, test_failed); \
