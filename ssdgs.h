@@ -1139,10 +1139,14 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 /* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says
    so. */
 #if defined(__clang__)
-#if defined(__wasm__) && defined(__FAST_MATH__)
-#pragma clang fp reassociate(off)
-#elif __clang_major__ >= 12 && !defined(__wasm__)
-#pragma float_control(precise, on, push) /* which lets expressions fuse */
+#if __clang_major__ >= 12
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wignored-pragmas" /* of machines without float_control */
+#pragma float_control(precise, on, push)             /* which lets expressions fuse */
+#pragma clang diagnostic pop
+#ifdef __FAST_MATH__
+#pragma clang fp reassociate(off) /* for those machines */
+#endif
 #endif
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__TINYC__)
@@ -1212,8 +1216,8 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__ISA_NEON 6
 
 #if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && !defined(__TINYC__)
-#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)) && \
-    (defined(__GNUC__) || defined(_MSC_VER))
+/* Not _M_IX86: Microsoft's compiler of 32 bits takes three vectors by value at most. */
+#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__)) && (defined(__GNUC__) || defined(_MSC_VER))
 #if defined(__MINGW32__) && !defined(__clang__) && !defined(__OPTIMIZE__)
 #define SSDGS__X86 1 /* its 16-byte stack cannot hold spilled AVX vectors: SSE2 alone */
 #elif defined(SSDGS_NO_AVX2)
@@ -1252,7 +1256,8 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 #include <immintrin.h>
-#if defined(__clang__) && defined(_MSC_VER) /* clang-cl hides these without -mavx */
+#if defined(__clang__) && defined(_MSC_VER) /* clang-cl hides these without -mavx512f */
+#include <smmintrin.h>
 #include <avxintrin.h>
 #include <avx2intrin.h>
 #include <fmaintrin.h>
@@ -3535,7 +3540,7 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
         }
         gaussians += (o->model->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
     }
-    if (count > UINT16_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects", count);
+    if (count > (int)UINT16_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects", count);
     if (gaussians > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of more than %d Gaussians",
                            SSDGS__MAX_GAUSSIANS);
@@ -12549,10 +12554,14 @@ SSDGS__SMALL_END
 #endif /* SSDGS_NO_TRAINER */
 
 #if defined(__clang__)
-#if defined(__wasm__) && defined(__FAST_MATH__)
+#if __clang_major__ >= 12
+#ifdef __FAST_MATH__
 #pragma clang fp reassociate(on)
-#elif __clang_major__ >= 12 && !defined(__wasm__)
+#endif
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wignored-pragmas"
 #pragma float_control(pop)
+#pragma clang diagnostic pop
 #endif
 #pragma STDC FP_CONTRACT DEFAULT
 #elif defined(__GNUC__) && !defined(__TINYC__)
