@@ -1631,7 +1631,9 @@ static void test_prune_weight(void) {
     CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
     for (int i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (int pass = 0; pass < 3; pass++) { /* opacities are reset at 30, and no more at 90, so near the end */
+    /* opacities are reset at 30, and no more at 90, so near the end */
+    for (int pass = 0; pass < 4; pass++) {
+        static const int iteration[4] = {40, 50, 100, 10};
         ssdgs_real *const names = model->gaussians + (size_t)SSDGS_DIFFUSE * model->capacity;
         model->count = MANY;
         for (int i = 0; i < MANY; i++) {
@@ -1641,7 +1643,7 @@ static void test_prune_weight(void) {
             trainer->contribution[i] =
                 trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
         }
-        trainer->iteration = pass == 2 ? 100 : pass ? 50 : 40;
+        trainer->iteration = iteration[pass];
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == (pass ? MANY - LIGHT : MANY));
         for (int i = 0; i < model->count && pass; i++) CHECK(names[i] >= LIGHT);
