@@ -62,6 +62,12 @@ static void test_unshadowed(ssdgs_model *model) {
         if (!(turn & 1)) CHECK(same(shot + 1, shot + 2));
         else CHECK(!same(shot + 1, shot + 2));
     }
+    for (int step = 0; step < 4; step++) { /* nor a map of where it was before it had none */
+        lights[0].position[0] = (ssdgs_real)(step == 1 ? 2 : -2);
+        lights[0].unshadowed = step == 2;
+        alone(model, &camera, lights, 2, &options, shot + (step ? 1 : 0));
+    }
+    CHECK(same(shot, shot + 1));
     const ssdgs_object object = ssdgs_object_default(model);
     const ssdgs_real behind[3] = {(ssdgs_real)-0.6, 0, (ssdgs_real)-0.8};
     ssdgs_real fraction = 0;
