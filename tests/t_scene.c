@@ -1187,6 +1187,16 @@ static void test_kept(void) {
         CHECK(same(shot + 1, shot + 2) && !same(shot, shot + 1));
         ssdgs_scene_destroy(other);
     }
+    /* a larger model out of sight and reach: what is kept of the others lies elsewhere then */
+    ssdgs_model *larger = cloud(&s, 300, 300, 0.3);
+    object[0] = placed(model[1], 0, 0.5, 0, 0, -40, 0);
+    object[1] = ssdgs_object_default(model[0]);
+    lights[0].range = lights[1].range = 5;
+    together(object, 2, &camera, lights, 2, &options, shot);
+    object[0].model = larger;
+    together(object, 2, &camera, lights, 2, &options, shot + 1);
+    CHECK(same(shot, shot + 1));
+    ssdgs_model_destroy(larger);
     for (int i = 0; i < 2; i++) ssdgs_model_destroy(model[i]);
     together(NULL, 0, &camera, lights, 2, &options, shot); /* and of models that are gone nothing is asked */
     CHECK(shot->stats.gaussians == 0 && shot->value[15 * PIXELS] == 0);
