@@ -434,6 +434,8 @@ static void test_metal(void) {
     ssdgs_settings settings = ssdgs_settings_default();
     settings.terms = SSDGS_SPECULAR_TERM;
     ssdgs_model *model = ball(&settings, 0.5);
+    for (int i = 0; i < 2 * SSDGS_ASG_COUNT; i++) /* other lobes, which the mirror's replace */
+        ssdgs_model_arrays(model).asg_sharpness[i] = 2;
     const ssdgs_camera camera = camera_from(0, -2, 0);
     const ssdgs_render_options exact = ssdgs_render_options_exact();
     ssdgs_light light = parallel_light(sun[0], sun[1], sun[2]);
@@ -449,6 +451,8 @@ static void test_metal(void) {
             g.f0 = (ssdgs_real)0.9;
             CHECK(!ssdgs_model_set(model, i, &g));
         }
+        for (int i = 0; i < SSDGS_ASG_COUNT; i++) /* by the blended normal alone */
+            CHECK(ssdgs_model_arrays(model).asg_sharpness[2 * i + 1] < -15);
         alone(model, &camera, &light, 1, &exact, shot);
         memset(given, 0, sizeof given);
         for (int pixel = 0; pixel < PIXELS; pixel++) {

@@ -1257,8 +1257,10 @@ static void test_failed_frame(void) {
     ssdgs_context *was = context;
     ssdgs_light lights[LIGHTS];
     int failed = 0, wrong = 0;
-    for (int k = 0; k < 160; k++) {
+    for (int k = 0; k < 320; k++) {
         const int many = k / 2 % 2 ? OBJECTS : 1; /* objects of the second frame */
+        const ssdgs_camera camera = camera_from(0, -3, 1);
+        const ssdgs_image image = planes_of(shot);
         const ssdgs_real point[3] = {0, 0, -1};
         ssdgs_scene *scenes[2] = {NULL, NULL};
         ssdgs_context_desc desc;
@@ -1275,12 +1277,14 @@ static void test_failed_frame(void) {
         for (int i = 0; i < LIGHTS; i++) lights[i] = point_light(0.1 * i, 0, 3);
         CHECK(!ssdgs_scene_light(*scenes, object, 1, lights, k % 2 ? LIGHTS : 1, NULL));
         lights[0] = point_light(3, 0, 0.2); /* past the plate's edge */
-        memory.fail_at = memory.calls + 1 + k / 4;
-        const ssdgs_result result = ssdgs_scene_light(*scenes, object, many, lights, LIGHTS, NULL);
+        memory.fail_at = memory.calls + 1 + k / 8;
+        const ssdgs_result result = k / 4 % 2 ? ssdgs_scene_light(*scenes, object, many, lights, LIGHTS, NULL)
+                                              : ssdgs_scene_render(*scenes, object, many, &camera, lights,
+                                                                   LIGHTS, NULL, &image, NULL);
         memory.fail_at = 0;
         ssdgs_real fraction[2];
         failed += result == SSDGS_ERR_MEMORY;
-        for (int i = 0; i < LIGHTS && result; i++)
+        for (int i = 0; i < LIGHTS && result && k / 4 % 2; i++)
             wrong += ssdgs_scene_shadow(*scenes, i, point, 1, fraction) != SSDGS_ERR_ARGUMENT;
         for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_light(scenes[i], object, many, lights, LIGHTS, NULL));
         for (int i = 0; i < LIGHTS; i++) {
@@ -1295,8 +1299,8 @@ static void test_failed_frame(void) {
     context = was;
 }
 
-/* What a splat's blur spreads into the picture from beside it is drawn, whether one object is there or two.
- */
+/* What a splat's blur, or its size, spreads into the picture from beside it is drawn, whether one object is
+   there or two. */
 static void test_blurred(void) {
     ssdgs_settings s = small_settings();
     s.pixel_variance = 10;
@@ -1308,19 +1312,21 @@ static void test_blurred(void) {
     g.opacity = (ssdgs_real)0.999;
     CHECK(!ssdgs_model_set(model, 0, &g));
     ssdgs_render_options options = ssdgs_render_options_exact();
-    double drawn = 0;
-    for (int i = 0; i < 60; i++) { /* on the left, on the right */
-        const double beside = 3 + (i / 2 < 10 ? i / 2 : i - i % 2 - 10),
+    double drawn[2] = {0, 0};
+    for (int i = 0; i < 76; i++) { /* on the left, on the right */
+        const double beside = i < 60 ? 3 + (i / 2 < 10 ? i / 2 : i - i % 2 - 10) : i - 40,
                      at = (beside + SIDE / 2) * 3 / (double)camera.fx;
+        for (int c = 0; c < 3 && i == 60; c++) g.scale[c] = (ssdgs_real)0.4;
+        if (i == 60) CHECK(!ssdgs_model_set(model, 0, &g));
         ssdgs_object object[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
         options.alpha_threshold = (ssdgs_real)(i < 20 ? 1.0 / 255 : 0);
         object[0].to_world[3] = (ssdgs_real)(i % 2 ? at : -at);
         object[1].to_world[3] = 1000;
         for (int j = 0; j < 2; j++) together(object, 1 + j, &camera, NULL, 0, &options, shot + j);
         CHECK(same(shot, shot + 1));
-        for (int p = 0; p < PIXELS; p++) drawn += (double)shot->value[15 * PIXELS + p];
+        for (int p = 0; p < PIXELS; p++) drawn[i / 60] += (double)shot->value[15 * PIXELS + p];
     }
-    CHECK(drawn > 0.5);
+    CHECK(drawn[0] > 0.5 && drawn[1] > 100);
     ssdgs_model_destroy(model);
 }
 
