@@ -10017,6 +10017,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     result = ssdgs__normals_loss(frame, shot->normal_weight);
     if (result) return result;
     memcpy(frame->frozen, shot->frozen, sizeof frame->frozen);
+    /* Where no network mends what is wrong in shadows, surfaces that follow them run away. */
+    if (!model->settings.shadow.layers) frame->visibility_given = 1;
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
 }
 

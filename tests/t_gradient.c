@@ -537,6 +537,43 @@ static void test_photo(int transfer, double intensity) {
     ssdgs_model_destroy(model);
 }
 
+/* Shadows teach the surfaces that receive them, but not where no network can mend what is wrong in them. */
+static void test_receivers(void) {
+    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1},
+                            background[3] = {0, 0, 0};
+    static unsigned char pixels[SIDE * SIDE * 4];
+    ssdgs_photo photo;
+    memset(&photo, 0, sizeof photo);
+    photo.camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    photo.light.position[0] = photo.light.position[1] = -2;
+    photo.light.intensity[0] = photo.light.intensity[1] = photo.light.intensity[2] = 9;
+    photo.pixels = pixels;
+    memset(pixels, 255, sizeof pixels);
+    for (int layers = 0; layers < 2; layers++) {
+        ssdgs_real position[3][COUNT]; /* dL/dx as trained, with visibility held fixed, and not */
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs__loss_values values;
+        ssdgs_model *model = NULL;
+        ssdgs_frame frame;
+        settings.shadow.layers = layers;
+        if (!CHECK(!ssdgs_model_create(context, &settings, COUNT, &model))) exit(1);
+        fill(model);
+        const ssdgs__photo_job shot = {
+            &photo, &photo.camera, &photo.light, background, SSDGS_ALL_TERMS, {0, 0}, 0.2, 0, 1, NULL};
+        if (ssdgs__photo_backward(&frame, model, &shot, &values)) exit(1);
+        for (int way = 0; way < 3; way++) {
+            if (way) frame.visibility_given = way == 1;
+            if (way &&
+                ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD))
+                exit(1);
+            memcpy(position[way], frame.gradient, sizeof position[way]);
+        }
+        CHECK(memcmp(position[1], position[2], sizeof position[1]) != 0);
+        CHECK(!memcmp(position[0], position[layers ? 2 : 1], sizeof position[0]));
+        ssdgs_model_destroy(model);
+    }
+}
+
 /* What a rendering looks like on a background is what a photograph of the same colour and alpha looks
    like. */
 static void test_compose(void) {
@@ -604,6 +641,7 @@ int main(void) {
         test_photo(transfer, 9);
         test_photo(transfer, 300);
     }
+    test_receivers();
     test_compose();
     test_octaves();
     test_empty_tiles();
