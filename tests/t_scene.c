@@ -1248,8 +1248,8 @@ static void test_threads_and_memory(void) {
     context = was, scene = was_scene;
 }
 
-/* A frame in which any one allocation fails leaves no light's map, not that of the frame before either; the
-   next one makes them as a scene that is new does. */
+/* Any one allocation fails. ssdgs_scene_light() then leaves no light's map, not that of the frame before
+   either. After it, and after a picture that failed, the next call makes them as a new scene does. */
 static void test_failed_frame(void) {
     enum { LIGHTS = 8, OBJECTS = 40 };
     ssdgs_settings s = small_settings();

@@ -100,6 +100,12 @@ static inline void test_row(int before, const char *rows, const char *name) {
         test_row(test_before, rows, name); \
     } while (0)
 
+#define TEST_END() \
+    do { \
+        printf("%d passed, %d failed\n", test_passed, test_failed); \
+        return test_failed != 0; \
+    } while (0)
+
 /* ---- memory that counts, and fails on demand ---- */
 
 typedef struct test_meter {
@@ -133,12 +139,6 @@ static inline void test_release(void *user, void *memory) {
 #define TEST_METER(desc, meter) \
     ((desc).allocator.allocate = test_allocate, (desc).allocator.release = test_release, \
      (desc).allocator.user = (meter))
-
-#define TEST_END() \
-    do { \
-        printf("%d passed, %d failed\n", test_passed, test_failed); \
-        return test_failed != 0; \
-    } while (0)
 
 /* ---- golden files ---- */
 
