@@ -708,11 +708,9 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
-    ssdgs_real densify_shadow; /* px: one half in shadow on more of a photograph, on average, is split; 0.5 */
-    ssdgs_real prune_weight;   /* px: one whose weights sum to less, on average, is removed; 0.05 */
-    ssdgs_real prune_outside;  /* share of photographs that must show background at its centre before one is
-                                  removed, see OUTLINES in the manual; 0.02 */
-    ssdgs_real adam_epsilon;   /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
+    ssdgs_real prune_outside;    /* share of photographs that must show background at its centre before one is
+                                     removed, see OUTLINES in the manual; 0.02 */
+    ssdgs_real adam_epsilon;     /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
     ssdgs_real finish; /* factor of the model's rates in the last tenth of the iterations; 0.3; 1 = none */
     ssdgs_rates rates;
     ssdgs_sum sum; /* none */
@@ -9546,11 +9544,9 @@ struct ssdgs_trainer {
     size_t stride;             /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
-    ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, weights, half
-                                    shadow */
+    ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, weights */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
-    ssdgs_real *half_shadow;
     ssdgs_real *exposure; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
     int exposed;          /* 1: it is up to date */
     double ambient[6];    /* Adam's moments of settings.ambient: means, then squares */
@@ -9592,8 +9588,6 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
     o.opacity_reset_every = 3000;
     o.batch = 1;
     o.densify_gradient = (ssdgs_real)4e-4;
-    o.densify_shadow = (ssdgs_real)0.5;
-    o.prune_weight = (ssdgs_real)0.05;
     o.prune_outside = (ssdgs_real)0.02;
     o.adam_epsilon = (ssdgs_real)0.1;
     o.finish = (ssdgs_real)0.3;
@@ -9620,8 +9614,7 @@ SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
     o.densify_from = 500;
     o.normal_weight = 0;
     o.densify_gradient = (ssdgs_real)2e-4;
-    o.densify_shadow = 0;
-    o.prune_weight = o.prune_outside = o.adam_epsilon = 0;
+    o.prune_outside = o.adam_epsilon = 0;
     o.finish = 1;
     SSDGS__RATE(position, 1.6e-4, 1.6e-6);
     SSDGS__RATE(scale, 0.005, 0.005);
@@ -10289,10 +10282,10 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
-/* Reads gradients and weights gathered over the photographs. Adds, halves and removes Gaussians. Called by
+/* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by
    steps. */
 
-#define SSDGS__STATISTICS 4
+#define SSDGS__STATISTICS 3
 #define SSDGS__MAX_BATCH 256
 #define SSDGS__PER_PIXEL 0.75  /* more Gaussians than that take time and show nothing */
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
@@ -10300,9 +10293,6 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
 #define SSDGS__DOUBT 0.02      /* weight of c_s and c_sss in the loss where photographs have one light */
 #define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
-#define SSDGS__HALVED \
-    0.015 /* of the Gaussians at most, at a time: what is not in its place yet must not multiply */
-#define SSDGS__HALF 0.75 /* of the longest axis: a Gaussian's halves, apart by what keeps its variance */
 
 static void ssdgs__rearranged(ssdgs_trainer *trainer) {
     trainer->arrangement = ++trainer->model->arrangement;
@@ -10343,7 +10333,6 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     trainer->screen_gradient = statistics;
     trainer->screen_count = statistics + capacity;
     trainer->contribution = statistics + 2 * capacity;
-    trainer->half_shadow = statistics + 3 * capacity;
     trainer->exposure = statistics + SSDGS__STATISTICS * capacity;
     trainer->exposed = 0;
     if (capacity != model->capacity) model->arrangement++;
@@ -10392,48 +10381,37 @@ static void ssdgs__forget(ssdgs_trainer *trainer, size_t at) {
         trainer->mean[c * trainer->stride + at] = trainer->square[c * trainer->stride + at] = 0;
 }
 
-/* Makes two Gaussians of `from`, the second at `to`: its halves along the longest axis; or else clones if it
-   is small, two samples of it, smaller, if it is large. */
-static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to, int halve) {
+/* Makes two Gaussians of `from`, the second at `to`: clones if it is small; two samples of it, smaller, if it
+   is large. */
+static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to) {
     const ssdgs_train_options *o = &trainer->options;
     const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
     const size_t stride = trainer->stride;
     ssdgs_real *p = trainer->model->gaussians;
-    int longest = 0;
     ssdgs__copy_gaussian(p, stride, to, from);
     ssdgs__forget(trainer, to);
-    for (int c = 1; c < 3; c++)
-        if (p[(size_t)(SSDGS_LOG_SCALE + c) * stride + from] >
-            p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from])
-            longest = c;
-    if (!halve && (double)p[(size_t)(SSDGS_LOG_SCALE + longest) * stride + from] <=
-                      log(SSDGS__SPLIT_SIZE * trainer->extent))
-        return; /* the copy is the clone */
+    ssdgs_real longest = p[(size_t)SSDGS_LOG_SCALE * stride + from];
+    for (size_t c = 1; c < 3; c++) {
+        const ssdgs_real scale = p[(SSDGS_LOG_SCALE + c) * stride + from];
+        longest = scale > longest ? scale : longest;
+    }
+    if ((double)longest <= log(SSDGS__SPLIT_SIZE * trainer->extent)) return; /* the copy is the clone */
     ssdgs_real raw[4];
     for (int c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw, q, r);
     for (int half = 0; half < 2; half++) {
         const size_t at = half ? to : from;
-        double offset[3] = {0, 0, 0};
+        double offset[3];
         for (int c = 0; c < 3; c++) {
             ssdgs_real *scale = p + (size_t)(SSDGS_LOG_SCALE + c) * stride + at;
-            if (halve && c != longest) continue;
-            offset[c] = (double)ssdgs__exp_scalar(*scale) *
-                        (halve ? (half ? 1 : -1) * sqrt(1 - SSDGS__HALF * SSDGS__HALF)
-                               : ssdgs__normal(key, (uint64_t)(3 * half + c)));
-            *scale += (ssdgs_real)(halve ? log(SSDGS__HALF) : -0.47000362924573558); /* ln 1.6 */
+            offset[c] = (double)ssdgs__exp_scalar(*scale) * ssdgs__normal(key, (uint64_t)(3 * half + c));
+            *scale += (ssdgs_real)-0.47000362924573558; /* ln 1.6 */
         }
         for (int c = 0; c < 3; c++)
             for (int j = 0; j < 3; j++)
                 p[(size_t)(SSDGS_POSITION + c) * stride + at] +=
                     (ssdgs_real)((double)r[3 * c + j] * offset[j]);
-        if (halve) { /* together as opaque as the whole */
-            ssdgs_real *opacity = p + (size_t)SSDGS_OPACITY * stride + at;
-            const double veil = log(1 + exp(*opacity < 20 ? (double)*opacity : 20)) /
-                                (2 * SSDGS__HALF); /* -ln(1 - opacity) */
-            *opacity = (ssdgs_real)log(expm1(veil));
-        }
     }
     ssdgs__forget(trainer, from);
 }
@@ -10528,7 +10506,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const int before = trainer->iteration - o->batch, last = ssdgs__last_reset(o, before);
     const int recovering = last && last > before - o->densify_every;
     uint64_t *order;
-    size_t kept = 0, dropped = 0, wanted = 0, pulled = 0, halved = 1 + (size_t)(SSDGS__HALVED * (double)n);
+    size_t kept = 0, dropped = 0, wanted = 0;
     const ssdgs_real *p = model->gaussians;
     /* two lists of n candidates; at most 2 n Gaussians' order, a plane of them; what is dropped */
     ssdgs__ranked *candidates = (ssdgs__ranked *)ssdgs__allocate(
@@ -10547,26 +10525,20 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
             const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
             size = s > size ? s : size;
         }
-        drop[i] = drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint ||
-                  (double)size > log(largest_size) ||
-                  (!recovering && trainer->contribution[i] < o->prune_weight * trainer->screen_count[i]);
+        drop[i] =
+            drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size);
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
         const ssdgs_real gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
-        const ssdgs_real shadow = trainer->half_shadow[i] / trainer->screen_count[i];
-        const int pull = !(gradient < o->densify_gradient);
-        if (!pull && !(o->densify_shadow > 0 && shadow >= o->densify_shadow)) continue;
-        candidates[wanted].value =
-            pull ? gradient : -1 / shadow; /* below 0: to be halved, after the others */
+        if (gradient < o->densify_gradient) continue;
+        candidates[wanted].value = gradient;
         candidates[wanted++].index = (uint32_t)i;
-        pulled += (size_t)pull;
     }
     if (dropped == n) { /* never extinct */
         drop[0] = 0;
         dropped--;
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
-    wanted = wanted - pulled < halved ? wanted : pulled + halved;
     size_t room = (size_t)trainer->budget > n - dropped ? (size_t)trainer->budget - (n - dropped) : 0;
     if (wanted > room || n - dropped > (size_t)trainer->budget) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
@@ -10595,8 +10567,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     }
     size_t i, added;
     for (i = 0, added = 0; i < wanted; i++)
-        if (!drop[candidates[i].index])
-            ssdgs__make_two(trainer, candidates[i].index, n + added++, candidates[i].value < 0);
+        if (!drop[candidates[i].index]) ssdgs__make_two(trainer, candidates[i].index, n + added++);
     for (i = 0; i < n + added; i++)
         if (i >= n || !drop[i]) order[kept++] = i;
     ssdgs__reorder(trainer, order, kept, (ssdgs_real *)(order + 2 * n));
@@ -10622,14 +10593,10 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
                      half_h = magnify * (ssdgs_real)frame->camera.height / 2;
     for (int i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
-        const ssdgs_real lit = frame->terms & SSDGS_SHADOW_TERM ? frame->visibility[g] : 1;
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
         sums[g] += SSDGS__SQRT(x * x + y * y);
         sums[trainer->stride + g] += 1;
         sums[2 * trainer->stride + g] += d[6];
-        if (d[6] > 1)
-            sums[3 * trainer->stride + g] +=
-                4 * lit * (1 - lit) * (d[6] - 1); /* to halve less than a pixel shows nothing */
     }
 }
 
@@ -10942,8 +10909,6 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(dssim, 0, 1);
     SSDGS__RANGE(normal_weight, 0, most);
     SSDGS__RANGE(densify_gradient, 0, most);
-    SSDGS__RANGE(densify_shadow, 0, most);
-    SSDGS__RANGE(prune_weight, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(adam_epsilon, 0, most);
     SSDGS__RANGE(finish, 0, 1);

@@ -205,8 +205,6 @@ changes() {
     row 'no light bias' '' no_bias --set light_bias=0
     row 'no transport' '' no_transport --set transport=0
     row 'camera pass adds 0.3 px^2' '' variance --set pixel_variance=0.3
-    row 'none dropped for its weight' '' no_prune --set prune_weight=0
-    row 'none halved for its shadow' '' no_halving --set densify_shadow=0
     row 'scattering network 32 wide' '' narrow --set scattering_width=32
     row 'scattering network 128 wide' '' wide --set scattering_width=128
 }

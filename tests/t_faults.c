@@ -868,13 +868,16 @@ static void test_checkpoints(void) {
     bytes whole = slurp(run_path);
     head h;
     size_t parameters = sizeof h;
-    ssdgs_real most = 0;
     int wrong = 0;
     with_steps(14); /* all that training knows comes back: by now every statistic counts */
     uint64_t before = held();
-    for (int i = 0; i < model->count; i++)
-        most = trainer->half_shadow[i] > most ? trainer->half_shadow[i] : most;
-    CHECK(most > 0 && trainer->corrections[0].steps[1] > 0 && !ssdgs_trainer_save(trainer, file_path));
+    for (size_t k = 0; k < SSDGS__STATISTICS; k++) {
+        ssdgs_real most = 0;
+        for (size_t i = 0; i < (size_t)model->count; i++)
+            if (trainer->screen_gradient[k * trainer->stride + i] > most) most = 1;
+        CHECK(most > 0);
+    }
+    CHECK(trainer->corrections[0].steps[1] > 0 && !ssdgs_trainer_save(trainer, file_path));
     end_world();
     with_trainer();
     CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == before);
@@ -990,7 +993,7 @@ static void test_checkpoints(void) {
         if (i == 1) options.iterations++;
         if (i == 2) options.rates.position.end = 0;
         if (i == 3) options.rates.light.end *= 2;
-        if (i == 4) options.prune_weight = 0;
+        if (i == 4) options.densify_gradient = 0;
         settings = small_settings(i == 5 ? 9 : 8);
         settings.transport = i != 6;
         settings.terms = i == 7 ? SSDGS_DIFFUSE_TERM : SSDGS_ALL_TERMS;

@@ -83,8 +83,6 @@ static const field train_fields[] = {
     R(dssim, 0, 1),
     R(normal_weight, 0, 1e30),
     R(densify_gradient, 0, 1e30),
-    R(densify_shadow, 0, 1e30),
-    R(prune_weight, 0, 1e30),
     R(prune_outside, 0, 1),
     R(adam_epsilon, 0, 1e30),
     R(finish, 0, 1),
@@ -259,8 +257,6 @@ static const preset train_presets[] = {/* default, published */
                                        R(bounds_max[1], 0.5, 0.5),
                                        R(bounds_max[2], 0.5, 0.5),
                                        R(densify_gradient, 4e-4, NONE),
-                                       R(densify_shadow, 0.5, 0),
-                                       R(prune_weight, 0.05, 0),
                                        R(prune_outside, 0.02, 0),
                                        R(adam_epsilon, 0.1, 0),
                                        R(finish, 0.3, 1)

@@ -1485,7 +1485,7 @@ static void test_cap(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    options.prune_weight = options.prune_outside = 0;
+    options.prune_outside = 0;
     options.densify_gradient = 1;
     for (int pass = 0; pass < 3; pass++) {
         options.max_gaussians = pass ? MANY : MANY / 2;
@@ -1617,40 +1617,6 @@ static void test_resets(void) {
     for (int i = 0; i < 89; i++) CHECK((ssdgs__last_reset(&options, i) == i && i) == (i == 30));
     options.opacity_reset_every = 0;
     CHECK(!ssdgs__last_reset(&options, 30));
-}
-
-/* Gaussians that hardly show go, but neither those never seen nor all of them after opacities were reset. */
-static void test_prune_weight(void) {
-    enum { MANY = 8, LIGHT = 3 };
-    ssdgs_train_options options = short_run(100);
-    ssdgs_context *context = NULL;
-    ssdgs_model *model = NULL;
-    ssdgs_trainer *trainer = NULL;
-    options.densify_gradient = 1;
-    CHECK(!ssdgs_context_create(NULL, &context));
-    CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
-    for (int i = 0; i < MANY; i++) model->gaussians[(size_t)SSDGS_OPACITY * model->capacity + (size_t)i] = 0;
-    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    /* opacities are reset at 30, and no more at 90, so near the end */
-    for (int pass = 0; pass < 4; pass++) {
-        static const int iteration[4] = {40, 50, 100, 10};
-        ssdgs_real *const names = model->gaussians + (size_t)SSDGS_DIFFUSE * model->capacity;
-        model->count = MANY;
-        for (int i = 0; i < MANY; i++) {
-            names[i] = (ssdgs_real)i;
-            trainer->screen_count[i] = i == LIGHT ? 0 : 4;
-            trainer->screen_gradient[i] = 3; /* in four photographs: too little to make more of it */
-            trainer->contribution[i] =
-                trainer->screen_count[i] * options.prune_weight * (ssdgs_real)(i < LIGHT ? 0.9 : 1.1);
-        }
-        trainer->iteration = iteration[pass];
-        CHECK(!ssdgs__densify(trainer));
-        CHECK(model->count == (pass ? MANY - LIGHT : MANY));
-        for (int i = 0; i < model->count && pass; i++) CHECK(names[i] >= LIGHT);
-    }
-    ssdgs_trainer_destroy(trainer);
-    ssdgs_model_destroy(model);
-    ssdgs_context_destroy(context);
 }
 
 /* Notes in the log, by words of theirs. */
@@ -2490,119 +2456,105 @@ static void test_fade(void) {
     ssdgs_context_destroy(context);
 }
 
-/* What lies half in shadow is halved along its longest axis, so that centre, variance and, where they
-   overlap, the light that gets through stay. */
-static void test_half_shadow(void) {
-    static const double turn[4] = {0.9, 0.1, -0.3, 0.3}, scale[3] = {0.02, 0.11, 0.05};
+/* A Gaussian pulled hard becomes two: a small one is cloned; a large one becomes two samples of it, 1.6 times
+   smaller. New ones have no momentum. One pulled less stays as it was. */
+static void test_two(void) {
+    enum { STAYS, SMALL, LARGE, MANY };
+    static const double turn[4] = {0.9, 0.1, -0.3, 0.3};
     ssdgs_train_options options = short_run(100);
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
-    double length = 0;
     options.opacity_reset_every = 0;
     options.densify_gradient = 1;
-    options.densify_shadow = 2;
     CHECK(!ssdgs_context_create(NULL, &context));
-    CHECK(!ssdgs_model_create(context, NULL, 2, &model));
-    ssdgs_real *p = model->gaussians;
-    ssdgs_real raw[4];
-    for (int c = 0; c < 4; c++)
-        raw[c] = p[(size_t)(SSDGS_ROTATION + c) * model->capacity + 1] = (ssdgs_real)turn[c];
-    for (int c = 0; c < 3; c++) {
-        p[(size_t)c * model->capacity + 1] = (ssdgs_real)0.2;
-        p[(size_t)(SSDGS_LOG_SCALE + c) * model->capacity + 1] = (ssdgs_real)log(scale[c]);
-    }
-    p[SSDGS_OPACITY * model->capacity + 1] = (ssdgs_real)1.2;
+    CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
     CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (int i = 0; i < 2; i++) { /* the first has too little of it */
+    const double edge = 0.01 * trainer->extent; /* between small and large */
+    const double scale[3] = {0.5 * edge, 1.1 * edge, 0.2 * edge};
+    ssdgs_real *p = model->gaussians;
+    for (size_t i = 0; i < MANY; i++) {
+        p[SSDGS_DIFFUSE * model->capacity + i] = (ssdgs_real)i;
+        for (size_t c = 0; c < 4; c++) p[(SSDGS_ROTATION + c) * model->capacity + i] = (ssdgs_real)turn[c];
+        for (size_t c = 0; c < 3; c++) {
+            p[c * model->capacity + i] = (ssdgs_real)0.2;
+            p[(SSDGS_LOG_SCALE + c) * model->capacity + i] =
+                (ssdgs_real)log(scale[c] * (i == SMALL ? 0.9 / 1.1 : 1));
+        }
+        p[SSDGS_OPACITY * model->capacity + i] = (ssdgs_real)1.2;
         trainer->screen_count[i] = 3;
-        trainer->contribution[i] = 100;
-        trainer->half_shadow[i] = 3 * (ssdgs_real)(i ? 2.1 : 1.9);
+        trainer->screen_gradient[i] = 3 * (ssdgs_real)(i == STAYS ? 0.9 : 1.1);
     }
-    for (size_t i = 0; i < SSDGS_CHANNELS * trainer->stride; i++) /* of Gaussians that were dropped, too */
-        trainer->mean[i] = trainer->square[i] = 1;
+    for (size_t i = 0; i < SSDGS_CHANNELS * trainer->stride; i++) trainer->mean[i] = trainer->square[i] = 1;
     trainer->iteration = 50;
-    CHECK(!ssdgs__densify(trainer) && model->count == 3);
+    CHECK(!ssdgs__densify(trainer) && model->count == 5);
     p = model->gaussians;
     const size_t stride = model->capacity;
-    ssdgs_real q[4], r[9];
-    ssdgs__rotation_scalar(raw, q, r);
-    double middle[3], apart[3];
-    for (int half = 0, i = 0; i < 3; i++) { /* the first is still the first; halves start without momentum */
-        for (int c = 0; c < SSDGS_CHANNELS; c++)
-            CHECK(trainer->mean[(size_t)c * stride + (size_t)i] == !i &&
-                  trainer->square[(size_t)c * stride + (size_t)i] == !i);
-        CHECK(trainer->half_shadow[i] == 0 && trainer->contribution[i] == 0 &&
-              trainer->screen_gradient[i] == 0 && trainer->screen_count[i] == 0);
-        if (i == 0) continue;
-        for (int c = 0; c < 3; c++) {
-            const double x = (double)p[(size_t)c * stride + (size_t)i];
-            middle[c] = (half ? middle[c] : 0) + x / 2;
-            apart[c] = half ? apart[c] - x : x;
-            CHECK(fabs(exp((double)p[(size_t)(SSDGS_LOG_SCALE + c) * stride + (size_t)i]) -
-                       (c == 1 ? 0.75 : 1) * scale[c]) < 1e-6);
-        }
-        { /* 1 - opacity to the power 2/3: 1 / (2 x 0.75) */
-            const double veil = pow(1 + exp(1.2), -2.0 / 3),
-                         opacity = 1 / (1 + exp(-(double)p[SSDGS_OPACITY * stride + (size_t)i]));
-            CHECK(fabs(opacity - (1 - veil)) < 1e-6);
-        }
-        half++;
-    }
+    int found[MANY] = {0, 0, 0};
+    double axis[3][3], apart = 0, norm = 0; /* columns of the rotation */
+    for (int c = 0; c < 4; c++) norm += turn[c] * turn[c];
     for (int c = 0; c < 3; c++) {
-        CHECK(fabs(middle[c] - 0.2) < 1e-6);
-        length += apart[c] * apart[c];
-        CHECK(fabs(fabs(apart[c]) - 2 * scale[1] * sqrt(1 - 0.75 * 0.75) * fabs((double)r[3 * c + 1])) <
-              1e-6);
+        const int a = (c + 1) % 3, b = (c + 2) % 3;
+        const double w = turn[0], *v = turn + 1;
+        axis[c][c] = 1 - 2 * (v[a] * v[a] + v[b] * v[b]) / norm;
+        axis[c][a] = 2 * (v[c] * v[a] + w * v[b]) / norm;
+        axis[c][b] = 2 * (v[c] * v[b] - w * v[a]) / norm;
     }
-    CHECK(fabs(length / 4 + 0.75 * 0.75 * scale[1] * scale[1] - scale[1] * scale[1]) < 1e-7);
+    for (size_t i = 0; i < 5; i++) {
+        const int name = (int)p[SSDGS_DIFFUSE * stride + i];
+        const int old = name == STAYS || (name == SMALL && !found[SMALL]);
+        double along[3] = {0, 0, 0};
+        for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+            CHECK(trainer->mean[c * stride + i] == old && trainer->square[c * stride + i] == old);
+        CHECK(trainer->contribution[i] == 0 && trainer->screen_gradient[i] == 0 &&
+              trainer->screen_count[i] == 0);
+        CHECK(p[SSDGS_OPACITY * stride + i] == (ssdgs_real)1.2);
+        for (size_t c = 0; c < 3; c++) {
+            const double size = exp((double)p[(SSDGS_LOG_SCALE + c) * stride + i]);
+            CHECK(fabs(size / scale[c] - (name == LARGE ? 1 / 1.6 : name == SMALL ? 0.9 / 1.1 : 1)) < 1e-5);
+            for (size_t k = 0; k < 3; k++) along[k] += axis[k][c] * ((double)p[c * stride + i] - 0.2);
+        }
+        for (int k = 0; k < 3; k++) { /* the draws that the seed gives, along the Gaussian's axes */
+            const double draw =
+                ssdgs__normal(options.seed ^ (UINT64_C(50) << 32) ^ LARGE, (uint64_t)(3 * found[name] + k));
+            CHECK(fabs(along[k] - (name == LARGE ? scale[k] * draw : 0)) < 1e-7);
+            if (name == LARGE) apart += fabs(draw);
+        }
+        found[name]++;
+    }
+    CHECK(found[STAYS] == 1 && found[SMALL] == 2 && found[LARGE] == 2 && apart > 1);
     p[SSDGS_OPACITY * stride] = -6;
     ssdgs__reset_opacity(trainer); /* lowers what is above 0.01 */
     CHECK(p[SSDGS_OPACITY * stride] == -6 &&
           fabs((double)p[SSDGS_OPACITY * stride + 1] - log(0.01 / 0.99)) < 1e-6);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
-    CHECK(!ssdgs_model_create(context, NULL, 200, &model)); /* of many, the few with the most */
-    CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
-    for (int i = 0; i < 200; i++) {
-        model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] = (ssdgs_real)i;
-        trainer->screen_count[i] = 1;
-        trainer->contribution[i] = 100;
-        trainer->half_shadow[i] = (ssdgs_real)(10 + i);
-    }
-    trainer->iteration = 50;
-    CHECK(!ssdgs__densify(trainer) && model->count == 204);
-    int i, c;
-    for (i = 0, c = 0; i < 204; i++)
-        c += model->gaussians[(size_t)SSDGS_DIFFUSE * model->capacity + (size_t)i] >= 196;
-    CHECK(c == 8);
-    for (i = 0; i < 4; i++) { /* gathered: lit to a fifth, on 11 px; without the shadow term; less than a
-                                 pixel; two photographs */
-        ssdgs_real splat[SSDGS__SPLAT] = {4, (ssdgs_real)1.5}, lit = (ssdgs_real)0.2;
-        uint32_t first = 0;
-        ssdgs_frame frame;
-        memset(&frame, 0, sizeof frame);
-        frame.camera.width = 2;
-        frame.camera.height = 4;
-        frame.terms = i == 1 ? SSDGS_DIFFUSE_TERM : SSDGS_ALL_TERMS;
-        frame.shaded_count = 1;
-        frame.shaded = &first;
-        frame.splat_gradient = splat;
-        frame.visibility = &lit;
-        splat[6] = (ssdgs_real)(i == 2 ? 0.9 : 11);
-        if (i < 3)
-            trainer->half_shadow[0] = trainer->contribution[0] = trainer->screen_gradient[0] =
-                trainer->screen_count[0] = 0;
-        ssdgs__gather_statistics(trainer, &frame, 1, trainer->screen_gradient);
-        if (i == 3) ssdgs__gather_statistics(trainer, &frame, 2, trainer->screen_gradient);
-        CHECK(fabs((double)trainer->half_shadow[0] - (i == 0 ? 6.4 : i == 3 ? 12.8 : 0)) < 1e-5);
-        CHECK(fabs((double)trainer->contribution[0] - (i == 2 ? 0.9 : i == 3 ? 22.9 : 11)) < 1e-5);
-        CHECK(fabs((double)trainer->screen_gradient[0] - (i == 3 ? 20 : 5)) < 1e-5 &&
-              trainer->screen_count[0] == (i == 3 ? 3 : 1));
-    }
-    ssdgs_trainer_destroy(trainer);
-    ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
+}
+
+/* What density control knows of a Gaussian: sums of its pull, in half images, of photographs, of weights. */
+static void test_statistics(void) {
+    enum { STRIDE = 2, AT = 1 };
+    ssdgs_real sums[SSDGS__STATISTICS * STRIDE] = {0}, splats[SSDGS__SPLAT * STRIDE] = {0};
+    uint32_t shaded = AT;
+    ssdgs_trainer trainer;
+    ssdgs_frame frame;
+    memset(&trainer, 0, sizeof trainer);
+    memset(&frame, 0, sizeof frame);
+    trainer.stride = STRIDE;
+    frame.camera.width = 2;
+    frame.camera.height = 4;
+    frame.shaded_count = 1;
+    frame.shaded = &shaded;
+    frame.splat_gradient = splats;
+    splats[SSDGS__SPLAT * AT] = 4;
+    splats[SSDGS__SPLAT * AT + 1] = (ssdgs_real)1.5;
+    splats[SSDGS__SPLAT * AT + 6] = 11;
+    ssdgs__gather_statistics(&trainer, &frame, 1, sums);
+    CHECK(sums[AT] == 5 && sums[STRIDE + AT] == 1 && sums[2 * STRIDE + AT] == 11);
+    ssdgs__gather_statistics(&trainer, &frame, 2, sums); /* a photograph that is to count as if larger */
+    CHECK(sums[AT] == 15 && sums[STRIDE + AT] == 2 && sums[2 * STRIDE + AT] == 22);
+    CHECK(sums[0] == 0 && sums[STRIDE] == 0 && sums[2 * STRIDE] == 0);
 }
 
 /* How many Gaussians there may be: three quarters of what photographs show, of alpha's pixels, within limits.
@@ -2661,7 +2613,6 @@ int main(void) {
     test_units();
     test_blur();
     test_resets();
-    test_prune_weight();
     test_prune_outside();
     test_nothing_in_view();
     test_outlines_known();
@@ -2674,7 +2625,8 @@ int main(void) {
     test_rearranged();
     test_budget();
     test_fade();
-    test_half_shadow();
+    test_two();
+    test_statistics();
     test_learning();
     test_refinement();
     test_ambient();

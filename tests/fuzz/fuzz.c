@@ -551,8 +551,6 @@ static ssdgs_train_options draw_options(input *in) {
     o.opacity_reset_every = draw_below(in, 4);
     o.dssim = draw_real(in, 0.2, 1);
     o.densify_gradient = draw_real(in, 0, 1);
-    o.densify_shadow = draw_real(in, 0, 1);
-    o.prune_weight = draw_real(in, 0, 1);
     for (int i = 0; i < 3; i++) {
         o.background[i] = draw_real(in, 0.5, 1);
         o.bounds_min[i] = draw_real(in, -0.5, 1);
