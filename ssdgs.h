@@ -1037,7 +1037,6 @@ typedef struct ssdgs_frame {
     int terms;             /* to render, of any object */
     ssdgs_real bias[2];    /* world units: the largest light_map.bias, of Gaussians and of pixels */
     ssdgs_real near_plane; /* world units: of cameras that name none */
-    int cue;               /* 1: depth_cue is asked for */
     int training;          /* 1: network activations are kept for the backward */
     int frozen[2];         /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_splat_view *views;
@@ -1052,10 +1051,9 @@ typedef struct ssdgs_frame {
     size_t light_instances; /* of all lights' views that were walked */
     unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
     ssdgs_real *visibility; /* (lights, n) eq. 7; of a light without views neither this nor the next two */
-    ssdgs_real *depth_cue;  /* (lights, n) world units */
-    ssdgs_real
-        *flux; /* (lights, n) intercepted, sr per unit intensity, directional: area; NULL, so not computed,
-                  unless settings.transport asks or the caller of the stages points it at memory */
+    /* NULL, so not computed, unless settings ask or the caller of the stages points them at memory: */
+    ssdgs_real *depth_cue; /* (lights, n) world units */
+    ssdgs_real *flux;      /* (lights, n) intercepted, sr per unit intensity, directional: area */
     /* SSDGS_STAGE_SHADE */
     uint32_t *shaded; /* (shaded_count) Gaussians seen, ascending */
     int shaded_count;
@@ -4262,7 +4260,6 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         o.light_count = o.settings.baked ? 0 : light_count;
         frame->light_count = o.light_count > frame->light_count ? o.light_count : frame->light_count;
         frame->terms |= o.terms;
-        frame->cue |= (o.terms & SSDGS_SCATTERING_TERM) && o.settings.depth_cue;
         frame->count = o.first + o.gaussians.count;
         at = ((uint64_t)frame->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
         const ssdgs_real unit = o.settings.length_unit * o.scale,
@@ -4565,12 +4562,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
     SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    int deferred = 0, transport = 0;
+    int deferred = 0, cue = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
-        deferred |= ssdgs__is_deferred(frame->objects + i);
-        transport |= ssdgs__has_transport(frame->objects + i);
+        const ssdgs_placed *o = frame->objects + i;
+        deferred |= ssdgs__is_deferred(o);
+        cue |= (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
+        transport |= ssdgs__has_transport(o);
     }
+    if (cue) SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
     if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
@@ -4969,7 +4968,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
-    t.cue = frame->cue;
+    t.cue = frame->depth_cue != NULL;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
     t.light_map = v->light_map && t.count ? v->light_map + (size_t)v->map_tile[index] * 256 : NULL;
@@ -5037,7 +5036,7 @@ static void ssdgs__gather_light_task(void *data, int index) {
             }
             frame->visibility[at] =
                 sum[1] > 0 ? sum[0] / sum[1] : 1; /* nothing in the way of an empty footprint */
-            frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
+            if (frame->depth_cue) frame->depth_cue[at] = sum[1] > 0 && sum[2] > 0 ? sum[2] / sum[1] : 0;
             if (frame->flux) frame->flux[at] = sum[3];
         }
 }

@@ -1797,7 +1797,7 @@ void main() {
 
 /* Of the views of a light one after the other; what the last one adds up to is eq. 7. */
 static const char gpu_gather_light[] = GPU_GLSL(
-layout(std140, binding = 0) uniform parameters { uint count, light, first, last, flux; };
+layout(std140, binding = 0) uniform parameters { uint count, light, first, last, cue, flux; };
 layout(std430, binding = 0) readonly buffer of_gaussians { pair of_gaussian[]; };
 layout(std430, binding = 1) readonly buffer instances { pair instance[]; };
 layout(std430, binding = 2) readonly buffer sums { vec4 tile_sums[]; };
@@ -1816,7 +1816,7 @@ void main() {
         return;
     }
     visibility[at] = sum.y > 0 ? sum.x / sum.y : 1; /* nothing in the way of an empty footprint */
-    depth_cue[at] = sum.y > 0 && sum.z > 0 ? sum.z / sum.y : 0;
+    if (cue != 0u) depth_cue[at] = sum.y > 0 && sum.z > 0 ? sum.z / sum.y : 0;
     if (flux != 0u) all_flux[at] = sum.w;
 }
 );
@@ -2727,7 +2727,7 @@ static gpu_walk_parameters gpu_walk_of(const ssdgs_frame *frame, int view) {
     p.cx = (float)v->cx, p.cy = (float)v->cy;
     p.inverse_focal = (float)(1 / (v->orthographic ? v->fx * v->distance : v->fx));
     p.orthographic = v->orthographic != 0;
-    p.cue = frame->cue != 0;
+    p.cue = frame->depth_cue != NULL;
     p.flux = frame->flux != NULL;
     return p;
 }
@@ -2770,12 +2770,16 @@ static int gpu_same_light(const ssdgs_frame *frame, int view, int other) {
 static void gpu_gather_light_view(gpu *g, const ssdgs_frame *frame, int view, const gpu_view *from) {
     const size_t n = (size_t)frame->count, all = n * (size_t)frame->light_count * sizeof(float);
     const struct {
-        uint32_t count, light, first, last, flux;
-    } p = {(uint32_t)n, (uint32_t)frame->views[view].light, !gpu_same_light(frame, view, view - 1),
-           !gpu_same_light(frame, view, view + 1), frame->flux != NULL};
+        uint32_t count, light, first, last, cue, flux;
+    } p = {(uint32_t)n,
+           (uint32_t)frame->views[view].light,
+           !gpu_same_light(frame, view, view - 1),
+           !gpu_same_light(frame, view, view + 1),
+           frame->depth_cue != NULL,
+           frame->flux != NULL};
     gpu_reserve(g, &g->scratch.sums, n * 4 * sizeof(float));
     gpu_reserve(g, &g->frame.visibility, all);
-    gpu_reserve(g, &g->frame.depth_cue, all);
+    gpu_reserve(g, &g->frame.depth_cue, frame->depth_cue ? all : 4);
     gpu_reserve(g, &g->frame.flux, frame->flux ? all : 4);
     gpu_use(g, GPU_GATHER_LIGHT, &p, sizeof p);
     gpu_bind(g, 0, &from->of_gaussian);
@@ -2901,7 +2905,7 @@ static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
     gpu_frame *f = &g->frame;
     gpu_reserve(g, &f->facts, (size_t)frame->view_count * sizeof(gpu_fact));
     gpu_reserve(g, &f->visibility, n * lights * sizeof(float));
-    gpu_reserve(g, &f->depth_cue, n * lights * sizeof(float));
+    gpu_reserve(g, &f->depth_cue, frame->depth_cue ? n * lights * sizeof(float) : 0);
     gpu_reserve(g, &f->flux, frame->flux ? n * lights * sizeof(float) : 0);
     gpu_upload_model(g, frame->objects);
     gpu_upload_lamps(g, frame);

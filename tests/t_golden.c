@@ -678,7 +678,7 @@ static void test_full(const char *name, int defaults) {
     size_t i;
     for (i = 0; i < n; i++) { /* given and fixed; every Gaussian is compared, so every one is shaded */
         frame.visibility[i] = (ssdgs_real)gold(&file, "visibility", NULL)[i];
-        frame.depth_cue[i] = (ssdgs_real)gold(&file, "depth_cue", NULL)[i];
+        if (frame.depth_cue) frame.depth_cue[i] = (ssdgs_real)gold(&file, "depth_cue", NULL)[i];
         frame.seen[i] = 1;
     }
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));

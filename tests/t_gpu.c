@@ -43,7 +43,10 @@ static void upload_seen(const uint32_t *seen, size_t n) {
 static void upload_walk(const ssdgs_frame *frame) {
     const size_t n = (size_t)frame->count, all = n * (size_t)frame->light_count * sizeof(float);
     for (size_t i = 0; i < n * (size_t)frame->light_count; i++) /* of lights without maps nothing is known */
-        if (!ssdgs__casts(frame->lights + i / n)) frame->visibility[i] = frame->depth_cue[i] = NAN;
+        if (!ssdgs__casts(frame->lights + i / n)) {
+            frame->visibility[i] = NAN;
+            if (frame->depth_cue) frame->depth_cue[i] = NAN;
+        }
     const ssdgs_model_view *v = &frame->objects->gaussians;
     gpu_frame *f = &device->frame;
     uint32_t *seen = (uint32_t *)malloc(n * sizeof *seen);
@@ -53,7 +56,7 @@ static void upload_walk(const ssdgs_frame *frame) {
     gpu_upload_networks(device, frame->objects);
     gpu_upload_exposures(device, frame->objects);
     gpu_upload(device, &f->visibility, frame->visibility, all);
-    gpu_upload(device, &f->depth_cue, frame->depth_cue, all);
+    if (frame->depth_cue) gpu_upload(device, &f->depth_cue, frame->depth_cue, all);
     if (frame->flux) gpu_upload(device, &f->flux, frame->flux, all);
     gpu_upload(device, &f->camera.depth, frame->views[0].depth, n * sizeof(float));
     gpu_upload_lamps(device, frame);
@@ -445,6 +448,7 @@ static void begin_shooting(shooting *s, int which, int count) {
     settings.scattering.width = settings.shadow.width = 16;
     settings.light_map.size = 96;
     settings.light_map.bias = (ssdgs_real)0.05;
+    settings.depth_cue = which > 0; /* what lies in the dark alone is not sampled where there is none */
     s->model = cloud(&settings, 1000 * which, count, which == 2 ? 2 : 1);
     s->camera = camera_from(3, which, 1);
     s->camera.near_plane = (ssdgs_real)0.05;
@@ -827,7 +831,6 @@ static void walk_light(int which, int count) {
     if (!flux) exit(1);
     s.frame.flux = flux;
     s.frame.maps = 1;
-    s.frame.cue = which > 0; /* what lies in the dark alone is not sampled where there is none */
     CHECK(!ssdgs_stage_cpu(&s.frame, SSDGS_STAGE_WALK));
     for (int view = 1; view < s.frame.view_count; view++) {
         const ssdgs_splat_view *v = s.frame.views + view;
@@ -852,23 +855,25 @@ static void walk_light(int which, int count) {
     CHECK(falls > 1000);
     const size_t all = n * (size_t)s.light_count;
     float *visibility = (float *)downloaded(&device->frame.visibility, all * sizeof *visibility);
-    float *cue = (float *)downloaded(&device->frame.depth_cue, all * sizeof *cue);
     float *fluxes = (float *)downloaded(&device->frame.flux, all * sizeof *fluxes);
     size_t empty = 0; /* footprints, in the dark: nothing is in their way, but the CPU does not look there */
     for (size_t i = 0; i < all; i++)
         if (stop > 0 && s.frame.visibility[i] <= 0 && visibility[i] >= 1) visibility[i] = 0, empty++;
     CHECK(empty <= 1 + all / 1000);
     CHECK_NEAR(visibility, s.frame.visibility, all, 1e-5 + 2 * stop, 0, "visibility");
-    for (size_t i = 0; i < all; i++)
-        if (stop > 0 && s.frame.depth_cue[i] <= 0) cue[i] = 0;
-    if (s.frame.cue) CHECK_NEAR(cue, s.frame.depth_cue, all, 1e-5 + 5 * stop, 1e-5, "depth cue");
+    if (s.frame.depth_cue) {
+        float *cue = (float *)downloaded(&device->frame.depth_cue, all * sizeof *cue);
+        for (size_t i = 0; i < all; i++)
+            if (stop > 0 && s.frame.depth_cue[i] <= 0) cue[i] = 0;
+        CHECK_NEAR(cue, s.frame.depth_cue, all, 1e-5 + 5 * stop, 1e-5, "depth cue");
+        free(cue);
+    }
     double most = 0, mean = 0;
     for (size_t i = 0; i < all; i++)
         most = fmax(most, (double)flux[i]), mean += (double)visibility[i] / (double)all;
     CHECK_NEAR(fluxes, flux, all, (1e-6 + stop) * most, 1e-5, "flux");
     CHECK(mean > 0.02 && mean < 0.9);
     free(visibility);
-    free(cue);
     free(fluxes);
     free(flux);
     end_shooting(&s, "walk: light");

@@ -76,7 +76,7 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
     if (fixed) { /* the Gaussians' visibility, depth cue, flux and the lights' maps are held fixed */
         if (frame->flux) memcpy(frame->flux, fixed->flux, n * sizeof(ssdgs_real));
         memcpy(frame->visibility, fixed->visibility, n * sizeof(ssdgs_real));
-        memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
+        if (frame->depth_cue) memcpy(frame->depth_cue, fixed->depth_cue, n * sizeof(ssdgs_real));
         for (int i = 1; i < frame->view_count; i++) frame->views[i] = fixed->views[i];
     }
     frame->visibility_given = s->given;
@@ -168,7 +168,7 @@ static void run(const scene *s) {
     memcpy(gradient, frame.gradient, stride * SSDGS_CHANNELS * sizeof *gradient);
     memcpy(global_gradient, frame.global_gradient, model->global_count * sizeof *gradient);
     memcpy(visibility, frame.visibility, COUNT * (size_t)s->light_count * sizeof *visibility);
-    memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
+    if (frame.depth_cue) memcpy(cue, frame.depth_cue, COUNT * (size_t)s->light_count * sizeof *cue);
     if (frame.flux) memcpy(flux, frame.flux, COUNT * (size_t)s->light_count * sizeof *flux);
     ssdgs_frame fixed = frame;
     fixed.flux = flux;

@@ -70,7 +70,7 @@ static void find_arrays(device *d, ssdgs_frame *f, int stage) {
     if (stage >= SSDGS_STAGE_WALK || f->views->cached) ADD(f->seen, n, 1);
     if (stage >= SSDGS_STAGE_WALK && f->view_count > 1) {
         ADD(f->visibility, n * lights, 0);
-        if (f->cue) ADD(f->depth_cue, n * lights, 0);
+        ADD(f->depth_cue, n * lights, 0);
         ADD(f->flux, n * lights, 0);
     }
     if (stage >= SSDGS_STAGE_SHADE) {
