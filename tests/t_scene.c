@@ -359,6 +359,30 @@ static void test_materials(void) {
     }
 }
 
+/* What one object asks for, a depth cue, transport, deferred highlights, does not depend on what the last one
+   asks for. */
+static void test_order(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    ssdgs_settings modest = ssdgs_settings_published(), s = modest;
+    modest.scattering.width = modest.shadow.width = 16;
+    for (int kind = 0; kind < 3; kind++) {
+        s = modest;
+        if (kind == 0) s.depth_cue = 1;
+        if (kind == 1) s.transport = 1;
+        if (kind == 2) s.asg = SSDGS_ASG_DEFERRED;
+        ssdgs_model *model[2];
+        ssdgs_object object[3];
+        model[0] = cloud(&s, 0, 100, 0.3), model[1] = cloud(&modest, 500, 100, 0.3);
+        for (int i = 0; i < 3; i++) object[i] = ssdgs_object_default(model[i % 2]);
+        object[1].to_world[3] = (ssdgs_real)0.3;
+        together(object, 2, &camera, &light, 1, NULL, shot);
+        together(object + 1, 2, &camera, &light, 1, NULL, shot + 1);
+        CHECK_L2(shot[1].value, shot[0].value, 3 * PIXELS, real64 ? 1e-12 : 1e-5, "the other order");
+        ssdgs_model_destroy(model[0]), ssdgs_model_destroy(model[1]);
+    }
+}
+
 /* A plate between the light and a ball of another model takes the ball's light. */
 static void test_shadows(void) {
     const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
@@ -1582,6 +1606,7 @@ int main(void) {
     test_skipped();
     test_merged();
     test_materials();
+    test_order();
     test_shadows();
     test_baked();
     test_scene_depth();
