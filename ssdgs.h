@@ -2507,7 +2507,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.asg = SSDGS_ASG_DEFERRED;
     s.per_channel_optics = s.transport = s.residual_shadow = 1;
     s.scattering.layers = 3;
-    s.scattering.width = 64;
+    s.scattering.width = 128;
     s.octaves.light = 1;
     s.shadow.layers = 4;
     s.shadow.width = 32;

@@ -205,8 +205,7 @@ changes() {
     row 'no light bias' '' no_bias --set light_bias=0
     row 'no transport' '' no_transport --set transport=0
     row 'camera pass adds 0.3 px^2' '' variance --set pixel_variance=0.3
-    row 'scattering network 32 wide' '' narrow --set scattering_width=32
-    row 'scattering network 128 wide' '' wide --set scattering_width=128
+    row 'scattering network 64 wide' '' narrow --set scattering_width=64
 }
 
 # part FUNCTION TITLE: a section; where PARTS does not name it, the one that tests/EXPERIMENTS.md has.

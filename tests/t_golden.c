@@ -341,6 +341,7 @@ static void test_network(const char *name, int shadow, int residual, int default
     settings.octaves.view = settings.octaves.light = 4;
     settings.transport = 0;
     settings.depth_cue = defaults;
+    if (defaults) settings.scattering.width = 64; /* the golden network's */
     settings.residual_shadow = residual;
     settings.shadow.width = 32;
     settings.shadow.layers = 4;
@@ -644,6 +645,7 @@ static void test_full(const char *name, int defaults) {
     settings.pixel_variance = (ssdgs_real)0.3;
     settings.depth_cue = defaults;
     settings.octaves.view = settings.octaves.light = 4;
+    if (defaults) settings.scattering.width = 64; /* the golden network's */
     if (defaults) settings.length_unit = (ssdgs_real)gold(&file, "length_unit", NULL)[0];
     ssdgs_model *model = gold_geometry(&settings);
     ssdgs_model_view view = ssdgs_model_arrays(model);
