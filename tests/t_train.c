@@ -2502,7 +2502,7 @@ static void test_two(void) {
     }
     for (size_t i = 0; i < 5; i++) {
         const int name = (int)p[SSDGS_DIFFUSE * stride + i];
-        const int old = name == STAYS || (name == SMALL && !found[SMALL]);
+        const ssdgs_real old = name == STAYS || (name == SMALL && !found[SMALL]) ? 1 : 0;
         double along[3] = {0, 0, 0};
         for (size_t c = 0; c < SSDGS_CHANNELS; c++)
             CHECK(trainer->mean[c * stride + i] == old && trainer->square[c * stride + i] == old);
