@@ -1051,7 +1051,7 @@ typedef struct ssdgs_frame {
     size_t light_instances; /* of all lights' views that were walked */
     unsigned char *seen;    /* (n) SSDGS_SEEN, SSDGS_SKIPPED or 0 */
     ssdgs_real *visibility; /* (lights, n) eq. 7; of a light without views neither this nor the next two */
-    /* NULL, so not computed, unless settings ask or the caller of the stages points them at memory: */
+    /* These two are NULL, and not computed, unless settings ask or the stages' caller sets them. */
     ssdgs_real *depth_cue; /* (lights, n) world units */
     ssdgs_real *flux;      /* (lights, n) intercepted, sr per unit intensity, directional: area */
     /* SSDGS_STAGE_SHADE */
@@ -10281,8 +10281,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
-/* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by
-   steps. */
+/* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by steps. */
 
 #define SSDGS__STATISTICS 3
 #define SSDGS__MAX_BATCH 256
@@ -10380,6 +10379,15 @@ static void ssdgs__forget(ssdgs_trainer *trainer, size_t at) {
         trainer->mean[c * trainer->stride + at] = trainer->square[c * trainer->stride + at] = 0;
 }
 
+/* The log scale of its longest axis. */
+static ssdgs_real ssdgs__longest(const ssdgs_trainer *trainer, size_t at) {
+    const ssdgs_real *scale = trainer->model->gaussians + SSDGS_LOG_SCALE * trainer->stride + at;
+    ssdgs_real longest = *scale;
+    for (size_t c = 1; c < 3; c++)
+        longest = scale[c * trainer->stride] > longest ? scale[c * trainer->stride] : longest;
+    return longest;
+}
+
 /* Makes two Gaussians of `from`, the second at `to`: clones if it is small; two samples of it, smaller, if it
    is large. */
 static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to) {
@@ -10389,12 +10397,8 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to) {
     ssdgs_real *p = trainer->model->gaussians;
     ssdgs__copy_gaussian(p, stride, to, from);
     ssdgs__forget(trainer, to);
-    ssdgs_real longest = p[(size_t)SSDGS_LOG_SCALE * stride + from];
-    for (size_t c = 1; c < 3; c++) {
-        const ssdgs_real scale = p[(SSDGS_LOG_SCALE + c) * stride + from];
-        longest = scale > longest ? scale : longest;
-    }
-    if ((double)longest <= log(SSDGS__SPLIT_SIZE * trainer->extent)) return; /* the copy is the clone */
+    if ((double)ssdgs__longest(trainer, from) <= log(SSDGS__SPLIT_SIZE * trainer->extent))
+        return; /* the copy is the clone */
     ssdgs_real raw[4];
     for (int c = 0; c < 4; c++) raw[c] = p[(size_t)(SSDGS_ROTATION + c) * stride + from];
     ssdgs_real q[4], r[9];
@@ -10498,8 +10502,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count;
-    const double largest_size =
-        0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent : 2 * trainer->start_size;
+    const double largest = log(0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent
+                                                                               : 2 * trainer->start_size);
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: weights say little */
     const int before = trainer->iteration - o->batch, last = ssdgs__last_reset(o, before);
@@ -10519,13 +10523,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         return result;
     }
     for (size_t i = 0; i < n; i++) {
-        ssdgs_real size = p[SSDGS_LOG_SCALE * trainer->stride + i];
-        for (int c = 1; c < 3; c++) {
-            const ssdgs_real s = p[(size_t)(SSDGS_LOG_SCALE + c) * trainer->stride + i];
-            size = s > size ? s : size;
-        }
-        drop[i] =
-            drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint || (double)size > log(largest_size);
+        drop[i] = drop[i] || p[SSDGS_OPACITY * trainer->stride + i] < faint ||
+                  (double)ssdgs__longest(trainer, i) > largest;
         dropped += drop[i];
         if (drop[i] || !(trainer->screen_count[i] > 0)) continue;
         const ssdgs_real gradient = trainer->screen_gradient[i] / trainer->screen_count[i];
