@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.1 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.2 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -167,6 +167,8 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
+  0.2.2  The scattering network is 128 wide, not 64: metal and plastic train better. The trainer's options
+         densify_shadow and prune_weight are gone; they had come to be worth nothing.
   0.2.1  A highlight's colour is its energy, however narrow its lobe: glossy scenes train a little better.
   0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
          For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.
@@ -192,7 +194,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 201 /* 0.2.1; written into files */
+#define SSDGS_VERSION 202 /* 0.2.2; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)

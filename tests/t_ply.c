@@ -633,7 +633,8 @@ static void test_versions(void) {
     static const struct {
         unsigned char version;
         int loads, heights;
-    } cases[5] = {{0, 0, 0}, {100, 1, 1}, {200, 1, 1}, {SSDGS_VERSION, 1, 0}, {SSDGS_VERSION + 1, 0, 0}};
+    } cases[6] = {{0, 0, 0},   {100, 1, 1},           {200, 1, 1},
+                  {201, 1, 0}, {SSDGS_VERSION, 1, 0}, {SSDGS_VERSION + 1, 0, 0}};
     ssdgs_model *model = make_model(3);
     bytes file = saved(model);
     const document d = parse(&file);
@@ -649,7 +650,7 @@ static void test_versions(void) {
                     setting[i] = file.data + (d.table[t].data - file.data) + 4 * c;
     cut.tables = 1;
     bytes edited = emit(&cut, &v);
-    for (int i = 0; i < 5 && CHECK(setting[0] && setting[1]); i++) {
+    for (int i = 0; i < 6 && CHECK(setting[0] && setting[1]); i++) {
         ssdgs_model *back = NULL, *bare = NULL;
         *setting[0] = cases[i].version;
         if (!cases[i].loads) {
