@@ -665,12 +665,13 @@ typedef struct ssdgs_rate {
     ssdgs_real start, end;
 } ssdgs_rate;
 typedef struct ssdgs_rates {
-    ssdgs_rate position; /* of 1.1 x the cameras' radius */
+    ssdgs_rate position; /* of 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
     ssdgs_rate opacity, scale, rotation, color;
     ssdgs_rate asg, frame;                   /* start up to iteration 40,000*, end at 90,000* */
     ssdgs_rate material, shadow, scattering; /* start up to 50,000*, end at 100,000* */
-    ssdgs_rate camera, light; /* of the bounds' longest side, directions in radians; end at 60,000*. Times
-                                 sqrt(300 / shows) where a photograph has fewer than 300 shows */
+    ssdgs_rate camera, light; /* of the bounds' longest side; turns of a camera of its angle of view,
+                                 directions in radians. They rise until 20,000* and 30,000*, end at 60,000*.
+                                 Times sqrt(300 / shows) where a photograph has fewer than 300 shows */
 } ssdgs_rates;
 
 /* Processes that share each batch. All hold the same photographs and options; each draws its part, and the
@@ -678,7 +679,8 @@ typedef struct ssdgs_rates {
    in pairs, keeps the bits (examples/train_mpi.c). */
 typedef struct ssdgs_sum {
     /* Makes of `count` values their sums over all processes, the same everywhere. Any result but SSDGS_OK
-       ends the step, which changes nothing. */
+       ends the step, which changes nothing. A process whose step returns ERR_MEMORY must end all: it may not
+       have called this, or has other Gaussians than the rest. */
     ssdgs_result (*add)(void *user, ssdgs_real *values, size_t count);
     void *user;
     int rank, processes; /* this one, 0 and up, of so many, of which `batch` is a multiple */
@@ -691,8 +693,9 @@ typedef struct ssdgs_train_options {
     int iterations;        /* 20000: photographs drawn */
     uint64_t seed;         /* 1 */
     int schedule;          /* ssdgs_schedule: in which order the terms join; merged */
-    int random_background; /* 1: photographs with transparency are laid over a new colour each step; 0: over
-                              background; 1 */
+    int random_background; /* 1: photographs with transparency are laid over a new colour each step, but where
+                              `background` is taken for empty only those with an outline; 0: over background;
+                              1 */
     int initial_points;    /* random Gaussians in the bounds when the model is empty, no more than density
                               control makes; 10000 */
     int max_gaussians;     /* density control stops here; 0: at three quarters of the pixels that a photograph
@@ -711,7 +714,7 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
     ssdgs_real prune_outside;    /* share of photographs that must show background at its centre before one is
-                                     removed, see OUTLINES in the manual; 0.02 */
+                                     removed, as is one that none shows, see OUTLINES in the manual; 0.02 */
     ssdgs_real adam_epsilon;     /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
     ssdgs_real finish; /* factor of the model's rates in the last tenth of the iterations; 0.3; 1 = none */
     ssdgs_rates rates;
@@ -737,13 +740,13 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 /* Trains model on photos; the photo structs are copied. A model of 0 Gaussians starts from random points and
    gets light_scale, centre, length_unit and new networks; one that has Gaussians goes on (with
    SSDGS_SCHEDULE_JOINT with all terms). options NULL = default. Once something else has moved the model's
-   Gaussians (ssdgs_model_sort(), another trainer) all calls below fail. */
+   Gaussians (ssdgs_model_sort(), another trainer) it neither steps, saves nor loads. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer); /* NULL is fine */
-/* A step: `batch` iterations. ERR_NONFINITE: its photographs are passed over. ERR_MEMORY: nothing has
-   changed, or, as stats->iteration says, density control alone is left out. ERR_CANCELLED: another process
-   failed. */
+/* A step: `batch` iterations. ERR_NONFINITE: its photographs are passed over, or, where stats->iteration
+   stays, the model's networks are not finite. ERR_MEMORY: nothing has changed or, where stats->iteration
+   moves, density control alone is left out. ERR_CANCELLED: another process failed. */
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats);
 /* Steps until `iterations` are done, and calls progress (may be NULL) after each. Ten refused steps in a row
    end it. */
@@ -9552,7 +9555,7 @@ struct ssdgs_trainer {
     int exposed;          /* 1: it is up to date */
     double ambient[6];    /* Adam's moments of settings.ambient: means, then squares */
     int ambient_steps;    /* and its clock */
-    double extent;        /* 1.1 x the cameras' radius */
+    double extent;        /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
     int budget;           /* density control makes no more Gaussians */
     int outlines;         /* photographs show where the object ends */
     int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
@@ -9659,7 +9662,8 @@ static int ssdgs__phase(const ssdgs_train_options *o, int asg, double t, int lea
     return terms;
 }
 
-/* The last multiple of opacity_reset_every up to an iteration if opacities are reset after it, or 0. */
+/* The last multiple of opacity_reset_every up to an iteration, or 0 if density control has ended half a
+   period after it: then opacities are not reset any more. */
 static int ssdgs__last_reset(const ssdgs_train_options *o, int iteration) {
     const int every = o->opacity_reset_every, last = every ? iteration - iteration % every : 0;
     return ssdgs__schedule_time(o, last + every / 2) <= o->densify_until ? last : 0;
@@ -10002,7 +10006,8 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
         across += d * d;
         along += d * ((double)job.target[i] - (double)job.image[i]);
     }
-    frame->intensity[0] = across > 0 ? along / across : 0;
+    const double step = across > 0 ? along / across : 0; /* without bounds where a photograph is black */
+    frame->intensity[0] = step < -1 ? -1 : step > 1 ? 1 : step;
     frame->intensity[1] = across;
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
     result = ssdgs__loss(context, &frame->scratch->loss, &images, shot->dssim, frame->pixel_gradient, values);
@@ -10213,8 +10218,7 @@ static double ssdgs__light_at(const ssdgs_light *light, const double place[3], d
 
 /* Goes only a part of the way to the intensity that fits best: what does not fit yet may be the model. */
 static void ssdgs__intensity_step(ssdgs__correction *c, const double *moves) {
-    const double step = moves[9] < -1 ? -1 : moves[9] > 1 ? 1 : moves[9];
-    c->value[9] += SSDGS__INTENSITY_STEP * step;
+    c->value[9] += SSDGS__INTENSITY_STEP * moves[9];
     c->sure = moves[10];
 }
 
@@ -10227,7 +10231,7 @@ static void ssdgs__anchor_intensities(ssdgs_trainer *trainer) {
         weight += trainer->corrections[i].sure;
     }
     for (int i = 0; i < trainer->photo_count && weight > 0; i++)
-        trainer->corrections[i].value[9] -= sum / weight;
+        if (!trainer->photos[i].more_count) trainer->corrections[i].value[9] -= sum / weight;
 }
 
 /* The bounds' longest side. */
@@ -10446,12 +10450,7 @@ static int ssdgs__outline_side(const ssdgs_photo *photo, const ssdgs_camera *cam
     const ssdgs_real v = camera->fy * t[1] / t[2] + camera->cy;
     if (!(u >= 0 && v >= 0 && u < (ssdgs_real)camera->width && v < (ssdgs_real)camera->height)) return 0;
     for (int i = 0; i < 5 && transparent; i++) { /* the centre and beside it */
-        const int px = (int)u + (i == 1   ? reach
-                                 : i == 2 ? -reach
-                                          : 0),
-                  py = (int)v + (i == 3   ? reach
-                                 : i == 4 ? -reach
-                                          : 0);
+        const int px = (int)u + reach * ((i == 1) - (i == 2)), py = (int)v + reach * ((i == 3) - (i == 4));
         if (px < 0 || py < 0 || px >= camera->width || py >= camera->height) continue;
         if (ssdgs__photo_alpha(photo, (size_t)py * (size_t)camera->width + (size_t)px)) return 1;
     }
@@ -10907,7 +10906,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     SSDGS__RANGE(refine, 0,
                  SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT);
     SSDGS__RANGE(dssim, 0, 1);
-    SSDGS__RANGE(normal_weight, 0, most);
+    SSDGS__RANGE(normal_weight, 0, 1000000);
     SSDGS__RANGE(densify_gradient, 0, most);
     SSDGS__RANGE(prune_outside, 0, 1);
     SSDGS__RANGE(adam_epsilon, 0, most);
@@ -11082,7 +11081,6 @@ static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
     ssdgs__release(context, trainer->mean);
     ssdgs__release(context, trainer->square);
     ssdgs__release(context, trainer->global_mean);
-    ssdgs__release(context, trainer->global_square);
     ssdgs__release(context, trainer->screen_gradient);
     ssdgs__release(context, trainer);
     ssdgs__context_drop(context);
@@ -11115,7 +11113,11 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     context->subject_number = index;
     ssdgs_result result = ssdgs__camera_check(context, &photo->camera, 0);
     if (!result) result = ssdgs__lights_check(context, &photo->light, 1);
-    if (!result) result = ssdgs__lights_check(context, photo->more, photo->more_count);
+    if (!result) {
+        context->subject = "the other lights of photograph";
+        result = ssdgs__lights_check(context, photo->more, photo->more_count);
+        context->subject = "photograph";
+    }
     for (int i = 0; !result && i <= photo->more_count; i++)
         if (ssdgs__photo_light(photo, i)->unshadowed)
             result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
@@ -11223,14 +11225,14 @@ static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within)
     double cross[3];
     ssdgs__cross(a + 3, a + 6, cross);
     const double determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
-    for (int j = 0; j < 3 && determinant > 1e-6; j++) { /* Cramer's rule on a symmetric matrix */
-        double m[9];
-        memcpy(m, a, sizeof m);
-        memcpy(m + 3 * j, b, sizeof b);
-        ssdgs__cross(m + 3, m + 6, cross);
-        x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
-    }
-    if (determinant > 1e-6) { /* else they are parallel */
+    if (determinant > 1e-6) {         /* else they are parallel */
+        for (int j = 0; j < 3; j++) { /* Cramer's rule on a symmetric matrix */
+            double m[9];
+            memcpy(m, a, sizeof m);
+            memcpy(m + 3 * j, b, sizeof b);
+            ssdgs__cross(m + 3, m + 6, cross);
+            x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
+        }
         for (int i = 0; i < trainer->photo_count; i++) {
             const ssdgs_camera *camera = &trainer->photos[i].camera;
             const ssdgs__silhouette *s = silhouettes + i;
@@ -11307,9 +11309,9 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const doubl
             ssdgs_real stored[3];
             ssdgs__photo_pixel(photo, transfer, black, pixel, stored);
             for (int c = 0; c < 3; c++) {
+                const double d = fabs((double)(stored[c] - corner[c]));
                 value += (double)stored[c] * (double)stored[c]; /* about linear */
-                apart = fabs((double)(stored[c] - corner[c])) > apart ? fabs((double)(stored[c] - corner[c]))
-                                                                      : apart;
+                apart = d > apart ? d : apart;
             }
             if (apart < 0.02) value = 0;
             area += alpha;
@@ -11600,9 +11602,10 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
         if (trainer->transparent[i] == 2) continue;
         for (int y = 0; y < h; y++)
             for (int x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
+                const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
                 ssdgs_real value[3], apart = 0;
-                ssdgs__photo_pixel(photo, trainer->model->settings.transfer, background,
-                                   (size_t)y * (size_t)w + (size_t)x, value);
+                if (!ssdgs__photo_alpha(photo, pixel)) continue; /* shows nothing */
+                ssdgs__photo_pixel(photo, trainer->model->settings.transfer, background, pixel, value);
                 for (int c = 0; c < 3; c++) {
                     const ssdgs_real d =
                         value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
@@ -11667,11 +11670,12 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
     trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
     trainer->magnify = (ssdgs_real *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->magnify);
-    trainer->global_mean = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
-    trainer->global_square = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
+    trainer->global_mean =
+        (ssdgs_real *)ssdgs__allocate(context, 2 * model->global_count * sizeof(ssdgs_real));
     if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent ||
-        !trainer->magnify || !trainer->global_mean || !trainer->global_square)
+        !trainer->magnify || !trainer->global_mean)
         return SSDGS_ERR_MEMORY;
+    trainer->global_square = trainer->global_mean + model->global_count;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
     trainer->photo_count = photo_count;
     for (int i = 0; i < photo_count; i++) {
@@ -11843,9 +11847,10 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                       ssdgs__drawn *drawn) {
     const ssdgs_train_options *o = &trainer->options;
     const double *correction = trainer->corrections[photo].value;
+    const int shown = trainer->transparent[photo]; /* a few soft pixels do not hide a backdrop */
     ssdgs_real background[3];
     for (int j = 0; j < 3; j++)
-        background[j] = o->random_background && (trainer->transparent[photo] || trainer->filled)
+        background[j] = o->random_background && (trainer->backdrop ? shown == 2 : shown || trainer->filled)
                             ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
                                                          3 * (uint64_t)iteration + (uint64_t)j)
                             : o->background[j];
@@ -11912,7 +11917,8 @@ static ssdgs_result ssdgs__expose_step(ssdgs_trainer *trainer) {
 /* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits are
    those of one process where each draws a power of two. Leaves the mean gradients in the frame, all
    photographs' in moves (batch, SSDGS__MOVES) and their statistics' sums, (SSDGS__STATISTICS, stride), where
-   *statistics says. A process whose photograph fails takes part in the sum, so that the others hear of it. */
+   *statistics says. A process whose photograph fails, but not one without memory for the sums, takes part in
+   the sum, so that the others hear of it. */
 static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
                                       ssdgs_frame *frame, double *moves, const ssdgs_real **statistics,
                                       ssdgs__drawn *drawn) {
@@ -12064,11 +12070,8 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
         if (ssdgs__last_reset(o, after) > before) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
-        stats->iteration = trainer->iteration;
-        stats->gaussians = trainer->model->count;
         stats->shaded = (int)(drawn.shaded + 0.5);
         stats->terms = step.terms;
-        stats->skipped_steps = trainer->skipped;
         stats->loss = drawn.loss;
         stats->psnr = drawn.psnr;
     }
@@ -12078,8 +12081,15 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
-    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_step(trainer, stats));
+    ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
+    if (result) return result;
+    result = ssdgs__trainer_step(trainer, stats);
+    if (stats) {
+        stats->iteration = trainer->iteration;
+        stats->gaussians = trainer->model->count;
+        stats->skipped_steps = trainer->skipped;
+    }
+    return ssdgs__leave(trainer->context, result);
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
@@ -12090,10 +12100,11 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
     while (trainer->iteration < trainer->options.iterations) {
+        const int before = trainer->iteration;
         ssdgs_train_stats stats;
         result = ssdgs_trainer_step(trainer, &stats);
         bad = result ? bad + 1 : 0;
-        if ((result && result != SSDGS_ERR_NONFINITE) || bad == 10) break;
+        if (bad == 10 || (result && (result != SSDGS_ERR_NONFINITE || trainer->iteration == before))) break;
         result = SSDGS_OK;
         if (!progress || progress(user, &stats)) continue;
         result = ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d",
@@ -12222,7 +12233,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
-        if (photo->more_count) continue;
+        if (photo->more_count || model->settings.baked) continue;
         ssdgs__correction_step(&correction, gradient, 1, rate, ssdgs__light_unit(&light, unit), angle);
         ssdgs__intensity_step(&correction, gradient);
     }
@@ -12261,7 +12272,7 @@ typedef struct ssdgs__checkpoint_head {
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
     double start_size, ambient[6];
-    int32_t ambient_steps, exposed;
+    int32_t ambient_steps, exposed, outlines;
     ssdgs_settings settings;
 } ssdgs__checkpoint_head;
 
@@ -12337,6 +12348,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     memcpy(head->ambient, trainer->ambient, sizeof head->ambient);
     head->ambient_steps = trainer->ambient_steps;
     head->exposed = trainer->exposed;
+    head->outlines = trainer->outlines;
     head->settings = trainer->model->settings;
 }
 
@@ -12413,7 +12425,7 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
             if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
                 !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0)
                 return 0;
-        if (!ssdgs__finite((ssdgs_real)c.value[9]) || !(c.sure >= 0)) return 0;
+        if (!ssdgs__finite((ssdgs_real)c.value[9]) || !(c.sure >= 0 && c.sure < 1e300)) return 0;
         for (int j = 0; j < 2; j++)
             if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
     }
@@ -12447,7 +12459,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         if (!ssdgs__finite((ssdgs_real)head.ambient[i]) || (i > 2 && head.ambient[i] < 0))
             reason = "its values are out of range";
     if (!reason && (head.ambient_steps < 0 || head.ambient_steps > head.iteration || head.exposed < 0 ||
-                    head.exposed > 1))
+                    head.exposed > 1 || head.outlines < 0 || head.outlines > 1))
         reason = "its counts are out of range";
     if (!reason) {
         const size_t expected =
@@ -12486,6 +12498,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         ssdgs__model_changed(trainer->model);
         ssdgs__rearranged(trainer);
         trainer->exposed = head.exposed;
+        trainer->outlines = head.outlines;
     }
     ssdgs__release(context, bytes);
     return result;

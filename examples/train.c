@@ -284,7 +284,8 @@ static void show(run *r, const ssdgs_train_stats *stats) {
     r->view->show.training.iteration = stats->iteration;
     r->view->show.training.loss = stats->loss;
     r->view->show.training.psnr = r->psnr;
-    r->view->show.training.left = r->speed > 0 ? (r->iterations - stats->iteration) / r->speed : 0;
+    r->view->show.training.left =
+        r->speed > 0 && stats->iteration < r->iterations ? (r->iterations - stats->iteration) / r->speed : 0;
     for (int rounds = 0; rounds < 16 && view_poll(r->view, 0); rounds++) {}
     const double begun = olat_seconds();
     while (r->view->show.training.paused && !interrupted) view_poll(r->view, 100);
@@ -293,7 +294,8 @@ static void show(run *r, const ssdgs_train_stats *stats) {
 
 static int progress(void *user, const ssdgs_train_stats *stats) {
     run *r = (run *)user;
-    int done = stats->iteration, total = r->iterations;
+    const int total = r->iterations;
+    const int done = stats->iteration < total ? stats->iteration : total; /* the last batch may go past it */
     int percent = (int)(100.0 * done / total), finished = done >= total;
     double now = olat_seconds();
     r->done = done;
@@ -374,6 +376,8 @@ static int parse(job *j, int argc, char **argv) {
 
     if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
     j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
+    ssdgs_settings unchanged;
+    memcpy(&unchanged, &j->settings, sizeof unchanged);
     j->options = preset ? ssdgs_train_options_published() : ssdgs_train_options_default();
     if (given[REFIT]) { /* nothing but fine steps */
         j->options.iterations = 1000;
@@ -425,6 +429,9 @@ static int parse(job *j, int argc, char **argv) {
     for (int i = 0; i < sets; i++)
         if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL)
             return usage(problem, argv[i]);
+    if (given[REFIT] && memcmp(&unchanged, &j->settings, sizeof unchanged))
+        return usage("--refit keeps what the model computes: not for it are --transfer, --terms, settings of",
+                     "--set");
     j->desc.isa = (ssdgs_isa)isa;
     j->desc.logger.write = hear;
     return 0;

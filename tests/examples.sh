@@ -11,6 +11,7 @@ says() { # says CODE TEXT COMMAND...: ends with that code and says that
     "$@" >"$out/log" 2>&1
     [ $? -eq "$code" ] && grep -q -- "$text" "$out/log"
 }
+lacks() { ! grep -q -- "$1" "$out/log"; }
 hash_of() { find "$@" -type f -exec cksum {} + | sort; }
 differs() { ! cmp -s "$1" "$2"; }
 unchanged() { [ "$(hash_of "$set")" = "$before" ]; }
@@ -96,9 +97,13 @@ check "--set batch=3" says 0 "iterations left" "$build/train" "$set" -o "$out/ba
 check "a checkpoint after the hundredth" grep -q SSDGSCK "$out/batch.ply.ckpt"
 check "which goes on" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/batch.ply" --iterations 180 --points 200 --threads 1 --set batch=3 --resume
 
+check "a last batch that goes past the end" says 0 "60/60" "$build/train" "$set" -o "$out/batch.ply" --iterations 60 --points 200 --threads 1 --set batch=8
+check "is not told of" lacks "64/60"
+
 # fewer Gaussians, trained on
 check "--refit" says 0 "refit.ply: 50 Gaussians" "$build/train" "$set" -o "$out/refit.ply" --refit "$model" --max-gaussians 50 --iterations 60 --threads 1
 check "--refit of itself" says 1 "would replace an input" "$build/train" "$set" -o "$out/refit.ply" --refit "$out/refit.ply"
+check "--refit keeps the settings" says 2 "keeps what the model computes" "$build/train" "$set" -o "$out/refit2.ply" --refit "$model" --set eta=2
 check "--refit of nothing" says 1 "nowhere.ply" "$build/train" "$set" -o "$out/refit.ply" --refit "$out/nowhere.ply"
 refitted=$("$build/relight" "$out/refit.ply" "$set" --out "$out/refit" --threads 1 | sed -n 's/^test: PSNR \([0-9.]*\).*/\1/p')
 check "--refit learns: $refitted dB, $(psnr "$out/reduced") before" awk -v a="$refitted" -v b="$(psnr "$out/reduced")" 'BEGIN { exit !(a > b + 0.1) }'

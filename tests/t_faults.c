@@ -877,10 +877,15 @@ static void test_checkpoints(void) {
             if (trainer->screen_gradient[k * trainer->stride + i] > most) most = 1;
         CHECK(most > 0);
     }
-    CHECK(trainer->corrections[0].steps[1] > 0 && !ssdgs_trainer_save(trainer, file_path));
-    end_world();
-    with_trainer();
-    CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == before);
+    CHECK(trainer->corrections[0].steps[1] > 0);
+    for (int outlines = 0; outlines < 2; outlines++) { /* 0: as where no random point is inside of them */
+        trainer->outlines = outlines;
+        CHECK(!ssdgs_trainer_save(trainer, file_path));
+        end_world();
+        with_trainer();
+        trainer->outlines = !outlines;
+        CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == before && trainer->outlines == outlines);
+    }
     end_world();
     with_trainer();
     before = held();
@@ -931,6 +936,8 @@ static void test_checkpoints(void) {
                     {"ambient light's steps", offsetof(head, ambient_steps), WORD, -1},
                     {"ambient light's steps", offsetof(head, ambient_steps), WORD, (double)h.iteration + 1},
                     {"exposed", offsetof(head, exposed), WORD, 2},
+                    {"outlines", offsetof(head, outlines), WORD, -1},
+                    {"outlines", offsetof(head, outlines), WORD, 2},
                     {"settings", offsetof(head, settings), WORD, 0},
                     {"terms", offsetof(head, settings.terms), WORD, 16},
                     {"width", offsetof(head, settings.scattering.width), WORD, 1024},
@@ -953,6 +960,7 @@ static void test_checkpoints(void) {
                     {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
                     {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
                     {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
+                    {"intensity", corrections + offsetof(ssdgs__correction, sure), DOUBLE, infinite},
                     {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
                     {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}};
         for (size_t k = 0; k <= sizeof lies / sizeof *lies; k++) {

@@ -81,7 +81,7 @@ static const field train_fields[] = {
     I(batch, 1, 256),
     I(refine, 0, 15),
     R(dssim, 0, 1),
-    R(normal_weight, 0, 1e30),
+    R(normal_weight, 0, 1e6),
     R(densify_gradient, 0, 1e30),
     R(prune_outside, 0, 1),
     R(adam_epsilon, 0, 1e30),

@@ -303,7 +303,14 @@ static void test_resume(void) {
     ssdgs_context_destroy(context);
 }
 
-/* A step with a non-finite gradient changes nothing and names the parameter. */
+static int count_calls(void *user, const ssdgs_train_stats *stats) {
+    (void)stats;
+    ++*(int *)user;
+    return 1;
+}
+
+/* A step with a non-finite gradient changes nothing and names the parameter. A network that is not finite
+   lets no step come about, which ends the run. */
 static void test_refused_step(void) {
     const ssdgs_train_options options = short_run(2);
     ssdgs_settings settings = ssdgs_settings_default();
@@ -324,6 +331,12 @@ static void test_refused_step(void) {
     CHECK(strstr(ssdgs_error_message(context), "gradient of") != NULL);
     CHECK(!memcmp(before, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof *before));
     free(before);
+    model->globals[model->global_count - 1] = nan_value;
+    CHECK(ssdgs_trainer_step(trainer, &stats) == SSDGS_ERR_NONFINITE);
+    CHECK(stats.iteration == 2 && stats.gaussians == model->count && stats.skipped_steps == 1);
+    int calls = 0;
+    trainer->options.iterations = 100;
+    CHECK(ssdgs_trainer_run(trainer, count_calls, &calls) == SSDGS_ERR_NONFINITE && calls == 0);
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
@@ -882,10 +895,30 @@ static void test_refinement(void) {
         if (!CHECK(worst < (learns ? 0.1 : 0.02)))
             printf("    learns %d: intensities off by %g\n", learns, worst);
         CHECK(!learns || fabs(told) < 1e-6 * trainer->corrections[0].sure);
+        if (learns) { /* what is lit by more lights as well takes no part */
+            trainer->photos[0].more_count = 1;
+            for (p = 0; p < PHOTOS; p++) {
+                trainer->corrections[p].value[9] = p ? 2 : 0;
+                trainer->corrections[p].sure = p ? 1 : 0;
+            }
+            ssdgs__anchor_intensities(trainer);
+            for (p = 0; p < PHOTOS; p++) CHECK(fabs(trainer->corrections[p].value[9]) < 1e-12);
+        }
         ssdgs_trainer_destroy(trainer);
         if (learns) break;
         CHECK(!ssdgs_refine_photo(model, disturbed, background, 60));
         CHECK(fabs((double)(disturbed[0].light.intensity[2] / photos[0].light.intensity[2]) - 1) < 0.03);
+        /* next to no light: a step goes no further than elsewhere; light that colours do not ask for stays */
+        ssdgs_photo dark = photos[0];
+        for (int c = 0; c < 3; c++) dark.light.intensity[c] = (ssdgs_real)1e-38;
+        CHECK(!ssdgs_refine_photo(model, &dark, background, 1));
+        CHECK(fabs(log((double)dark.light.intensity[1] / 1e-38) - SSDGS__INTENSITY_STEP) < 1e-3);
+        model->settings.baked = 1;
+        dark = disturbed[1];
+        CHECK(!ssdgs_refine_photo(model, &dark, background, 2));
+        CHECK(!memcmp(&dark.light, &disturbed[1].light, sizeof dark.light) &&
+              memcmp(&dark.camera, &disturbed[1].camera, sizeof dark.camera));
+        model->settings.baked = 0;
     }
 
     /* distant lights told 0.1 rad wrong, each another way */
@@ -1210,6 +1243,8 @@ static void test_more_lights(void) {
             if (i == 3) more[1].direction[1] = 2;
             CHECK(ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer) == SSDGS_ERR_ARGUMENT);
             CHECK(strstr(ssdgs_error_message(context), words[i]) != NULL);
+            CHECK((strstr(ssdgs_error_message(context), "the other lights of photograph ") != NULL) ==
+                  (i != 2));
             shots[5] = shots[4];
             more[1] = told;
         }
@@ -2456,6 +2491,50 @@ static void test_fade(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Photographs that show `background` around the object do so too where some pixels are not quite opaque: they
+   are not laid over other colours, which one with an outline is. What is wholly transparent does not say
+   whether the others show it. */
+static void test_backdrop(void) {
+    enum { MANY = 8 };
+    static unsigned char shown[SIDE * SIDE * 4], clear[SIDE * SIDE * 4];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_context *context = NULL;
+    CHECK(!ssdgs_context_create(NULL, &context));
+    options.schedule = SSDGS_SCHEDULE_JOINT;
+    for (int filled = 0; filled < 2; filled++)
+        for (int outlined = 0; outlined < 2; outlined++) {
+            ssdgs_photo shots[MANY];
+            uint64_t hash[2];
+            for (int i = 0; i < SIDE * SIDE; i++) {
+                const int x = i % SIDE - SIDE / 2, y = i / SIDE - SIDE / 2;
+                memset(shown + 4 * i, filled || x * x + y * y < SIDE * SIDE / 9 ? 150 : 0, 3);
+                shown[4 * i + 3] = i == SIDE * SIDE / 2 ? 254 : 255;
+            }
+            for (int i = 0; i < MANY; i++) {
+                shots[i] = photos[i % PHOTOS];
+                if (i != 3 || !outlined) shots[i].pixels = shown;
+                if (filled && i % 2) shots[i].pixels = clear;
+            }
+            for (int random = 0; random < 2; random++) {
+                ssdgs_model *model = NULL;
+                ssdgs_trainer *trainer = NULL;
+                options.random_background = random;
+                CHECK(!ssdgs_model_create(context, NULL, 20, &model));
+                if (!CHECK(!ssdgs_trainer_create(model, shots, MANY, &options, &trainer))) exit(1);
+                CHECK(trainer->backdrop == !filled && trainer->filled == filled);
+                for (int i = 0; i < MANY; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
+                hash[random] = 1;
+                for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+                    hash[random] = ssdgs__fold(hash[random], model->gaussians + c * model->capacity,
+                                               (size_t)model->count * sizeof *model->gaussians);
+                ssdgs_trainer_destroy(trainer);
+                ssdgs_model_destroy(model);
+            }
+            CHECK((hash[0] == hash[1]) == (!filled && !outlined));
+        }
+    ssdgs_context_destroy(context);
+}
+
 /* A Gaussian pulled hard becomes two: a small one is cloned; a large one becomes two samples of it, 1.6 times
    smaller. New ones have no momentum. One pulled less stays as it was. */
 static void test_two(size_t longest) {
@@ -2617,6 +2696,7 @@ int main(void) {
     test_prune_outside();
     test_nothing_in_view();
     test_outlines_known();
+    test_backdrop();
     test_wrong_outlines();
     test_light_notes();
     test_borders();
