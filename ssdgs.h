@@ -85,7 +85,8 @@ CONVENTIONS
 
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
-  Buffers only grow: a second frame of the same size allocates nothing. What a frame keeps for the next
+  Buffers only grow: the same frame again allocates nothing, and others only where more Gaussians meet more
+  tiles than in any before. What a frame keeps for the next
   belongs to its model or scene, the rest to the context. Pixels, planes and paths stay the caller's.
   Contexts, models, scenes and trainers may be destroyed in any order.
 
@@ -157,7 +158,7 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
-  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones, too
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside them
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
@@ -283,7 +284,8 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
 
 /* Makes a context; desc may be NULL. Contexts share nothing; one context serves one thread at a time. */
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out);
-/* Joins the threads. The memory stays until what was made on the context is gone too. NULL is fine. */
+/* Joins the threads. What was made on the context goes on working without them, and keeps its memory until
+   the last of it is gone. NULL is fine. */
 SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
 /* Gives back the memory that frames and training have left for the next; those that follow take it anew. What
    models and scenes keep stays theirs. */
@@ -377,15 +379,16 @@ typedef struct ssdgs_gaussian {
     ssdgs_real position[3];   /* world */
     ssdgs_real rotation[4];   /* quaternion w x y z, of any length: its axes in the world; 0: the third is the
                                  normal */
-    ssdgs_real scale[3];      /* standard deviations along them, world units */
+    ssdgs_real scale[3];      /* standard deviations along them, world units, above 0 */
     ssdgs_real normal[3];     /* of the surface, for shading; 0 0 0 = the third axis. Highlights lie along the
                                  other two, turned with the third to the normal */
     ssdgs_real opacity;       /* 0 .. 1 at the centre */
-    ssdgs_real diffuse[3];    /* c_d: albedo, 0 .. 1 */
+    ssdgs_real diffuse[3];    /* c_d: albedo, 0 or more */
     ssdgs_real specular[3];   /* c_s; deferred, its lobe's height: see ssdgs_gaussian_mirror(). 0 = none */
     ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
-    ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight: 1 = broad, more is narrower */
-    ssdgs_real f0;            /* of a deferred highlight, at normal incidence: 0.04 for dielectrics */
+    ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight, above 0: 1 = broad, more is narrower */
+    ssdgs_real f0;            /* of a deferred highlight, at normal incidence, above 0, below 1: 0.04 for
+                                 dielectrics */
     ssdgs_real softness;      /* 0: a deferred shadow is the pixel's, sharp; 1: the Gaussian's */
     ssdgs_real material[SSDGS_MATERIAL_COUNT]; /* code that the networks see */
 } ssdgs_gaussian;
@@ -452,10 +455,11 @@ typedef struct ssdgs_light {
     ssdgs_real position[3];  /* world; directional: unit vector towards the light */
     ssdgs_real intensity[3]; /* RGB, 0 or more, in the training data's units; directional: irradiance */
     ssdgs_real direction[3]; /* spot, focus: unit vector along which it shines */
-    ssdgs_real cone[2]; /* spot: angles to it in radians, full inside the first, 0 outside the second; between
-                           them as in glTF. No light scatters across its rim */
+    ssdgs_real cone[2]; /* spot: angles to it in radians, 0 .. pi, full inside the first, 0 outside the larger
+                           second; between them as in glTF. No light scatters across its rim */
     ssdgs_real range;   /* point, spot: where it fades to 0, as in glTF; 0: nowhere */
-    ssdgs_real focus; /* point, spot: fades as cos^focus of the angle to direction, as LEDs do; 0: does not */
+    ssdgs_real focus; /* point, spot: fades as cos^focus of the angle to direction, as LEDs do; up to 1000; 0:
+                         does not */
     int unshadowed;   /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
                          beneath a plane */
 } ssdgs_light;
@@ -467,7 +471,8 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
    where their columns lie one after the other, as in OpenGL, SSDGS_CLIP_Y_DOWN where clip y points down, as
    in Vulkan. Off-centre is fine, and so is any range of depths, reversed or infinite: it is not read. In a
    left-handed world the view mirrors: scenes alone take it, with models placed by a reflection. Set
-   near_plane after that. ERR_ARGUMENT: view is no rotation and translation, projection no perspective. */
+   near_plane after that. ERR_ARGUMENT: view is no rotation and translation, projection no perspective, or
+   there is no such flag. */
 enum { SSDGS_COLUMN_MAJOR = 1, SSDGS_CLIP_Y_DOWN = 2 };
 SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
                                                   const ssdgs_real projection[16], int flags, int width,
@@ -477,7 +482,8 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
 
 /* Where results go. Set all to 0 first. Planes are the caller's; NULL = not computed. Colours are linear, not
    clamped (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background =
-   color. */
+   color. Beside an object with deferred highlights, scattering has all light of those without and of baked
+   ones. */
 typedef struct ssdgs_image {
     int stride;                    /* pixels from row to row; 0 = camera width */
     ssdgs_real *color;             /* (h,w,3) */
@@ -498,11 +504,11 @@ typedef struct ssdgs_render_options {
     int terms;     /* SSDGS_*_TERM mask: of the model's, those to render */
     int antialias; /* 1: opacity makes up for pixel_variance, so far Gaussians do not grow (Mip-Splatting) */
     ssdgs_real background[3]; /* linear; settings.transfer none: as stored */
-    ssdgs_real stop; /* pixels, a light map's too, are done when their transmittance is less; 0 = never */
-    ssdgs_real alpha_threshold; /* a splat is not drawn at pixels where its alpha is below this */
-    ssdgs_real max_error;    /* Gaussians whose weights sum to less in every pixel are not shaded; 0 = none */
-    ssdgs_real light_detail; /* resolution of the light maps; 1 = the model's choice */
-    ssdgs_real transport_detail; /* accuracy of true dipole transport; 1 = off by about 1 % at most */
+    ssdgs_real stop; /* 0 .. 1: pixels, a light map's too, are done below this transmittance; 0 = never */
+    ssdgs_real alpha_threshold; /* 0 .. 1: a splat is not drawn at pixels where its alpha is below this */
+    ssdgs_real max_error;    /* 0 .. 1: Gaussians whose weights sum to less in every pixel are not shaded */
+    ssdgs_real light_detail; /* 0.01 .. 8: resolution of the light maps; 1 = the model's choice */
+    ssdgs_real transport_detail; /* 0.1 .. 8: accuracy of true dipole transport; 1 = 1 % off at most, about */
     ssdgs_real ambient[9][3];    /* RGB, light from all around: see below; 0 = none */
 } ssdgs_render_options;
 /* ambient: the irradiance on a surface with the world's normal x y z is the sum of ambient[0] .. [8] times 1,
@@ -536,8 +542,7 @@ typedef struct ssdgs_render_stats {
     size_t light_instances; /* the same of the lights' maps made for this frame */
 } ssdgs_render_stats;
 
-/* Renders model as camera sees it under lights[0 .. light_count). After the first frame of a size nothing is
-   allocated. */
+/* Renders model as camera sees it under lights[0 .. light_count). */
 SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
                                     int light_count, const ssdgs_image *image);
 /* The same with options (NULL = default) and statistics (may be NULL). */
@@ -559,7 +564,8 @@ typedef struct ssdgs_object {
     ssdgs_real specular;     /* 0 or more: factor of its highlights; 1 */
     ssdgs_real translucency; /* 0.1 .. 10: factor of how far light travels in it, by true transport; 1 */
     const unsigned char *mask; /* (Gaussians of the model) 255: takes tint, roughness and specular whole; 0:
-                                  stays as it is. Geometric lobes take roughness whole. NULL: all do; NULL */
+                                  stays as it is. Geometric lobes take roughness whole. Read in the call.
+                                  NULL: all do; NULL */
 } ssdgs_object;
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* where and as it was trained */
 
@@ -570,8 +576,8 @@ SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene); /* NULL is fine */
 /* As ssdgs_render_ex(), of several objects. Their Gaussians are sorted and blended together and shadow each
    other. Light scatters within each alone. A model that is scaled stays as bright: a light's E at a place is
    the same for all. objects may be NULL when object_count is 0. ERR_ARGUMENT: a transform is none of the
-   above, a tint is negative, or the models mix settings.transfer (baked ones may). ERR_LIMIT: 2^28 Gaussians
-   in all, 65,535 objects. */
+   above, a tint is negative, or the models mix settings.transfer (baked ones may). ERR_NONFINITE: a transform
+   or a background is not finite. ERR_LIMIT: 2^28 Gaussians in all, 65,535 objects. */
 SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                           const ssdgs_camera *camera, const ssdgs_light *lights,
                                           int light_count, const ssdgs_render_options *options,
@@ -582,29 +588,32 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
 typedef struct ssdgs_occluder {
     void (*shadow)(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction);
     void *user;
-    uint64_t revision; /* another one whenever an answer may differ; until then what was found is kept */
+    uint64_t revision; /* another one whenever the answer for a light may differ; until then what was found is
+                          kept. Lights that move, come or go need none */
 } ssdgs_occluder;
 /* For the frames from now on: Gaussians, what scatters in them and pixels get what it leaves. NULL: nothing
    else. Copied. */
 SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder);
 /* Makes the lights' maps of a frame ahead of it, for ssdgs_scene_shadow(). ssdgs_scene_render() with the same
-   objects, lights and options finds them made. */
+   objects, lights and options finds them made. From then on every frame of the scene makes them. */
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options);
 /* What of a light passes the scene's objects on the way to points (count,3), world: fraction (count), 0 .. 1.
-   By the maps of the last ssdgs_scene_light(), which note the first 2 % lost. ERR_ARGUMENT: there is
-   none of that light, or that frame failed. */
+   By the maps of the scene's last frame, of ssdgs_scene_light() or ssdgs_scene_render(), which note the first
+   2 % lost. 1 for a light without shadow. ERR_ARGUMENT: that frame had no such light, made no maps or
+   failed. */
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
 
 /* An environment map, (height,width,3) linear radiance, as lights. Its first row lies around the z axis, its
-   first column at the x axis, from where columns go towards y: to_world (3,3), row-major, turns it; NULL = as
-   it is. lights (light_count) become directional ones, each for a part of the sky; ambient may be
-   options.ambient or NULL. With both, ambient takes of each pixel what is below twice the sky's mean, the
-   lights take the rest. Pictures of two trained models were, from those under 256 lights, with ambient alone
-   32 and 25 dB, under 4 lights 33 and 27, 16 lights 40 and 34, 64 lights 48 and 40; under 2 lights with
-   ambient 34 and 27. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT, ERR_MEMORY. */
+   first column at the x axis, from where columns go towards y: to_world (3,3), row-major, turns it, a
+   rotation or reflection; NULL = as it is. lights (light_count) become directional ones, each for a part of
+   the sky; ambient may be options.ambient or NULL. With both, ambient takes of each pixel what is below twice
+   the sky's mean, the lights take the rest. Pictures of two trained models were, from those under 256 lights,
+   with ambient alone 32 and 25 dB, under 4 lights 33 and 27, 16 lights 40 and 34, 64 lights 48 and 40; under
+   2 lights with ambient 34 and 27. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT,
+   ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_real *pixels, int width,
                                          int height, const ssdgs_real *to_world, ssdgs_light *lights,
                                          int light_count, ssdgs_real ambient[9][3]);
@@ -892,7 +901,7 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    network's with depth_cue or transport. Cues always are. Layers are out x in weights, then biases, with
    max(0, x) but behind the last. S is sigmoid(answer), with residual_shadow sigmoid(answer + logit v), v
    within 0.01 .. 0.99. Of sigmoids u the optics are sigma_s, sigma_a = 2 u + 0.05 and r = 3 u + 0.1. A light
-   out of whose reach are all 64 neighbours of a block leaves it out.
+   out of whose reach are all 64 neighbours of a block leaves it out: there S is 1.
 
    What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was shaded
    before them or, without one, after. A Gaussian whose colour is not finite is black.
@@ -3391,6 +3400,8 @@ static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ss
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                                "camera: row %d, column %d of view or projection is not finite", i / 4, i % 4);
     }
+    if (flags & ~(SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN))
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: flags = %d", flags);
     if (fabs(v[12]) + fabs(v[13]) + fabs(v[14]) > 1e-6 || fabs(v[15] - 1) > 1e-6)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "camera: the last row of view is not 0 0 0 1: is it the other order of elements?");
@@ -3673,7 +3684,7 @@ static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds 
 
 static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o);
 
-/* A model's, in its space, at alpha 1/255. */
+/* The bounds of a model in its space, of all that is drawn at alpha 1/255. */
 static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bounds) {
     ssdgs_context *context = model->context;
     const ssdgs_object object = ssdgs_object_default(model);
@@ -3706,7 +3717,7 @@ static int ssdgs__casts(const ssdgs_light *light) {
            (light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0);
 }
 
-/* Whether it has a direction, from its position. */
+/* Whether a light's direction matters. */
 static int ssdgs__aimed(const ssdgs_light *light) {
     return light->kind == SSDGS_LIGHT_SPOT || (light->kind == SSDGS_LIGHT_POINT && light->focus > 0);
 }
@@ -3813,6 +3824,7 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
         memset(v, 0, sizeof *v);
         v->light = index;
         v->width = v->height = map;
+        v->distance = 1;
         ssdgs__light_blur(settings, &v->blur, &v->variance, &v->compensate);
         v->cx = v->cy = (ssdgs_real)map / 2;
         double direction[3], eye[3], f;
@@ -3826,8 +3838,7 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
             v->by_distance = 1;
         } else {
             v->orthographic = !along && distance > 1000 * radius;
-            v->distance =
-                v->orthographic && light->kind != SSDGS_LIGHT_DIRECTIONAL ? (ssdgs_real)distance : 1;
+            if (v->orthographic && light->kind != SSDGS_LIGHT_DIRECTIONAL) v->distance = (ssdgs_real)distance;
             for (int i = 0; i < 3; i++) {
                 direction[i] = along ? (double)light->direction[i] : to_scene[i];
                 eye[i] =
@@ -4002,6 +4013,7 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, int lights_ready,
         const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
         lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
                          ssdgs__casts(light) == ssdgs__casts(last) &&
+                         ssdgs__limited(light) == ssdgs__limited(last) && /* else other bounds */
                          !memcmp(light->position, last->position, sizeof light->position) &&
                          !memcmp(&light->range, &last->range, sizeof light->range);
         if (light->kind == SSDGS_LIGHT_SPOT) /* whose map follows its cone; a focus is of shading alone */
@@ -4047,8 +4059,8 @@ static double ssdgs__boundary(double eta) {
 
 /* The dipole of settings.medium (eq. 5 with Jensen's distances) as weights of true transport's lengths, for
    each colour: at 24 distances, from half a mean free path to 16, the sum of least squares, relative to the
-   dipole. What Jensen's albedo has besides comes from nearby, so from the shortest length. Of it all, the
-   surface lets diffuse light in and out. */
+   dipole. What Jensen's albedo has beyond that sum goes to the shortest length. All is multiplied by the
+   share of diffuse light that the surface lets in and out. */
 static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucency,
                                   ssdgs_real weights[3 * SSDGS__LENGTHS]) {
     enum { PLACES = 24, ROUNDS = 100 };
@@ -4118,7 +4130,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
     k.diffuse = (o->terms & SSDGS_DIFFUSE_TERM) != 0;
     k.specular = (o->terms & SSDGS_SPECULAR_TERM) != 0;
-    k.shadow = (o->terms & SSDGS_SHADOW_TERM) && ssdgs__casts(from);
+    k.shadow = (o->terms & SSDGS_SHADOW_TERM) && !s->baked && ssdgs__casts(from);
     k.scattering = (o->terms & SSDGS_SCATTERING_TERM) && !ssdgs__has_medium(s, o->terms);
     k.residual_shadow = s->residual_shadow;
     k.refined_shadow = s->shadow.layers > 0;
@@ -4526,8 +4538,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
             if (result) return result;
             m->cache.bounds_ready = m->cache.objects >= 0;
         }
-        for (int i = 0, moved = 0; i < frame->light_count;
-             i++) { /* behind another number of views all move */
+        for (int i = 0, moved = 0; i < frame->light_count; i++) {
+            /* if a light has another number of views, those of all later lights move */
             const int views = ssdgs__light_views(frame, i, NULL);
             cached[i].kept = cached[i].kept && !moved;
             moved |= views != cached[i].views;
@@ -4545,6 +4557,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (!m->cache.camera_ready) {
         memset(frame->views, 0, sizeof *frame->views);
         frame->views[0].light = -1;
+        frame->views[0].distance = 1;
         frame->views[0].width = camera->width;
         frame->views[0].height = camera->height;
         frame->views[0].fx = camera->fx;
@@ -4836,8 +4849,8 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
            (size_t)chunk * (size_t)(v->tiles_x * v->tiles_y);
 }
 
-/* How many instances of a chunk of ranks each tile has, and which a rank's are: what ranks own lies anywhere
-   in memory. */
+/* Counts the instances that a chunk of ranks has in each tile. Copies of_gaussian into the order of ranks, as
+   its entries lie anywhere in memory. */
 static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
@@ -4972,7 +4985,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.depth_origin = v->nearest;
     t.cx = v->cx;
     t.cy = v->cy;
-    t.inverse_focal = 1 / (v->orthographic ? v->fx * v->distance : v->fx);
+    t.inverse_focal = 1 / (v->fx * v->distance);
     t.cue = frame->depth_cue != NULL;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
@@ -5165,12 +5178,12 @@ typedef struct ssdgs__node {
 #define SSDGS__LEVELS 12
 #define SSDGS__LEAF 8   /* Gaussians of a lowest node, and parts of a higher one */
 #define SSDGS__NEAR 256 /* lowest nodes near a block, taken together */
-/* A node is one point from so many of its radii away, and joins a series around receivers from so many of
-   their reaches. */
+/* From SSDGS__FAR of its radii away a node is one point. From SSDGS__WIDE of the receivers' reaches away it
+   joins the series around them. */
 #define SSDGS__FAR ((ssdgs_real)2)
 #define SSDGS__WIDE ((ssdgs_real)3)
-/* Gaussians with less than this part of the mean flux are one point for all, in a node with a radius below
-   that, in length units. */
+/* In a lowest node whose radius is below SSDGS__COMPACT length units, all Gaussians with less than SSDGS__DIM
+   of the mean flux are one point. */
 #define SSDGS__DIM ((ssdgs_real)0.05)
 #define SSDGS__COMPACT ((ssdgs_real)0.08)
 
@@ -5218,7 +5231,7 @@ static void ssdgs__node_add(ssdgs__node *node, const ssdgs__node *part) {
     for (int c = 0; c < 3; c++) node->x[c] += (part->x[c] - node->x[c]) * (part->flux / node->flux);
 }
 
-/* Its radius and spread by one of its parts, once all are in. */
+/* Grows a node's radius and spread by one of its parts. Its mean must be final. */
 static void ssdgs__node_reach(ssdgs__node *node, const ssdgs__node *part) {
     ssdgs_real distance2 = 0;
     for (int c = 0; c < 3; c++) distance2 += (part->x[c] - node->x[c]) * (part->x[c] - node->x[c]);
@@ -5465,7 +5478,8 @@ static void ssdgs__transport_leaves(ssdgs__transport_state *t) {
 
 typedef struct ssdgs__transport_job {
     ssdgs__node_job tree; /* where the light enters */
-    int blocks; /* of SSDGS__BLOCK Gaussians, all of the frame's: what is seen changes no Gaussian's light */
+    int blocks; /* of SSDGS__BLOCK Gaussians, of all in the frame, seen or not: sums do not depend on the
+                   camera */
     ssdgs_real *sources; /* (slots, 5 remote + 4 nearby, SSDGS__SOURCES) */
     ssdgs_real *sums;    /* (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK) */
     unsigned char
@@ -5551,8 +5565,10 @@ static void ssdgs__transport_task(void *data, int slot) {
         if (!job->tree.trees[o - frame->objects].leaves) continue;
         for (int s = 0; s < SSDGS__BLOCK; s++) { /* the last one fills the block up */
             const int at = first + s < g->count ? first + s : g->count - 1;
-            for (int k = 0; k < 3; k++)
-                x[k * SSDGS__BLOCK + s] = g->gaussians[(size_t)(SSDGS_POSITION + k) * g->stride + (size_t)at];
+            for (int k = 0; k < 3; k++) {
+                const ssdgs_real to = g->gaussians[(size_t)(SSDGS_POSITION + k) * g->stride + (size_t)at];
+                x[k * SSDGS__BLOCK + s] = ssdgs__finite(to) ? to : 0; /* not drawn; its neighbours are */
+            }
             seen |= (frame->seen[o->first + at] == SSDGS_SEEN) << s / 16;
         }
         for (int light = 0; light < frame->light_count; light++) {
@@ -6053,12 +6069,15 @@ static int ssdgs__reach_row(const ssdgs_frame *frame, const ssdgs_placed *o, int
 
 SSDGS__SMALL_BEGIN
 
-/* What a lobe e^(-x u), u = 1 - (n.h)^2, sends to an eye along n of a sky of radiance 1, over 4 pi: as dwi is
-   4 (wo.h) dh, the integral of e^(-x u), deferred times 1 - 2 u, to u = 1/2, where n.wi ends. */
+/* What a lobe e^(-x u), u = 1 - (n.h)^2, sends to an eye along n of a sky of radiance 1, over 4 pi. As dwi is
+   4 pi du, that is the integral of e^(-x u) to u = 1/2, where n.wi ends. Deferred, the lobe is multiplied by
+   n.wi / (wo.h)^2 = (1 - 2 u) / (1 - u); what 1 / (1 - u) adds is right to 1.5 %. */
 static ssdgs_real ssdgs__lobe_share(ssdgs_real x, int deferred) {
-    if (x < (ssdgs_real)0.03) return deferred ? (ssdgs_real)0.25 - x / 24 : (ssdgs_real)0.5 - x / 8;
-    const ssdgs_real share = (1 - ssdgs__exp_scalar(-x / 2)) / x;
-    return deferred ? (1 - 2 * share) / x : share;
+    const int even = x < (ssdgs_real)0.03;
+    const ssdgs_real share = even ? (ssdgs_real)0.5 - x / 8 : (1 - ssdgs__exp_scalar(-x / 2)) / x;
+    if (!deferred) return share;
+    return (even ? (ssdgs_real)0.25 - x / 24 : (1 - 2 * share) / x) *
+           (1 + 1 / ((ssdgs_real)4.4 + (ssdgs_real)0.75 * x));
 }
 
 /* Of Gaussian s of a block, were its lobes that much narrower: how much light its highlight sends back of a
@@ -6183,8 +6202,8 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
     }
 }
 
-/* How an object differs from its model: rows of factors, of the colours and of the highlights besides.
-   Changes the sharpness of deferred ones. 0: it does not. */
+/* Finds how an object differs from its model: rows of factors of the colours and, last, of the highlights.
+   Changes the sharpness of deferred lobes. 0: it does not differ. */
 static int ssdgs__edit(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
                        ssdgs_real *gauss, ssdgs_real factors[4 * SSDGS__BLOCK]) {
     const ssdgs__lighting *k = ssdgs__lightings(frame, o) + frame->light_count;
@@ -6261,15 +6280,18 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         const int off = ssdgs__beyond(frame, light, o);
         const int limited = ssdgs__limited(source), casts = ssdgs__casts(source);
         ssdgs_real reach[SSDGS__BLOCK];
-        const int reached =
+        const int lit =
             o->light_count && !off &&
             (!limited || ssdgs__reach_row(frame, o, light, gauss, reach, NULL) || frame->training);
-        const int lit =
-            reached || (o->light_count && !off && (frame->diffuse || frame->layer_pixels)); /* for S */
-        for (int i = 0; frame->layer_count && !(lit && lighting->deferred) && i < SSDGS__PER_LIGHT; i++)
-            for (int s = 0; s < live; s++)
+        for (int s = 0; frame->layer_count && !(lit && lighting->deferred) && s < live; s++) {
+            for (int i = 0; i < SSDGS__PER_LIGHT; i++)
                 memset(ssdgs__layer(frame, layer + i) + 4 * at[s], 0, 3 * sizeof(ssdgs_real));
-        for (int s = 0; off && s < SSDGS__BLOCK; s++) outs[9 * SSDGS__BLOCK + s] += 1;
+            if (!lighting->deferred) continue;
+            ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
+            to[1] = 1; /* or what blends with it would be darker */
+            to[2] = scratch[l->lobe + 10 * SSDGS__BLOCK + (size_t)s];
+        }
+        for (int s = 0; !lit && s < SSDGS__BLOCK; s++) outs[9 * SSDGS__BLOCK + s] += 1;
         if (!lit) continue;
         k->reflect(lighting, gauss, part + l->rows);
         for (int s = 0; s < SSDGS__BLOCK; s++) {
@@ -6289,7 +6311,9 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             for (int s = 0; s < SSDGS__BLOCK; s++) {
                 const size_t from =
                     at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
-                to[s] = casts ? job->transport[first + from] / irradiance[s] : cosine[s] * even;
+                to[s] = !casts              ? cosine[s] * even
+                        : irradiance[s] > 0 ? job->transport[first + from] / irradiance[s]
+                                            : 0;
             }
         }
         if (l->shadow_layers && lighting->shadow) {
@@ -6758,7 +6782,6 @@ typedef struct ssdgs__composite_job {
     const ssdgs_frame *frame;
     const ssdgs_real *color;
     ssdgs_real *planes[4]; /* colour, transmittance */
-    int deferred;          /* 1: with the layers and what they are lit to */
 } ssdgs__composite_job;
 
 /* Transmittance at a distance from the light, by one pixel of its map. After a fall it stays at what that
@@ -6984,7 +7007,7 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_frame *frame = job->frame;
     ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
     const int layers =
-        job->deferred && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
+        frame->layer_count && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
@@ -6995,17 +7018,17 @@ static void ssdgs__composite_task(void *data, int index) {
         memset(median, 0, sizeof median);
         tile.median = median;
     }
-    if (job->deferred) tile.material_of = frame->material_of;
+    if (frame->layer_count) tile.material_of = frame->material_of;
     tile.material = ssdgs__material_after(&tile, -1);
     for (int later = 0; tile.material >= 0; later = 1) {
         frame->context->k->composite(&tile, layers, color, pixels);
         if (tile.median) ssdgs__median_store(frame, &tile);
         tile.median = NULL;
-        if (job->deferred && layers == 1)
+        if (frame->layer_count && layers == 1)
             memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
-        for (int layer = 0; job->deferred && layer < SSDGS__LIGHT_LAYER; layer++)
+        for (int layer = 0; frame->layer_count && layer < SSDGS__LIGHT_LAYER; layer++)
             ssdgs__layer_pixels_store(frame, &tile, layer, later, pixels + layer * SSDGS__TILE_LAYER);
-        for (int light = 0; job->deferred && light < frame->light_count; light++)
+        for (int light = 0; frame->layer_count && light < frame->light_count; light++)
             if (frame->layer_pixels || ssdgs__reaches_tile(frame, &tile, light))
                 ssdgs__light_tile(frame, &tile, light, later, pixels);
         ssdgs__tile_store(&tile, pixels, later ? 3 : 4, later, job->planes);
@@ -7014,21 +7037,19 @@ static void ssdgs__composite_task(void *data, int index) {
 }
 
 /* Blends color, any triple per Gaussian; where deferred, the layers too, and lights what they blend to. */
-static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels,
-                                   int deferred) {
+static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
     ssdgs__composite_job job;
     job.frame = frame;
     job.color = color;
     for (int c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
     job.planes[3] = frame->transmittance;
-    job.deferred = deferred;
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task,
                     &job);
 }
 
 static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
-    ssdgs__composite_tiles(frame, frame->color, frame->pixels, frame->layer_count > 0);
+    ssdgs__composite_tiles(frame, frame->color, frame->pixels);
     return SSDGS_OK;
 }
 
@@ -7465,12 +7486,12 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
         const ssdgs_real *const from[4] = {frame->diffuse, frame->specular, frame->scattering, frame->normal};
         if (!to[c]) continue;
         if (frame->layer_count) ssdgs__deferred_component(frame, c, planes);
-        else ssdgs__composite_tiles(frame, from[c], planes, 0);
+        else ssdgs__composite_tiles(frame, from[c], planes);
         ssdgs__write_rows(frame, planes, 3, stride, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
         if (frame->layer_count) ssdgs__deferred_component(frame, 4, planes);
-        else ssdgs__composite_tiles(frame, frame->shadow, planes, 0);
+        else ssdgs__composite_tiles(frame, frame->shadow, planes);
         if (image->shadow) ssdgs__write_rows(frame, planes, 1, stride, NULL, image->shadow);
         if (image->depth) ssdgs__write_rows(frame, planes + pixels, 1, stride, NULL, image->depth);
     }
@@ -7510,8 +7531,8 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 
 /* ==== >>scene  placed models in one frame, shadows asked for and given ==== */
 
-/* Frames of ssdgs_object, what they keep, and what an engine asks of a model. All but the public functions is
-   in >>frame (objects), >>shadow and >>composite. */
+/* Frames of ssdgs_object, what comes of ambient light to each Gaussian, and lights of environment maps.
+   Placing objects is in >>frame, their maps in >>shadow. */
 
 SSDGS__SMALL_BEGIN
 
@@ -10844,6 +10865,7 @@ static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
     model->settings.baked = 0; /* for the lights that tell what is seen */
     model->settings.terms |= SSDGS_SHADOW_TERM;
     model->settings.asg = SSDGS_ASG_GEOMETRIC;
+    ssdgs__model_changed(model); /* what frames have kept is of other settings */
     ssdgs_result result = ssdgs__seen_around(model, seen, scratch);
     model->settings = settings;
     ssdgs__model_changed(model);
@@ -13492,7 +13514,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             applying += (uint32_t)!sample;
             if (sample) {
                 memset(sums + (size_t)place * 4, 0, 4 * sizeof(R));
-                taken |= !tile->of_gaussian || tile->of_gaussian[gaussian].count > 1;
+                taken |= cue || !tile->of_gaussian || tile->of_gaussian[gaussian].count > 1;
                 sums[(size_t)place * 4 + 1] = taken ? 0 : 1; /* else v is 0 */
             }
             if (!taken) continue;

@@ -794,9 +794,10 @@ void write_lobe(float depth) {
 }
 /* What a lobe e^(-x u), u = 1 - (n.h)^2, sends back along n of a sky of radiance 1, over 4 pi. */
 float lobe_share(float x) {
-    if (x < 0.03) return on(deferred) ? 0.25 - x / 24.0 : 0.5 - x / 8.0;
-    float share = (1.0 - power_of_e(-0.5 * x)) / x;
-    return on(deferred) ? (1.0 - 2.0 * share) / x : share;
+    bool even = x < 0.03;
+    float share = even ? 0.5 - x / 8.0 : (1.0 - power_of_e(-0.5 * x)) / x;
+    if (!on(deferred)) return share;
+    return (even ? 0.25 - x / 24.0 : (1.0 - 2.0 * share) / x) * (1.0 + 1.0 / (4.4 + 0.75 * x));
 }
 float lobe_energy() {
     float sum = 0.0;
@@ -860,7 +861,10 @@ void add_light(int i) {
     float answer = 0.0;
     float arrives[lengths] = float[lengths](0.0, 0.0, 0.0, 0.0, 0.0);
     if (l.rim.z > 0.0 && !reached(l)) {
-        for (int layer = 0; layer < 3 && on(deferred); layer++) write_layer(4 + 3 * i + layer, vec3(0));
+        if (!on(deferred)) return;
+        write_layer(4 + 3 * i, vec3(0));
+        write_layer(5 + 3 * i, vec3(0));
+        write_layer(6 + 3 * i, vec3(0, 1, sigmoid(raw(asg_weight + 3)))); /* there S is 1 */
         return;
     }
     if (mine) {
@@ -869,7 +873,8 @@ void add_light(int i) {
         if (shadowed) visibility = visibilities[at];
         if (casts && on(depth_cue)) cue = cues[at];
         for (int k = 0; k < lengths && on(transport); k++) {
-            if (casts) arrives[k] = transported[uint(counts.x) * uint(lengths * i + k) + me] / irradiance;
+            float brought = casts ? transported[uint(counts.x) * uint(lengths * i + k) + me] : 0.0;
+            if (casts) arrives[k] = irradiance > 0.0 ? brought / irradiance : 0.0;
             else arrives[k] = cosine * medium[k].w;
         }
     }
@@ -2725,7 +2730,7 @@ static gpu_walk_parameters gpu_walk_of(const ssdgs_frame *frame, int view) {
     p.max_error = (float)frame->options.max_error;
     p.bias = (float)frame->bias[0];
     p.cx = (float)v->cx, p.cy = (float)v->cy;
-    p.inverse_focal = (float)(1 / (v->orthographic ? v->fx * v->distance : v->fx));
+    p.inverse_focal = (float)(1 / (v->fx * v->distance));
     p.orthographic = v->orthographic != 0;
     p.cue = frame->depth_cue != NULL;
     p.flux = frame->flux != NULL;

@@ -29,6 +29,53 @@ static void middle_of(const picture *p, int plane, double rgb[3]) {
         rgb[c] = (double)p->value[plane * PIXELS + 3 * (SIDE / 2 * SIDE + SIDE / 2) + c];
 }
 
+/* ---- in the dark ---- */
+
+enum { DEEP = 24 };
+static ssdgs_real cue[DEEP];
+
+static ssdgs_result keep_cue(void *user, struct ssdgs_frame *frame, ssdgs_stage stage) {
+    (void)user;
+    if (stage == SSDGS_STAGE_COUNT) memcpy(cue, frame->depth_cue, sizeof cue);
+    return SSDGS_OK;
+}
+
+/* A row of Gaussians deep in the shadow of a wall is as deep in it whether one lies in one tile of the
+   light's map or in two. */
+static void test_deep(void) {
+    ssdgs_gpu_hook hook;
+    ssdgs_context_desc desc;
+    ssdgs_context *own = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_settings settings = ssdgs_settings_default();
+    const ssdgs_camera camera = camera_from(0, -3, -1);
+    const ssdgs_light light = parallel_light(0, 0, 1);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    const ssdgs_image image = planes_of(shot);
+    memset(&hook, 0, sizeof hook);
+    memset(&desc, 0, sizeof desc);
+    hook.fetch = keep_cue;
+    desc.gpu = &hook;
+    settings.depth_cue = 1;
+    settings.light_map.size = 256;
+    CHECK(!ssdgs_context_create(&desc, &own) && !ssdgs_model_create(own, &settings, 8 * DEEP, &model));
+    for (int i = 0; i < 8 * DEEP; i++) {
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        const int wall = i - DEEP;
+        g.position[0] = (ssdgs_real)(wall < 0 ? i / (double)DEEP - 0.5 : wall % 48 / 40.0 - 0.6);
+        g.position[1] = (ssdgs_real)(wall < 0 ? 0.03 : 0.2 * (wall / 48) - 0.3);
+        g.position[2] = (ssdgs_real)(wall < 0 ? -0.5 : 0.5);
+        for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)(wall < 0 || c == 2 ? 0.01 : 0.2);
+        g.opacity = (ssdgs_real)(wall < 0 ? 0.9 : 0.99);
+        CHECK(!ssdgs_model_set(model, i, &g));
+    }
+    options.stop = (ssdgs_real)1e-4;
+    CHECK(!ssdgs_render_ex(model, &camera, &light, 1, &options, &image, NULL));
+    for (int i = 0; i < DEEP; i++) CHECK(fabs((double)cue[i] - 1) < 0.05);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(own);
+}
+
 /* ---- without shadow, with a range, dark ---- */
 
 static void test_unshadowed(ssdgs_model *model) {
@@ -327,7 +374,7 @@ static void test_ambient_highlight(int asg) {
         const double want = sky_in_highlight(single, lambda, f0, normal, eye);
         const double ratio = got[0] / alpha / (double)g.specular[0] / want;
         if (!real64) printf("figure ambient_highlight_%d_%d %.3f of the integral\n", asg, i, ratio);
-        CHECK(ratio > (deferred ? 0.8 : 0.7) && ratio < 1.2);
+        CHECK(ratio > (deferred ? 0.9 : 0.7) && ratio < 1.2);
     }
     ssdgs_model_destroy(single);
 }
@@ -652,6 +699,7 @@ int main(void) {
         if (!kind && !real64) test_environment_pictures(model);
         ssdgs_model_destroy(model);
     }
+    test_deep();
     test_ambient_highlight(SSDGS_ASG_DEFERRED);
     test_ambient_highlight(SSDGS_ASG_GEOMETRIC);
     test_exposure_of_a_sheet();

@@ -106,6 +106,12 @@ static void test_roughness(int asg) {
         if (!real64)
             printf("figure roughness_%d_%.0f %.3f of the light\n", asg, 100 * roughness[i], all / even);
         CHECK(fabs(all / even - 1) < 0.12);
+        if (!i) { /* a sky of the radiance that the lights are together */
+            show(&object, NULL, 0, MANY / (ssdgs_real)4, shot + 1);           /* red has intensity 1 */
+            const double of_sky = (double)shot[1].value[middle - 6 * PIXELS]; /* in scattering */
+            if (!CHECK(fabs(of_sky / all - 1) < (asg == SSDGS_ASG_DEFERRED ? 0.03 : 0.1)))
+                printf("    %d: %g of the sky, %g of lights\n", asg, of_sky, all);
+        }
         show(&object, &ahead, 1, 0, shot + 1);
         if (i > 0) CHECK((double)shot[1].value[middle] < last);
         if (i > 0) last = (double)shot[1].value[middle];
@@ -289,6 +295,35 @@ static void test_wax(void) {
         printf("figure wax_%d %.1f dB from path tracing; in all %.2f, %.2f, %.2f of the light\n", side, dB,
                ratio[0], ratio[1], ratio[2]);
         CHECK(dB > 26 - 4 * side);
+    }
+    ssdgs_model_destroy(model);
+}
+
+/* A Gaussian that is not finite leaves its neighbours as they are, and so does a light too far away for a
+   distance^2. */
+static void test_broken(void) {
+    ssdgs_settings settings = wax();
+    settings.terms = SSDGS_ALL_TERMS;
+    ssdgs_model *model = cloud(&settings, 0, 200, 0.5);
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_light lights[2] = {point_light(1, -2, 2), point_light(real64 ? 1e200 : 1e25, 0, 0)};
+    for (int i = 0; i < 4; i++) {
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
+        const size_t at = i % 2 ? 70 : 0; /* of the first block, and so of another */
+        const ssdgs_real was = v.gaussians[at], opacity = v.gaussians[SSDGS_OPACITY * v.stride + at];
+        v.gaussians[SSDGS_OPACITY * v.stride + at] = -20; /* shows nothing */
+        show(&object, lights, 1, 0, shot);
+        if (i < 2) show(&object, lights, 2, 0, shot + 1);
+        else {
+            ssdgs_model_arrays(model);
+            v.gaussians[at] = (ssdgs_real)(i % 2 ? INFINITY : NAN);
+            show(&object, lights, 1, 0, shot + 1);
+            ssdgs_model_arrays(model);
+        }
+        v.gaussians[at] = was;
+        v.gaussians[SSDGS_OPACITY * v.stride + at] = opacity;
+        CHECK(!shot[1].stats.blackened && shot[1].stats.shaded == shot[0].stats.shaded);
+        CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, 1e-4, 1e-3, "beside what is broken");
     }
     ssdgs_model_destroy(model);
 }
@@ -600,6 +635,7 @@ int main(void) {
     }
     TEST_ROW("93", "media in code", (test_translucency(), test_media()));
     if (!real64) test_wax();
+    test_broken();
     test_metal();
     test_brushed();
     test_refused();

@@ -292,8 +292,47 @@ static void test_edges(void) {
     for (int i = 0; i < 2; i++) ssdgs_context_destroy(contexts[i]);
 }
 
+/* The same whatever was drawn before: here what the first of the lights that tell what is seen shows. */
+static void test_after_frame(void) {
+    static ssdgs_real color[PIXELS * 3];
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_context *context = open_context(1);
+    ssdgs_model *models[2];
+    for (int i = 0; i < 2; i++) {
+        ssdgs_settings settings = ssdgs_settings_default();
+        settings.transport = 0; /* so a frame asks for no flux */
+        models[i] = new_model(context, &settings, 300);
+        for (int k = 0; k < 300; k++) {
+            const ssdgs_gaussian g = any(k);
+            set(models[i], k, &g);
+        }
+        if (i) {
+            const double z = 1 - 1.0 / SSDGS__REDUCE_VIEWS;
+            const ssdgs_real eye[3] = {0, -3, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+            const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, SIDE, SIDE);
+            ssdgs_light light;
+            ssdgs_image image;
+            memset(&light, 0, sizeof light);
+            memset(&image, 0, sizeof image);
+            light.kind = SSDGS_LIGHT_DIRECTIONAL;
+            light.position[0] = (ssdgs_real)sqrt(1 - z * z);
+            light.position[2] = (ssdgs_real)z;
+            for (int c = 0; c < 3; c++) light.intensity[c] = 1;
+            image.color = color;
+            CHECK(!ssdgs_render_ex(models[i], &camera, &light, 1, &options, &image, NULL));
+        }
+        CHECK(!ssdgs_model_reduce(models[i], 100));
+    }
+    const ssdgs_model_view a = ssdgs_model_arrays(models[0]), b = ssdgs_model_arrays(models[1]);
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+        CHECK(!memcmp(a.gaussians + c * a.stride, b.gaussians + c * b.stride, 100 * sizeof(ssdgs_real)));
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(models[i]);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     test_moments();
+    test_after_frame();
     test_twins();
     test_hidden(0);
     test_hidden(1);

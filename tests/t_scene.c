@@ -441,6 +441,23 @@ static void test_baked(void) {
         CHECK(fabs((double)(stored - (ssdgs_real)(0.25 * (c + 1)))) < 1e-5);
         CHECK(fabs((double)(linear - ssdgs_srgb_decode((ssdgs_real)(0.25 * (c + 1))))) < 1e-5);
     }
+    { /* nothing shadows what is baked, whether lights have maps or not */
+        ssdgs_scene *fresh = NULL;
+        s.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
+        ssdgs_model *bright = cloud(&s, 0, 100, 0.1);
+        ssdgs_object beside[2] = {object[0], object[1]};
+        beside[1].model = bright;
+        CHECK(!ssdgs_scene_create(context, &fresh));
+        for (int pass = 0; pass < 2; pass++) {
+            const ssdgs_image image = planes_of(shot);
+            CHECK(!ssdgs_scene_render(fresh, beside, 2, &camera, &light, 1, NULL, &image, NULL));
+            CHECK(fabs((double)(shot->value[17 * PIXELS + middle] / shot->value[15 * PIXELS + middle]) - 1) <
+                  1e-5);
+            CHECK(!ssdgs_scene_light(fresh, beside, 2, &light, 1, NULL));
+        }
+        ssdgs_scene_destroy(fresh);
+        ssdgs_model_destroy(bright);
+    }
 #ifndef __FAST_MATH__
     for (int i = 0; i < 2; i++) { /* not finite: black, as beside no other */
         ssdgs_model_arrays(plain).gaussians[SSDGS_DIFFUSE * plain->capacity] =
@@ -957,6 +974,7 @@ static void test_matrices(void) {
             CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
             *in = kept;
         }
+        CHECK(ssdgs_camera_from_matrices(context, v, p, flags | 4, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
         v[0] *= 2;
         CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
         v[0] = (ssdgs_real)NAN;
@@ -1167,6 +1185,151 @@ static void test_local_lights(void) {
     for (int i = 0; i < MANY; i++) ssdgs_model_destroy(models[i]);
 }
 
+/* A light of any kind, about around 0. */
+static ssdgs_light any_light(uint64_t at) {
+    double d[3], length = 0;
+    for (int c = 0; c < 3; c++) {
+        d[c] = 2 * draw(at + (uint64_t)c) - 1;
+        length += d[c] * d[c];
+    }
+    length = sqrt(length) + 1e-9;
+    const int kind = (int)(3 * draw(at + 3));
+    ssdgs_light light = kind == 1 ? parallel_light(d[0] / length, d[1] / length, d[2] / length)
+                                  : point_light(2 * d[0], 2 * d[1], 2 * d[2]);
+    if (kind == 2) light.kind = SSDGS_LIGHT_SPOT;
+    for (int c = 0; c < 3; c++) light.direction[c] = (ssdgs_real)(-d[c] / length);
+    light.cone[0] = (ssdgs_real)(0.3 * draw(at + 4));
+    light.cone[1] = light.cone[0] + (ssdgs_real)(0.1 + draw(at + 5));
+    if (draw(at + 6) < 0.3) light.range = (ssdgs_real)(1 + 3 * draw(at + 7));
+    if (draw(at + 8) < 0.3) light.focus = 2;
+    light.unshadowed = draw(at + 9) < 0.2;
+    return light;
+}
+
+/* Whatever an engine changes, in any order: a frame is what a new scene makes of it, and its colours do not
+   depend on the planes that are asked for. */
+static void test_anything(void) {
+    enum { MODELS = 4, OBJECTS = 4, LIGHTS = 3, SEQUENCES = 12, STEPS = 25, CHANGES = 13 };
+    for (uint64_t sequence = 0; sequence < SEQUENCES; sequence++) {
+        uint64_t at = 50000 + 10000 * sequence;
+        ssdgs_model *models[MODELS];
+        ssdgs_object objects[OBJECTS];
+        ssdgs_light lights[LIGHTS];
+        ssdgs_camera camera = camera_from(0.3, -3, 1);
+        ssdgs_render_options options = ssdgs_render_options_default();
+        int count = OBJECTS, light_count = LIGHTS;
+        for (int i = 0; i < MODELS; i++) { /* two of other lobes, one of lobes of its own, one baked */
+            ssdgs_settings settings = small_settings();
+            if (i == 2) settings.asg = SSDGS_ASG_GEOMETRIC;
+            if (i == 3) settings.baked = 1;
+            if (sequence % 3 == 1) settings.shadow.layers = 0;
+            settings.light_map.size = sequence % 2 ? 0 : 64;
+            models[i] = cloud(&settings, 400 + 100 * i, 70, 0.4);
+        }
+        ssdgs_model_arrays(models[1]).asg_sharpness[0] += 1;
+        for (int i = 0; i < OBJECTS; i++)
+            objects[i] = placed(models[i], 6 * draw(at + (uint64_t)i), 1, i & 1, 0.8 * i - 1.2, 0.3 * i, 0);
+        for (int i = 0; i < LIGHTS; i++) lights[i] = any_light(at + 20 * (uint64_t)(1 + i));
+        for (int step = 0; step < STEPS; step++) {
+            at += 100;
+            ssdgs_object *object = objects + (int)(OBJECTS * draw(at));
+            ssdgs_light *light = lights + (int)(LIGHTS * draw(at + 1));
+            const ssdgs_real some = (ssdgs_real)draw(at + 2);
+            switch ((int)(CHANGES * draw(at + 3))) {
+            case 0: object->to_world[3] += some - (ssdgs_real)0.5; break;
+            case 1: object->model = models[(int)(MODELS * draw(at + 4))]; break;
+            case 2: object->tint[1] = 2 * some, object->roughness = (ssdgs_real)0.5 + some; break;
+            case 3: object->translucency = (ssdgs_real)0.5 + some; break;
+            case 4: *light = any_light(at + 10); break;
+            case 5: light->range = light->range > 0 ? 0 : 1 + 2 * some; break;
+            case 6: light->focus = light->focus > 0 ? 0 : 3 * some; break;
+            case 7: light->unshadowed = !light->unshadowed; break;
+            case 8: light->intensity[0] = some > (ssdgs_real)0.7 ? 4 : 0; break;
+            case 9:
+                options.terms = draw(at + 5) < 0.5 ? SSDGS_ALL_TERMS : 1 + (int)(15 * draw(at + 6));
+                break;
+            case 10: count = 1 + (int)(OBJECTS * draw(at + 7)); break;
+            case 11: light_count = (int)((LIGHTS + 1) * draw(at + 8)); break;
+            case 12: options.ambient[0][1] = some; break;
+            }
+            if (draw(at + 9) < 0.1) ssdgs_model_arrays(models[0]).gaussians[5] += (ssdgs_real)0.1;
+            if (draw(at + 30) < 0.3) camera = camera_from(2 * draw(at + 31) - 1, -3, 1);
+            const ssdgs_image planes[2] = {planes_of(shot), planes_of(shot + 1)};
+            ssdgs_image bare;
+            ssdgs_scene *fresh = NULL;
+            memset(&bare, 0, sizeof bare);
+            bare.color = shot[2].value;
+            const int bare_first = draw(at + 32) < 0.5;
+            for (int i = 0; i < 2; i++)
+                if (!CHECK(!ssdgs_scene_render(scene, objects, count, &camera, lights, light_count, &options,
+                                               i == bare_first ? planes : &bare, NULL)))
+                    printf("    %s\n", ssdgs_error_message(context));
+            CHECK(!ssdgs_scene_create(context, &fresh));
+            CHECK(!ssdgs_scene_render(fresh, objects, count, &camera, lights, light_count, &options,
+                                      planes + 1, NULL));
+            ssdgs_scene_destroy(fresh);
+            const int kept = CHECK(same(shot, shot + 1)),
+                      alike = CHECK(!memcmp(shot[0].value, shot[2].value, 3 * PIXELS * sizeof(ssdgs_real)));
+            if (!kept || !alike) printf("    sequence %d, step %d\n", (int)sequence, step);
+        }
+        for (int i = 0; i < MODELS; i++) ssdgs_model_destroy(models[i]);
+    }
+}
+
+/* A veil that a spot misses stands before a wall that it lights. The wall is as bright whether the veil is of
+   the same model, another object, or a mirror of it that is lit by itself, and whatever planes are asked for.
+ */
+static void test_missed(void) {
+    const ssdgs_camera camera = camera_from(0, -3, 0);
+    double first = 0;
+    ssdgs_settings settings = small_settings();
+    settings.shadow.layers = 0;
+    ssdgs_model *both = NULL, *parts[2] = {NULL, NULL};
+    CHECK(!ssdgs_model_create(context, &settings, 128, &both));
+    for (int i = 0; i < 2; i++) CHECK(!ssdgs_model_create(context, &settings, 64, parts + i));
+    for (int i = 0; i < 128; i++) {
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        g.position[0] = (ssdgs_real)(0.1 * (i % 8) - 0.35);
+        g.position[1] = (ssdgs_real)(i < 64 ? -0.5 : 0.5);
+        g.position[2] = (ssdgs_real)(0.1 * (i / 8 % 8) - 0.35);
+        for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)(c < 2 ? 0.06 : 0.01);
+        g.rotation[0] = g.rotation[1] = 1;
+        g.normal[1] = -1;
+        g.opacity = (ssdgs_real)(i < 64 ? 0.3 : 0.9);
+        g.softness = 1;
+        CHECK(!ssdgs_model_set(both, i, &g) && !ssdgs_model_set(parts[i / 64], i % 64, &g));
+    }
+    ssdgs_gaussian g; /* with other lobes it is another material */
+    ssdgs_model *other = NULL;
+    CHECK(!ssdgs_model_create(context, &settings, 64, &other));
+    for (int i = 0; i < 64; i++) CHECK(!ssdgs_model_get(parts[0], i, &g) && !ssdgs_model_set(other, i, &g));
+    ssdgs_model_arrays(other).asg_sharpness[0] += 1;
+    ssdgs_light spot = point_light(0, -0.4, 0);
+    spot.kind = SSDGS_LIGHT_SPOT;
+    memset(spot.direction, 0, sizeof spot.direction);
+    spot.direction[1] = 1;
+    spot.cone[0] = (ssdgs_real)0.2;
+    spot.cone[1] = (ssdgs_real)0.6;
+    for (int c = 0; c < 3; c++) spot.intensity[c] = 3;
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    for (int way = 0; way < 3; way++) {
+        const ssdgs_object objects[2] = {ssdgs_object_default(way ? parts[1] : both),
+                                         ssdgs_object_default(way == 1 ? parts[0] : other)};
+        ssdgs_image image = planes_of(shot), bare;
+        CHECK(!ssdgs_scene_render(scene, objects, way ? 2 : 1, &camera, &spot, 1, &options, &image, NULL));
+        memset(&bare, 0, sizeof bare);
+        bare.color = shot[1].value;
+        CHECK(!ssdgs_scene_render(scene, objects, way ? 2 : 1, &camera, &spot, 1, &options, &bare, NULL));
+        CHECK(!memcmp(shot[0].value, shot[1].value, 3 * PIXELS * sizeof(ssdgs_real)));
+        const double red = (double)shot->value[3 * (SIDE / 2 * SIDE + SIDE / 2)];
+        if (!way) first = red;
+        if (!CHECK(fabs(red / first - 1) < 0.03)) printf("    %d: %g, not %g\n", way, red, first);
+    }
+    ssdgs_model_destroy(both), ssdgs_model_destroy(other);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(parts[i]);
+}
+
 /* ---- what is kept, and what is not ---- */
 
 static void test_kept(void) {
@@ -1209,6 +1372,18 @@ static void test_kept(void) {
         CHECK(!ssdgs_scene_render(other, object, change > 2 ? 2 : 3, &camera, lights, 2, &options, &image,
                                   NULL));
         CHECK(same(shot + 1, shot + 2) && !same(shot, shot + 1));
+        ssdgs_scene_destroy(other);
+    }
+    /* a focus, with which a light lights less: its map covers what it reaches, not all */
+    for (int turn = 0; turn < 2; turn++) {
+        ssdgs_scene *other = NULL;
+        const ssdgs_image image = planes_of(shot + 1);
+        lights[0].direction[1] = 1;
+        lights[0].focus = (ssdgs_real)!turn;
+        together(object, 2, &camera, lights, 2, &options, shot);
+        CHECK(!ssdgs_scene_create(context, &other));
+        CHECK(!ssdgs_scene_render(other, object, 2, &camera, lights, 2, &options, &image, NULL));
+        CHECK(same(shot, shot + 1) && shot->stats.lights_cached == 1);
         ssdgs_scene_destroy(other);
     }
     /* a larger model out of sight and reach: what is kept of the others lies elsewhere then */
@@ -1618,6 +1793,8 @@ int main(void) {
     test_look_at();
     test_matrices();
     test_left_handed();
+    test_missed();
+    test_anything();
     test_kept();
     TEST_ROW("94", "objects out of sight", test_out_of_sight());
     TEST_ROW("95", "lights that reach some", test_local_lights());
