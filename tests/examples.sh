@@ -97,7 +97,7 @@ check "--set batch=3" says 0 "iterations left" "$build/train" "$set" -o "$out/ba
 check "a checkpoint after the hundredth" grep -q SSDGSCK "$out/batch.ply.ckpt"
 check "which goes on" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/batch.ply" --iterations 180 --points 200 --threads 1 --set batch=3 --resume
 
-check "a last batch that goes past the end" says 0 "60/60" "$build/train" "$set" -o "$out/batch.ply" --iterations 60 --points 200 --threads 1 --set batch=8
+check "a last batch that goes past the end" says 0 "60/60" "$build/train" "$set" -o "$out/past.ply" --iterations 60 --points 200 --threads 1 --set batch=8
 check "is not told of" lacks "64/60"
 
 # fewer Gaussians, trained on
