@@ -74,34 +74,35 @@ int main(int argc, char **argv) {
         double value;
         const size_t used = olat__parse_number(argv[i], &value);
         if (!strcmp(argv[i], "--focal")) {
-            if (++i == argc || argv[i][olat__parse_number(argv[i], &focal)] || !(focal > 0)) return usage();
+            if (++i == argc || argv[i][olat__parse_number(argv[i], &focal)] || !(focal > 0 && focal < 1e30))
+                return usage();
         } else if (numbers < 3) {
-            if (!used || argv[i][used]) return usage();
+            if (!used || argv[i][used] || !(fabs(value) < 1e30)) return usage();
             circle[numbers++] = value;
         } else if (argv[i][0] == '-') return usage();
         else argv[images++] = argv[i];
     }
     if (numbers < 3 || !images || !(circle[2] > 0)) return usage();
-    for (int i = 0; i < images && !failed; i++) {
+    for (int i = 0; i < images; i++) {
         char error[512];
         int width = 0, height = 0;
         ssdgs_pixels format;
         void *pixels = NULL;
         double at[2], direction[3];
         const char *problem;
-        failed = olat_read_png(argv[i], &width, &height, &format, &pixels, error);
-        unsigned char *bytes = failed ? NULL : (unsigned char *)malloc(4 * (size_t)width * (size_t)height);
+        const int unread = olat_read_png(argv[i], &width, &height, &format, &pixels, error);
+        unsigned char *bytes = unread ? NULL : (unsigned char *)malloc(4 * (size_t)width * (size_t)height);
         for (size_t p = 0; bytes && p < 4 * (size_t)width * (size_t)height; p++)
             bytes[p] = (unsigned char)(255 * olat__number(pixels, format, p) + (ssdgs_real)0.5);
         const double centre[2] = {0.5 * width, 0.5 * height};
-        problem = failed ? error : !bytes ? "out of memory" : highlight(bytes, width, height, circle, at);
+        problem = unread ? error : !bytes ? "out of memory" : highlight(bytes, width, height, circle, at);
         if (!problem && !reflected(circle, at, focal, centre, direction))
             problem = "the highlight lies beside the ball";
         if (problem)
-            fprintf(stderr, failed ? "ball: %s\n" : "ball: %s: %s\n", failed ? problem : argv[i], problem);
+            fprintf(stderr, unread ? "ball: %s\n" : "ball: %s: %s\n", unread ? problem : argv[i], problem);
         else
             printf("%s: \"pl_dir\": [%.6f, %.6f, %.6f]\n", argv[i], direction[0], direction[1], direction[2]);
-        failed = problem != NULL;
+        failed |= problem != NULL;
         free(bytes);
         free(pixels);
     }

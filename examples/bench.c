@@ -1332,6 +1332,8 @@ static char *path_beside(const char *program, const char *ending) {
     const size_t length = strlen(program),
                  stem = length > 4 && !strcmp(program + length - 4, ".exe") ? length - 4 : length;
     char *path = (char *)make(length + 16, 1);
+    if (!strchr(program, '/') && !strchr(program, '\\'))
+        die(program, "start it by its path, as build/bench: it writes beside itself");
     snprintf(path, length + 16, "%.*s%s", (int)stem, program, ending);
     return path;
 }

@@ -220,7 +220,7 @@ static int report_photographs(check *k) {
             share > 0.08 ? ": a bright room, or an object that light passes. Darken the room, or train "
                            "with --refine, which learns even light from the room"
                          : ": the room is dark");
-    } else
+    } else if (least_cosine >= 0.7) /* else what is lit from the side is black */
         say(k, 1,
             "all lights are within %.0f degrees of their camera: few shadows tell light from the room, and "
             "colour from light",
@@ -307,8 +307,10 @@ static int report_training(check *k) {
     ssdgs_photo *photos = olat_photos(k->sets);
     ssdgs_model *model = NULL;
     ssdgs_trainer *trainer = NULL;
+    ssdgs_settings settings = ssdgs_settings_default();
     pace p = {0, 0, 0};
-    ssdgs_result result = photos ? ssdgs_model_create(k->context, NULL, 0, &model) : SSDGS_ERR_MEMORY;
+    for (int c = 0; c < 3; c++) settings.origin[c] = (ssdgs_real)k->sets[0].origin[c]; /* notes name places */
+    ssdgs_result result = photos ? ssdgs_model_create(k->context, &settings, 0, &model) : SSDGS_ERR_MEMORY;
     if (!result) result = ssdgs_trainer_create(model, photos, k->sets[0].count, &k->options, &trainer);
     if (!result) result = ssdgs_trainer_run(trainer, keep_time, &p);
     if (result == SSDGS_ERR_CANCELLED) result = SSDGS_OK;
@@ -492,6 +494,8 @@ int main(int argc, char **argv) {
                 at += used + (c < 5);
                 (c < 3 ? k.options.bounds_min : k.options.bounds_max)[c % 3] = (ssdgs_real)box[c];
             }
+            for (int c = 0; c < 3; c++)
+                if (!(box[c] < box[c + 3])) return fail("--bounds: the first corner is below the second"), 2;
         } else if (argv[i][0] != '-' && !k.dataset) k.dataset = argv[i];
         else return usage();
     }

@@ -292,12 +292,21 @@ static ssdgs_result draw_frame(level *l, float t) {
     return result;
 }
 
+/* The library's notes, of what loading mended for instance. */
+static void hear(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    if (code == SSDGS_OK) fprintf(stderr, "engine: note: %s\n", message);
+}
+
 static ssdgs_result open_level(level *l, const char *const models[2]) {
     const ssdgs_occluder meshes = {mesh_shadow, l, 1}; /* the box does not move; a moving one changes the 1 */
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
     memcpy(l->box_low, low, sizeof low);
     memcpy(l->box_high, high, sizeof high);
-    ssdgs_result result = ssdgs_context_create(NULL, &l->context);
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    ssdgs_result result = ssdgs_context_create(&desc, &l->context);
     for (int i = 0; i < 2 && !result; i++)
         result = models[i] ? ssdgs_model_load(l->context, models[i], l->models + i, NULL)
                            : make_ball(l->context, i, l->models + i);
@@ -317,6 +326,13 @@ static int write_png(const char *prefix, const char *name, int width, int height
     return 1;
 }
 
+/* A whole number, 0 where the text is none. */
+static int number(const char *text) {
+    char *end;
+    const long value = strtol(text, &end, 10);
+    return *end || value < 0 || value > 9999 ? 0 : (int)value;
+}
+
 int main(int argc, char **argv) {
     const char *out = "build/engine_", *models[2] = {NULL, NULL};
     int frames = 120, given = 0, failed = 0;
@@ -324,10 +340,10 @@ int main(int argc, char **argv) {
     memset(&l, 0, sizeof l);
     l.width = 480, l.height = 270;
     for (int i = 1; i < argc && !failed; i++) {
-        if (!strcmp(argv[i], "--frames") && i + 1 < argc) frames = atoi(argv[++i]);
+        if (!strcmp(argv[i], "--frames") && i + 1 < argc) frames = number(argv[++i]);
         else if (!strcmp(argv[i], "--out") && i + 1 < argc) out = argv[++i];
         else if (!strcmp(argv[i], "--size") && i + 2 < argc)
-            l.width = atoi(argv[++i]), l.height = atoi(argv[++i]);
+            l.width = number(argv[++i]), l.height = number(argv[++i]);
         else if (argv[i][0] != '-' && given < 2) models[given++] = argv[i];
         else failed = 1;
     }

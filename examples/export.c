@@ -380,8 +380,10 @@ static double psnr(const unsigned char *sheet, int a, int b) {
 
 /* ---- the program ---- */
 
-/* The model's place, and a light above its left side, as bright there as the photographs' on average. */
-static ssdgs_result look(exporter *e, const float *from) {
+/* The model's place, and a light, given in the dataset's coordinates or above its left side, as bright there
+   as the photographs' on average. */
+static ssdgs_result look(exporter *e, const double *from, char *error) {
+    const ssdgs_settings *settings = ssdgs_model_settings(e->model);
     float low[3], high[3], distance2 = 0;
     const float direction[3] = {-0.5f, -0.7f, 0.5f};
     const ssdgs_result result = ssdgs_model_bounds(e->model, low, high);
@@ -391,11 +393,18 @@ static ssdgs_result look(exporter *e, const float *from) {
     }
     e->light.kind = SSDGS_LIGHT_POINT;
     for (int c = 0; c < 3; c++) {
-        e->light.position[c] = from ? from[c] : e->middle[c] + 4 * e->radius * direction[c];
+        e->light.position[c] = from ? (float)(from[c] - (double)settings->origin[c])
+                                    : e->middle[c] + 4 * e->radius * direction[c];
         distance2 += (e->light.position[c] - e->middle[c]) * (e->light.position[c] - e->middle[c]);
     }
-    for (int c = 0; c < 3; c++)
-        e->light.intensity[c] = distance2 / ssdgs_model_settings(e->model)->light_scale;
+    for (int c = 0; c < 3; c++) e->light.intensity[c] = distance2 / settings->light_scale;
+    if (!result && !(distance2 > 0)) olat__fail(error, "--light: it is in the middle of the object");
+    for (int c = 0; c < 3 && !result; c++)
+        if (settings->origin[c] < 0 || settings->origin[c] > 0) {
+            printf("positions are relative to %.9g %.9g %.9g\n", (double)settings->origin[0],
+                   (double)settings->origin[1], (double)settings->origin[2]);
+            break;
+        }
     return result;
 }
 
@@ -432,11 +441,16 @@ static ssdgs_result work(exporter *e, const char *prefix, char *error) {
     return result;
 }
 
+/* The library's notes on the model, not on what is read again. */
+static void hear(void *user, ssdgs_result code, const char *message) {
+    if (code == SSDGS_OK && !((const exporter *)user)->splats) fprintf(stderr, "export: note: %s\n", message);
+}
+
 static int usage(void) {
     fprintf(stderr, "usage: export MODEL.ply PREFIX [--linear] [--light X Y Z]\n"
                     "writes PREFIX.glb, PREFIX.ply, PREFIX.splat and, to compare, PREFIX.png\n"
                     "  --linear       the GLB's colours are linear light: nearer, where viewers know it\n"
-                    "  --light X Y Z  where the light is; else above the left side\n");
+                    "  --light X Y Z  where the light is, as in the dataset; else above the left side\n");
     return 2;
 }
 
@@ -446,14 +460,17 @@ int main(int argc, char **argv) {
     ssdgs_context_desc desc;
     olat_guard guard;
     const char *names[2] = {NULL, NULL};
-    float from[3];
+    double from[3];
     char error[512] = "";
     int given = 0, lit = 0;
     memset(&e, 0, sizeof e);
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--linear")) e.linear = 1;
         else if (!strcmp(argv[i], "--light") && i + 3 < argc) {
-            for (lit = 0; lit < 3; lit++) from[lit] = (float)atof(argv[++i]);
+            for (lit = 0; lit < 3; lit++) {
+                const size_t used = olat__parse_number(argv[++i], from + lit);
+                if (!used || argv[i][used] || !(fabs(from[lit]) < 1e30)) return usage();
+            }
         } else if (argv[i][0] != '-' && given < 2) names[given++] = argv[i];
         else return usage();
     }
@@ -472,6 +489,8 @@ int main(int argc, char **argv) {
     hook.stage[SSDGS_STAGE_WALK] = see_all;
     hook.stage[SSDGS_STAGE_COMPOSITE] = take_colors;
     desc.gpu = &hook;
+    desc.logger.write = hear;
+    desc.logger.user = &e;
     ssdgs_result result = failed ? SSDGS_OK : ssdgs_context_create(&desc, &e.context);
     if (!failed && !result) result = ssdgs_model_load(e.context, names[0], &e.model, NULL);
     if (e.model) e.count = ssdgs_model_peek(e.model).count;
@@ -485,8 +504,8 @@ int main(int argc, char **argv) {
         e.bytes = (unsigned char *)malloc(8192 + 72 * (size_t)e.count);
         if (!e.splats || !e.normals || !e.sums || !e.bytes) failed = olat__fail(error, "out of memory");
     }
-    if (!failed && !result) result = look(&e, lit ? from : NULL);
-    if (!failed && !result) result = work(&e, names[1], error);
+    if (!failed && !result) result = look(&e, lit ? from : NULL, error);
+    if (!failed && !result && !*error) result = work(&e, names[1], error);
     if (*error) fprintf(stderr, "%s\n", error);
     else if (result) fprintf(stderr, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(e.context));
     ssdgs_model_destroy(e.model);

@@ -53,6 +53,10 @@ int main(int argc, char **argv) {
     ssdgs_model *model = NULL;
     char error[512] = "";
 
+    if (argc > 2 || path[0] == '-') {
+        fprintf(stderr, "usage: minimal [PICTURE.png]\n");
+        return 2;
+    }
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
     settings.shadow.layers = 0;     /* nothing here is trained */
     settings.light_map.bias = 0.2f; /* discs as coarse as these must not shadow their neighbours */

@@ -1921,6 +1921,11 @@ static void olat__read_lights(olat__json *j, const olat__node *node, const doubl
         if (frame->more) frame->more_count = count - 1;
         else olat__json_fail(j, node, "out of memory");
     }
+    static const char *const own[5] = {"pl_pos", "pl_dir", "pl_intensity", "pl_mu", "pl_axis"};
+    for (int i = 0; i < 5 && olat__find(j, node, "pl_lights"); i++) {
+        const olat__node *key = olat__find(j, node, own[i]);
+        if (key) olat__json_fail(j, key, "beside pl_lights: each light there has its own");
+    }
     for (int i = 0; i < count && !j->failed; i++) {
         const olat__node *light = olat__light_node(j, node, i);
         if (light->type != OLAT__OBJECT) olat__json_fail(j, light, "an object was expected");

@@ -129,6 +129,8 @@ static int parse(job *j, int argc, char **argv) {
     }
     j->out = j->given[OUT_FOLDER];
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
+    if (j->given[TRAJECTORY] && (j->given[SPLIT] || j->given[FIT]))
+        return usage("--trajectory has no photographs: not for it is", j->given[FIT] ? "--fit" : "--split");
     const char *value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
     else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid"))
@@ -186,11 +188,17 @@ static const char *base_name(const olat_frame *frame) {
     return slash ? slash + 1 : frame->file;
 }
 
+/* A file name's length without its extension. */
+static size_t stem(const char *name) {
+    const char *dot = strrchr(name, '.');
+    return dot ? (size_t)(dot - name) : strlen(name);
+}
+
 /* OUT/NAME + SUFFIX.png, NAME being the frame's file name without its extension; without a frame OUT/SUFFIX.
    To be freed. */
 static char *output_path(const job *j, const olat_frame *frame, const char *suffix) {
-    const char *name = frame ? base_name(frame) : "", *dot = strrchr(name, '.');
-    const size_t length = dot ? (size_t)(dot - name) : strlen(name);
+    const char *name = frame ? base_name(frame) : "";
+    const size_t length = stem(name);
     char *path = (char *)malloc(strlen(j->out) + length + strlen(suffix) + 8);
     if (path) sprintf(path, "%s/%.*s%s%s", j->out, (int)length, name, suffix, frame ? ".png" : "");
     else fail("out of memory");
@@ -233,7 +241,8 @@ static int check_outputs(job *j) {
         ok = check_output(j, path);
         free(path);
     }
-    return ok && (!j->given[SHEET] || check_output(j, j->given[SHEET]));
+    if (!ok || !j->given[SHEET]) return ok;
+    return check_output(j, j->given[SHEET]) && (!olat_check_writable(j->given[SHEET], error) || !fail(error));
 }
 
 static void write_numbers(olat__writer *w, const score *s) {
@@ -532,11 +541,12 @@ static void paste(job *j, const olat_frame *frame, int row, int column) {
             }
 }
 
-/* Regardless of case, as some file systems are. */
+/* Without extensions, which the outputs have not, and regardless of case, as some file systems are. */
 static int compare_names(const void *a, const void *b) {
     const char *x = *(const char *const *)a, *y = *(const char *const *)b;
-    while (*x && tolower((unsigned char)*x) == tolower((unsigned char)*y)) x++, y++;
-    return tolower((unsigned char)*x) - tolower((unsigned char)*y);
+    const char *const ends[2] = {x + stem(x), y + stem(y)};
+    while (x < ends[0] && y < ends[1] && tolower((unsigned char)*x) == tolower((unsigned char)*y)) x++, y++;
+    return (x < ends[0] ? tolower((unsigned char)*x) : 0) - (y < ends[1] ? tolower((unsigned char)*y) : 0);
 }
 
 /* Whether one frame's name is another's with the suffix of an output. */
@@ -544,12 +554,12 @@ static int names_overlap(const char *const *names, int count) {
     int overlap = 0;
     for (int i = 0; i < count; i++)
         for (int output = DIFFUSE; output < OUTPUT_COUNT; output++) {
-            const char *end = strstr(names[i], suffixes[output]);
+            const size_t length = stem(names[i]), ending = strlen(suffixes[output]);
             char other[256];
             const char *key = other;
-            if (!end || end[strlen(suffixes[output])] != '.') continue;
-            snprintf(other, sizeof other, "%.*s%.16s", (int)(end - names[i] < 200 ? end - names[i] : 200),
-                     names[i], end + strlen(suffixes[output]));
+            if (length < ending || memcmp(names[i] + length - ending, suffixes[output], ending)) continue;
+            snprintf(other, sizeof other, "%.*s.", (int)(length - ending < 250 ? length - ending : 250),
+                     names[i]);
             overlap |= bsearch(&key, names, (size_t)count, sizeof *names, compare_names) != NULL;
         }
     return overlap;

@@ -21,6 +21,12 @@ static int usage(void) {
     return 2;
 }
 
+/* The library's notes, of what loading mended for instance. */
+static void hear(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    if (code == SSDGS_OK) fprintf(stderr, "view: note: %s\n", message);
+}
+
 int main(int argc, char **argv) {
     static view_server s;
     char error[512] = "", page[OLAT__MAX_PATH] = "";
@@ -41,6 +47,7 @@ int main(int argc, char **argv) {
     memset(&desc, 0, sizeof desc);
     desc.tracer.stage = view_stage;
     desc.tracer.user = &s.show;
+    desc.logger.write = hear;
     gpu *const device = wants_gpu ? gpu_create(error, sizeof error) : NULL;
     ssdgs_gpu_hook hook;
     if (device) {

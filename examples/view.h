@@ -174,7 +174,7 @@ static void view__serve(view_server *s, view__visitor *v, char *request) {
     const char *value;
     char *path, *rest, *query;
     size_t length = view__header(request, "connection", &value);
-    if (length == 5 && !memcmp(value, "close", 5)) v->leaves = 1;
+    if (length == 5 && olat__same_letters(value, "close", 5)) v->leaves = 1;
     length = view__header(request, "host", &value);
     if (!view__is_here(s, "", value, length)) {
         view__refuse(v, "403 Forbidden", "this is another host\n");

@@ -116,6 +116,17 @@ cp "$set/transforms_test.json" "$out/kept.json"
 cp "$out/names.json" "$set/transforms_test.json"
 check "names alike" says 0 "4 images" relight --out "$out/names" --components
 check "names alike are numbered" test -e "$out/names/0003_depth.png" -a ! -e "$out/names/r_000.png"
+sed -e 's|test/r_001|test/r_000_depth|' -e 's|test/r_002|test/r_000_depth_depth|' "$set/transforms_test.json" >"$out/names.json"
+cp "$set/test/r_002.png" "$set/test/r_000_depth_depth.png"
+cp "$set/transforms_test.json" "$out/names.kept" && cp "$out/names.json" "$set/transforms_test.json"
+check "a suffix twice" says 0 "4 images" relight --out "$out/names2" --components
+check "is numbered" test -e "$out/names2/0003_depth.png"
+cp "$out/names.kept" "$set/transforms_test.json"
+rm -f "$set/test/r_000_depth_depth.png"
+check "--trajectory --fit" says 2 "--trajectory has no photographs" relight --out "$out/names2" --trajectory --fit
+check "--trajectory --split" says 2 "--trajectory has no photographs" relight --out "$out/names2" --trajectory --split test
+check "a sheet that cannot be written" says 1 "cannot be written" relight --out "$out/unsheeted" --sheet "$out/no/such/sheet.png"
+check "is told before a picture is made" test ! -e "$out/unsheeted/r_000.png"
 cp "$out/kept.json" "$set/transforms_test.json"
 rm -f "$set/test/R_000.png" "$set/test/r_000_depth.png"
 check "the dataset is as it was" unchanged
@@ -252,6 +263,10 @@ check "no box" says 2 "^usage: check" "$build/check" "$set" --bounds 1,2,3
 check "no set" says 2 "^usage: check" "$build/check"
 
 # options of ball may stand anywhere
+check "--focal 1e999" says 2 "^usage: ball" "$build/ball" 20 20 10 "$set/test/r_000.png" --focal 1e999
+check "bounds the wrong way round" says 2 "first corner" "$build/check" "$set" --bounds 1,1,1,0,0,0
+check "engine --frames 2abc" says 2 "^usage: engine" engine --frames 2abc
+check "--light a b c" says 2 "^usage: export" export_of "$model" "$out/unlit" --light a b c
 check "ball" says 1 "r_000.png: " "$build/ball" --focal 500 20 20 10 "$set/test/r_000.png"
 
 rm -rf "$out"
