@@ -1277,8 +1277,8 @@ static void test_anything(void) {
 }
 
 /* A veil that a spot misses stands before a wall that it lights. The wall is as bright whether the veil is of
-   the same model, another object, or a mirror of it that is lit by itself, and whatever planes are asked for.
- */
+   the same model, another object, or one of other lobes, which is lit by itself, and whatever planes are
+   asked for. */
 static void test_missed(void) {
     const ssdgs_camera camera = camera_from(0, -3, 0);
     double first = 0;

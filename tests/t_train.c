@@ -908,7 +908,7 @@ static void test_refinement(void) {
         if (learns) break;
         CHECK(!ssdgs_refine_photo(model, disturbed, background, 60));
         CHECK(fabs((double)(disturbed[0].light.intensity[2] / photos[0].light.intensity[2]) - 1) < 0.03);
-        /* next to no light: a step goes no further than elsewhere; light that colours do not ask for stays */
+        /* in next to no light a step is no longer than the longest; a baked model's light stays */
         ssdgs_photo dark = photos[0];
         for (int c = 0; c < 3; c++) dark.light.intensity[c] = (ssdgs_real)1e-38;
         CHECK(!ssdgs_refine_photo(model, &dark, background, 1));
