@@ -11,6 +11,13 @@
 
 static int test_passed, test_failed;
 
+/* Whether there are denormal floats: -ffast-math may make them 0. */
+static inline int test_denormal(void) {
+    volatile float least = 1.2e-38f;
+    least *= 0.25f;
+    return least > 0;
+}
+
 static inline int test_check(int ok, const char *file, int line, const char *what) {
     if (ok) test_passed++;
     else test_failed++, printf("%s:%d: failed: %s\n", file, line, what);
