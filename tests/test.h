@@ -13,9 +13,8 @@ static int test_passed, test_failed;
 
 /* Whether there are denormal floats: -ffast-math may make them 0. */
 static inline int test_denormal(void) {
-    volatile float least = 1.2e-38f;
-    least *= 0.25f;
-    return least > 0;
+    const volatile float least = 1.2e-38f;
+    return least * 0.25f > 0;
 }
 
 static inline int test_check(int ok, const char *file, int line, const char *what) {
