@@ -170,7 +170,7 @@ ssdgs.h DOES NOT
 CHANGES
   0.2.2  The scattering network is 128 wide, not 64: metal and plastic train better. The trainer's options
          densify_shadow and prune_weight are gone; they had come to be worth nothing. What a spot, range or
-         focus misses darkens no more what it is blended with; ambient highlights are as bright as lamps'.
+         focus misses no longer darkens what it blends with; ambient highlights are as bright as lamps'.
   0.2.1  A highlight's colour is its energy, however narrow its lobe: glossy scenes train a little better.
   0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
          For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.

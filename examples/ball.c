@@ -72,12 +72,10 @@ int main(int argc, char **argv) {
     int numbers = 0, images = 0, failed = 0;
     for (int i = 1; i < argc; i++) {
         double value;
-        const size_t used = olat__parse_number(argv[i], &value);
         if (!strcmp(argv[i], "--focal")) {
-            if (++i == argc || argv[i][olat__parse_number(argv[i], &focal)] || !(focal > 0 && focal < 1e30))
-                return usage();
+            if (++i == argc || !olat_argument(argv[i], &focal) || !(focal > 0)) return usage();
         } else if (numbers < 3) {
-            if (!used || argv[i][used] || !(fabs(value) < 1e30)) return usage();
+            if (!olat_argument(argv[i], &value)) return usage();
             circle[numbers++] = value;
         } else if (argv[i][0] == '-') return usage();
         else argv[images++] = argv[i];

@@ -18,6 +18,8 @@
 #define COMPILER "unknown"
 #endif
 
+static char own_name[] = "bench";
+
 enum {
     SIDE = 256, /* px, of the timed frames */
     MAX_PHOTOS = 16,
@@ -1369,11 +1371,6 @@ static void scale_photo(const ssdgs_photo *from, ssdgs_photo *to) {
     to->pixels = pixels;
 }
 
-static void hear(void *user, ssdgs_result code, const char *message) {
-    (void)user;
-    if (code == SSDGS_OK) fprintf(stderr, "bench: note: %s\n", message);
-}
-
 /* What is wrong with the models is better known now; where they lie the dataset must be read. No output may
    be one of these files. */
 static void look_at_models(const char *dataset, char paths[2][1024], const char *program, double origin[3]) {
@@ -1383,7 +1380,8 @@ static void look_at_models(const char *dataset, char paths[2][1024], const char 
     memset(&guard, 0, sizeof guard);
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.logger.write = hear;
+    desc.logger.write = olat_hear;
+    desc.logger.user = own_name;
     ssdgs_context *context;
     check(NULL, ssdgs_context_create(&desc, &context));
     int failed = olat_guard_folder(&guard, dataset, "transforms_test.json", error);

@@ -495,7 +495,8 @@ int main(int argc, char **argv) {
                 (c < 3 ? k.options.bounds_min : k.options.bounds_max)[c % 3] = (ssdgs_real)box[c];
             }
             for (int c = 0; c < 3; c++)
-                if (!(box[c] < box[c + 3])) return fail("--bounds: the first corner is below the second"), 2;
+                if (!(box[c] < box[c + 3]))
+                    return fail("--bounds: the first corner must be below the second"), 2;
         } else if (argv[i][0] != '-' && !k.dataset) k.dataset = argv[i];
         else return usage();
     }

@@ -7,6 +7,8 @@
 #include "../ssdgs.h"
 #include "olat.h"
 
+static char program[] = "engine";
+
 enum { OBJECTS = 3, LIGHTS = 2, TILES = 24, SHEET = 3, BALL = 2000 };
 
 /* ---- the engine: its framebuffer, its triangles, its matrices (OpenGL's) ---- */
@@ -292,12 +294,6 @@ static ssdgs_result draw_frame(level *l, float t) {
     return result;
 }
 
-/* The library's notes, of what loading mended for instance. */
-static void hear(void *user, ssdgs_result code, const char *message) {
-    (void)user;
-    if (code == SSDGS_OK) fprintf(stderr, "engine: note: %s\n", message);
-}
-
 static ssdgs_result open_level(level *l, const char *const models[2]) {
     const ssdgs_occluder meshes = {mesh_shadow, l, 1}; /* the box does not move; a moving one changes the 1 */
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
@@ -305,7 +301,8 @@ static ssdgs_result open_level(level *l, const char *const models[2]) {
     memcpy(l->box_high, high, sizeof high);
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.logger.write = hear;
+    desc.logger.write = olat_hear;
+    desc.logger.user = program;
     ssdgs_result result = ssdgs_context_create(&desc, &l->context);
     for (int i = 0; i < 2 && !result; i++)
         result = models[i] ? ssdgs_model_load(l->context, models[i], l->models + i, NULL)

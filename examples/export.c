@@ -9,6 +9,8 @@
 #include "../ssdgs.h"
 #include "olat.h"
 
+static char program[] = "export";
+
 enum { SIDE = 256, VIEWS = 4, EYES = 14, GLB = 0, PLY, SPLAT, FILES };
 static const char *const suffix[FILES] = {".glb", ".ply", ".splat"};
 static const float harmonic = 0.28209479177387814f; /* of degree 0 */
@@ -443,7 +445,7 @@ static ssdgs_result work(exporter *e, const char *prefix, char *error) {
 
 /* The library's notes on the model, not on what is read again. */
 static void hear(void *user, ssdgs_result code, const char *message) {
-    if (code == SSDGS_OK && !((const exporter *)user)->splats) fprintf(stderr, "export: note: %s\n", message);
+    if (!((const exporter *)user)->splats) olat_hear(program, code, message);
 }
 
 static int usage(void) {
@@ -468,8 +470,7 @@ int main(int argc, char **argv) {
         if (!strcmp(argv[i], "--linear")) e.linear = 1;
         else if (!strcmp(argv[i], "--light") && i + 3 < argc) {
             for (lit = 0; lit < 3; lit++) {
-                const size_t used = olat__parse_number(argv[++i], from + lit);
-                if (!used || argv[i][used] || !(fabs(from[lit]) < 1e30)) return usage();
+                if (!olat_argument(argv[++i], from + lit)) return usage();
             }
         } else if (argv[i][0] != '-' && given < 2) names[given++] = argv[i];
         else return usage();

@@ -135,6 +135,12 @@ OLAT__API double olat_seconds(void) {
 #endif
 }
 
+/* An ssdgs_logger for programs: prints the library's notes, of what loading mended for instance, not
+   failures, which are told where they end the program. user: the program's name, a string. */
+OLAT__API void olat_hear(void *user, ssdgs_result code, const char *message) {
+    if (code == SSDGS_OK) fprintf(stderr, "%s: note: %s\n", (const char *)user, message);
+}
+
 /* ==== errors and files ==== */
 
 OLAT__PRINTF(2, 3) static int olat__fail(char *error, const char *format, ...) {
@@ -1404,6 +1410,12 @@ static size_t olat__parse_number(const char *text, double *value) {
     *value = strtod(digits, NULL);
     if (*text == '-') *value = -*value;
     return (size_t)(p - text);
+}
+
+/* Reads an argument of a program; 0 unless all of it is a number below 1e30. */
+OLAT__API int olat_argument(const char *text, double *value) {
+    const size_t used = olat__parse_number(text, value);
+    return used && !text[used] && fabs(*value) < 1e30;
 }
 
 /* Length of the UTF-8 sequence at p, 0 if it is malformed. A NUL ends every text, so nothing beyond it is

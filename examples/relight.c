@@ -14,6 +14,8 @@
 #endif
 
 #define PI 3.14159265358979323846
+static char program[] = "relight";
+
 enum {
     SPLIT,
     OUT_FOLDER,
@@ -74,11 +76,6 @@ static int fail_with(const ssdgs_context *context, ssdgs_result result) {
     return fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(context));
 }
 
-static void hear(void *user, ssdgs_result code, const char *message) {
-    (void)user;
-    if (code == SSDGS_OK) fprintf(stderr, "relight: note: %s\n", message);
-}
-
 /* What is written for a view; the first columns of the sheet come first. */
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
 enum { FIT_STEPS = 200, SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
@@ -130,7 +127,7 @@ static int parse(job *j, int argc, char **argv) {
     j->out = j->given[OUT_FOLDER];
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     if (j->given[TRAJECTORY] && (j->given[SPLIT] || j->given[FIT]))
-        return usage("--trajectory has no photographs: not for it is", j->given[FIT] ? "--fit" : "--split");
+        return usage("--trajectory has no photographs, so it takes no", j->given[FIT] ? "--fit" : "--split");
     const char *value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
     else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid"))
@@ -161,7 +158,8 @@ static int parse(job *j, int argc, char **argv) {
     while (value && isa < SSDGS_ISA_COUNT && strcmp(value, ssdgs_isa_string((ssdgs_isa)isa))) isa++;
     if (isa == SSDGS_ISA_COUNT) return usage("no such instruction set:", value);
     j->desc.isa = (ssdgs_isa)isa;
-    j->desc.logger.write = hear;
+    j->desc.logger.write = olat_hear;
+    j->desc.logger.user = program;
     return 0;
 }
 

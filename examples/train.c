@@ -21,6 +21,8 @@
 #define on_terminal() isatty(2)
 #endif
 
+static char program[] = "train";
+
 enum {
     OUTPUT,
     ITERATIONS,
@@ -348,12 +350,6 @@ typedef struct job {
     view_server view;
 } job;
 
-/* The library's notes; failures are told where they end the program. */
-static void hear(void *user, ssdgs_result code, const char *message) {
-    (void)user;
-    if (code == SSDGS_OK) fprintf(stderr, "train: note: %s\n", message);
-}
-
 enum { RATES_OF_MODEL = 10 }; /* the first of ssdgs_rates: all but camera and light */
 
 static int parse(job *j, int argc, char **argv) {
@@ -433,7 +429,8 @@ static int parse(job *j, int argc, char **argv) {
         return usage("--refit keeps what the model computes: not for it are --transfer, --terms, settings of",
                      "--set");
     j->desc.isa = (ssdgs_isa)isa;
-    j->desc.logger.write = hear;
+    j->desc.logger.write = olat_hear;
+    j->desc.logger.user = program;
     return 0;
 }
 

@@ -16,15 +16,11 @@ static void end(int number) {
     ended = 1;
 }
 
+static char program[] = "view";
+
 static int usage(void) {
     fprintf(stderr, "usage: view MODEL.ply [MODEL.ply ...] [--port N] [--page view.html] [--gpu]\n");
     return 2;
-}
-
-/* The library's notes, of what loading mended for instance. */
-static void hear(void *user, ssdgs_result code, const char *message) {
-    (void)user;
-    if (code == SSDGS_OK) fprintf(stderr, "view: note: %s\n", message);
 }
 
 int main(int argc, char **argv) {
@@ -47,7 +43,8 @@ int main(int argc, char **argv) {
     memset(&desc, 0, sizeof desc);
     desc.tracer.stage = view_stage;
     desc.tracer.user = &s.show;
-    desc.logger.write = hear;
+    desc.logger.write = olat_hear;
+    desc.logger.user = program;
     gpu *const device = wants_gpu ? gpu_create(error, sizeof error) : NULL;
     ssdgs_gpu_hook hook;
     if (device) {
