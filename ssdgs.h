@@ -527,19 +527,19 @@ SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_preview(void);
 
 typedef struct ssdgs_render_stats {
-    int gaussians;       /* in the model */
-    int objects;         /* in sight; the others only cast shadows */
-    int visible;         /* inside the camera's frustum */
-    int shaded;          /* contributing to a pixel */
-    int skipped;         /* contributing, but not shaded, within max_error: drawn in a neighbour's colour */
-    int rejected;        /* never drawn: a parameter is not finite */
-    int blackened;       /* drawn black: the colour is not finite */
-    int light_views;     /* light maps in use */
-    int camera_cached;   /* 1: projection, order and tiles are the last frame's */
-    int lights_cached;   /* lights whose maps are the last frame's */
-    int shadows_cached;  /* Gaussians x lights whose shadow network did not run again */
-    double network_work; /* share of the networks' multiplications done */
-    size_t instances;    /* (tile, splat) pairs of the camera */
+    int gaussians;         /* in the model */
+    int objects;           /* in sight; the others only cast shadows */
+    int visible;           /* inside the camera's frustum */
+    int shaded;            /* contributing to a pixel */
+    int skipped;           /* contributing, but not shaded, within max_error: drawn in a neighbour's colour */
+    int rejected;          /* never drawn: a parameter is not finite */
+    int blackened;         /* drawn black: the colour is not finite */
+    int light_views;       /* light maps in use */
+    int camera_cached;     /* 1: projection, order and tiles are the last frame's */
+    int lights_cached;     /* lights whose maps are the last frame's */
+    size_t shadows_cached; /* Gaussians x lights whose shadow network did not run again */
+    double network_work;   /* share of the networks' multiplications done */
+    size_t instances;      /* (tile, splat) pairs of the camera */
     size_t light_instances; /* the same of the lights' maps made for this frame */
 } ssdgs_render_stats;
 
@@ -5695,13 +5695,12 @@ static void ssdgs__asg_backward(ssdgs_frame *frame, const ssdgs_real *dbasis) {
 typedef struct ssdgs__row_lists {
     uint16_t all[SSDGS_MAX_WIDTH], in[SSDGS_MAX_WIDTH], out[SSDGS_MAX_WIDTH];
     uint64_t multiplied, multipliable; /* per Gaussian of a block: done, and of all neurons */
-    int shadows_cached;
+    uint64_t shadows_cached;
 } ssdgs__row_lists;
 
 static void ssdgs__row_lists_fill(ssdgs__row_lists *lists) {
     for (int i = 0; i < SSDGS_MAX_WIDTH; i++) lists->all[i] = (uint16_t)i;
-    lists->multiplied = lists->multipliable = 0;
-    lists->shadows_cached = 0;
+    lists->multiplied = lists->multipliable = lists->shadows_cached = 0;
 }
 
 /* inputs: (size, BLOCK); outputs: every layer's, (size, BLOCK) each. The last layer has no ReLU. Neurons that
@@ -6014,8 +6013,10 @@ static ssdgs__reaching ssdgs__reaching_of(const ssdgs_light *light, const ssdgs_
     ssdgs__reaching r;
     for (int c = 0; c < 3; c++) r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] : 0;
     r.range2 = inverse_range * inverse_range;
-    r.outer = light->kind == SSDGS_LIGHT_SPOT ? cos((double)light->cone[1]) : 0;
-    r.width = light->kind == SSDGS_LIGHT_SPOT ? cos((double)light->cone[0]) - r.outer : 0; /* 0: no cone */
+    const double inner = (double)light->cone[0], outer = (double)light->cone[1];
+    r.outer = light->kind == SSDGS_LIGHT_SPOT ? cos(outer) : 0;
+    r.width = light->kind == SSDGS_LIGHT_SPOT ? 2 * sin((inner + outer) / 2) * sin((outer - inner) / 2)
+                                              : 0; /* 0: no cone; cosines of narrow ones are both 1 */
     r.focus = (double)light->focus;
     return r;
 }
@@ -6434,7 +6435,7 @@ static void ssdgs__shade_task(void *data, int slot) {
     }
     job->counts[3 * slot] = lists.multiplied;
     job->counts[3 * slot + 1] = lists.multipliable;
-    job->counts[3 * slot + 2] = (uint64_t)lists.shadows_cached;
+    job->counts[3 * slot + 2] = lists.shadows_cached;
 }
 
 /* The objects' layouts, and the blocks of what is to be shaded. */
@@ -7143,7 +7144,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
         ssdgs_real visibility[SSDGS__TILE_LAYER];
         ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
         ssdgs_real *highlight_sums =
-            job->highlight_sums + (size_t)(index * frame->light_count + light) * SSDGS__HIGHLIGHT_SUMS;
+            job->highlight_sums +
+            ((size_t)index * (size_t)frame->light_count + (size_t)light) * SSDGS__HIGHLIGHT_SUMS;
         k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient, highlight_sums);
         if (!frame->visibility_given)
             ssdgs__place_backward(frame, job->lightings + light, light, &tile, pixels, gradient,
@@ -7438,7 +7440,7 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
         const uint64_t *counts = frame->memory->cache.counts + 3 * c;
         done += (double)counts[0];
         all += (double)counts[1];
-        stats->shadows_cached += (int)counts[2];
+        stats->shadows_cached += (size_t)counts[2];
     }
     stats->network_work = all > 0 ? done / all : 0;
     stats->instances = frame->views[0].instances;

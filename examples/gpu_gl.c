@@ -2419,7 +2419,8 @@ static int gpu_casts(const ssdgs_light *l) {
 static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_light *l) {
     const int spot = l->kind == SSDGS_LIGHT_SPOT, directional = l->kind == SSDGS_LIGHT_DIRECTIONAL,
               ranged = !directional && l->range > 0, focused = !directional && l->focus > 0;
-    const double inner = cos((double)l->cone[0]), outer = cos((double)l->cone[1]);
+    const double inner = (double)l->cone[0], outer = (double)l->cone[1],
+                 width = 2 * sin((inner + outer) / 2) * sin((outer - inner) / 2); /* of their cosines */
     double norm2 = 0;
     for (int i = 0; i < 3; i++) {
         lamp->place[i] = (float)l->position[i];
@@ -2430,8 +2431,8 @@ static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_l
     lamp->place[3] = (float)directional;
     lamp->intensity[3] = (float)gpu_casts(l);
     lamp->cone[3] = ranged ? (float)(1 / l->range) : 0;
-    lamp->rim[0] = spot ? (float)(((1 + norm2) / 2 - outer) / (inner - outer)) : 1;
-    lamp->rim[1] = spot ? (float)(0.5 / (inner - outer)) : 0;
+    lamp->rim[0] = spot ? (float)(((1 + norm2) / 2 - cos(outer)) / width) : 1;
+    lamp->rim[1] = spot ? (float)(0.5 / width) : 0;
     lamp->rim[2] = (float)(spot || ranged || focused);
     lamp->rim[3] = focused ? (float)l->focus : 0;
 }

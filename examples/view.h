@@ -14,7 +14,6 @@
 #include <ws2tcpip.h>
 #endif
 #include <signal.h>
-#include <time.h>
 #ifndef _WIN32
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -32,11 +31,7 @@ typedef SOCKET view__socket;
 #define send(socket, from, size, flags) send(socket, from, (int)(size), flags)
 #endif
 
-enum {
-    VIEW__VISITORS = 8,
-    VIEW__REQUEST = 8192,
-    VIEW__PATIENCE = 30 /* seconds */
-};
+enum { VIEW__VISITORS = 8, VIEW__REQUEST = 8192 };
 
 /* ---- the program ---- */
 
@@ -46,8 +41,8 @@ typedef struct view__visitor {
     size_t got;
     unsigned char *out; /* the answer, so far sent */
     size_t size, sent, room;
-    time_t heard; /* when something last went to or fro */
-    int leaves;   /* once the answer is sent */
+    uint64_t heard; /* the turn in which something last went to or fro */
+    int leaves;     /* once the answer is sent */
     ssdgs_scene *scene;
 } view__visitor;
 
@@ -58,6 +53,7 @@ typedef struct view_server {
     view__socket listener;
     int port; /* 0: any; then the one that was had */
     view__visitor visitors[VIEW__VISITORS];
+    uint64_t turns;
 } view_server;
 
 /* ---- answers ---- */
@@ -260,7 +256,7 @@ static void view__receive(view_server *s, view__visitor *v) {
         view__leave(v);
         return;
     }
-    v->heard = time(NULL);
+    v->heard = ++s->turns;
     v->got += (size_t)got;
     view__next_request(s, v);
     if (!v->size && v->leaves) view__leave(v);
@@ -274,7 +270,7 @@ static void view__transmit(view_server *s, view__visitor *v) {
         view__leave(v);
         return;
     }
-    v->heard = time(NULL);
+    v->heard = ++s->turns;
     v->sent += (size_t)put;
     if (v->sent < v->size) return;
     v->size = v->sent = 0;
@@ -291,22 +287,26 @@ static int view__blocks_not(view__socket socket) {
 #endif
 }
 
+/* Where there is no room, whoever was silent for longest leaves. A free place's heard is 0. */
 static void view__welcome(view_server *s) {
     const view__socket socket = accept(s->listener, NULL, NULL);
     const int one = 1;
     view__visitor *v = s->visitors;
+    int serves = socket != VIEW__NO_SOCKET && view__blocks_not(socket);
     if (socket == VIEW__NO_SOCKET) return;
-    while (v < s->visitors + VIEW__VISITORS && v->socket != VIEW__NO_SOCKET) v++;
 #ifndef _WIN32
-    if (socket >= FD_SETSIZE) v = s->visitors + VIEW__VISITORS;
+    serves = serves && socket < FD_SETSIZE;
 #endif
-    if (v == s->visitors + VIEW__VISITORS || !view__blocks_not(socket)) {
+    if (!serves) {
         view__close_socket(socket);
         return;
     }
+    for (int i = 1; i < VIEW__VISITORS; i++)
+        if (s->visitors[i].heard < v->heard) v = s->visitors + i;
+    if (v->socket != VIEW__NO_SOCKET) view__leave(v);
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, (const char *)&one, sizeof one);
     v->socket = socket;
-    v->heard = time(NULL);
+    v->heard = ++s->turns;
 }
 
 /* Serves whoever asks within so many milliseconds, one round: to be called again and again. 0: nobody did. */
@@ -328,7 +328,6 @@ static int view_poll(view_server *s, int milliseconds) {
         if (v->socket == VIEW__NO_SOCKET) continue;
         if (FD_ISSET(v->socket, &out)) view__transmit(s, v);
         else if (FD_ISSET(v->socket, &in)) view__receive(s, v);
-        else if (time(NULL) - v->heard > VIEW__PATIENCE) view__leave(v);
     }
     if (FD_ISSET(s->listener, &in)) view__welcome(s);
     return 1;

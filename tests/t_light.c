@@ -148,6 +148,12 @@ static void test_focus(ssdgs_model *single, const ssdgs_camera *camera) {
         for (int c = 0; c < 3; c++) want[c] = even[c] * pow(fmax(cos(off[i]), 0), focus[i]);
         CHECK_NEAR(lit, want, 3, 1e-6, exactly(1e-5), "an LED's focus");
     }
+    light.kind = SSDGS_LIGHT_SPOT; /* beside a cone so narrow that its cosines are 1 it is dark */
+    light.cone[0] = 0, light.cone[1] = (ssdgs_real)1e-9;
+    alone(single, camera, &light, 1, &options, shot);
+    middle_of(shot, 0, lit);
+    CHECK(lit[0] == 0 && lit[1] == 0 && lit[2] == 0);
+    light.kind = SSDGS_LIGHT_POINT;
     light.focus = 3;
     alone(single, camera, &light, 1, &options, shot);
     middle_of(shot, 0, want);
