@@ -165,18 +165,23 @@ static void name_them(const check *k, const unsigned char *which) {
 static int report_photographs(check *k) {
     const olat_dataset *set = k->sets;
     const facts *f = k->found[0];
-    int outlines = 0, floats = 0;
+    int outlines = 0, floats = 0, others = 0;
     double least = 1, most = 0;
     unsigned char *which = (unsigned char *)calloc((size_t)set->count, 1);
     if (!which) return fail("out of memory");
     for (int i = 0; i < set->count; i++) {
         outlines += f[i].has_outline;
         floats += olat__is_light(set->frames[i].format);
+        others += set->frames[i].camera.width != set->frames[0].camera.width ||
+                  set->frames[i].camera.height != set->frames[0].camera.height;
         least = fmin(least, f[i].shown), most = fmax(most, f[i].shown);
     }
     printf("Photographs\n");
-    say(k, set->count < 40, "%d photographs of %d x %d%s%s", set->count, set->frames[0].camera.width,
-        set->frames[0].camera.height, floats ? ", in OpenEXR" : "",
+    say(k, set->count < 40, "%d photographs of %d x %d%s%s%s", set->count, set->frames[0].camera.width,
+        set->frames[0].camera.height, others ? " and other sizes" : "",
+        floats == set->count ? ", in OpenEXR"
+        : floats             ? ", some in OpenEXR"
+                             : "",
         set->count < 40 ? ": a hundred and more, each from another place under another light, make a model "
                           "that can be relit"
                         : "");
@@ -469,6 +474,7 @@ static int run(check *k) {
     }
     if (failed) return 1;
     olat_print_notes(k->sets, "check");
+    if (file && strcmp(k->sets[0].notes, k->sets[1].notes)) olat_print_notes(k->sets + 1, "check");
     if (report_photographs(k)) return 1;
     report_places(k);
     if (report_training(k)) return 1;
