@@ -12283,6 +12283,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 #define SSDGS__CHECKPOINT_MAGIC "SSDGSCK5" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
+#define SSDGS__FOLD_START UINT64_C(0xCBF29CE484222325)
 
 static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
     const unsigned char *bytes = (const unsigned char *)data;
@@ -12343,8 +12344,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
     /* ints, then reals, without the padding between them */
-    head->inputs =
-        ssdgs__fold(UINT64_C(0xCBF29CE484222325), o, offsetof(ssdgs_train_options, refine) + sizeof(int));
+    head->inputs = ssdgs__fold(SSDGS__FOLD_START, o, offsetof(ssdgs_train_options, refine) + sizeof(int));
     head->inputs = ssdgs__fold(head->inputs, o->background,
                                offsetof(ssdgs_train_options, rates) + sizeof o->rates -
                                    offsetof(ssdgs_train_options, background));
@@ -12419,7 +12419,7 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
     ssdgs__checkpoint_describe(trainer, &head);
     ssdgs__checkpoint_io io;
     io.writer = &writer;
-    io.hash = UINT64_C(0xCBF29CE484222325);
+    io.hash = SSDGS__FOLD_START;
     ssdgs__checkpoint_write(&io, &head, sizeof head);
     ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
     ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
@@ -12494,8 +12494,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         uint64_t hash;
         memcpy(&hash, bytes + size - 8, 8);
         if (size != expected) reason = "it is cut short or too long";
-        else if (hash != ssdgs__fold(UINT64_C(0xCBF29CE484222325), bytes, size - 8))
-            reason = "its checksum is wrong";
+        else if (hash != ssdgs__fold(SSDGS__FOLD_START, bytes, size - 8)) reason = "its checksum is wrong";
         else if (!ssdgs__checkpoint_sound(&head, bytes + sizeof head)) reason = "its values are out of range";
         else if (ssdgs__settings_check(context, &head.settings)) reason = "its settings are out of range";
     }
