@@ -86,8 +86,8 @@ CONVENTIONS
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
   Buffers only grow: the same frame again allocates nothing, and others only where more Gaussians meet more
-  tiles than in any before. What a frame keeps for the next
-  belongs to its model or scene, the rest to the context. Pixels, planes and paths stay the caller's.
+  tiles than in any before. What a frame keeps for the next belongs to its model or scene, the rest to the
+  context. Pixels, planes and paths stay the caller's.
   Contexts, models, scenes and trainers may be destroyed in any order.
 
 THREADS
@@ -112,10 +112,11 @@ FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
   added, then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. Reading takes ASCII and both
   byte orders, skips what it does not know, and mends or drops broken Gaussians (ssdgs_load_stats). Limits:
-  8 GiB, 2^28 Gaussians, a header of 1 MiB. A plain splat file loads as baked colours: drawn as they are,
-  not trained. With settings.origin x y z are doubles. Checkpoints have native byte order and are refused by
-  other versions, precisions, options or cameras. Files are written under another name and renamed when
-  complete.
+  2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties. A plain splat file loads as baked
+  colours: drawn as they are, not trained. With settings.origin x y z are doubles. Checkpoints have native
+  byte order and are refused by other versions, precisions, options, cameras or lights. Files are written
+  under another name and renamed when complete: a link is replaced, not followed. A process that is killed
+  may leave PATH.tmp and numbers.
 
 OUTLINES
   Photographs should be transparent where the object is not. One of which a hundredth, but not all, is
@@ -1795,7 +1796,13 @@ struct ssdgs_context {
     char message[SSDGS__MESSAGE];
 };
 
+/* Of a long path it keeps the end, and room for what is wrong with it. */
 static void ssdgs__append(char *text, size_t *at, const char *more) {
+    const size_t length = strlen(more), most = SSDGS__MESSAGE / 2;
+    if (length > most) {
+        ssdgs__append(text, at, "...");
+        more += length - most;
+    }
     while (*more && *at + 1 < SSDGS__MESSAGE) text[(*at)++] = *more++;
     text[*at] = 0;
 }
@@ -2550,8 +2557,9 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
     return s;
 }
 
-#define SSDGS__RANGE_OF(what, s, field, low, high) \
-    if (!((s)->field >= (low) && (s)->field <= (high)) || !ssdgs__finite((ssdgs_real)(s)->field)) \
+#define SSDGS__RANGE_OF(what, type, s, field, low, high) \
+    if (!((type)(s)->field >= (type)(low) && (type)(s)->field <= (type)(high)) || \
+        !ssdgs__finite((ssdgs_real)(s)->field)) \
     return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field, \
                        (double)(s)->field, (double)(low), (double)(high))
 
@@ -2563,7 +2571,8 @@ static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
     if (s->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
-#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("settings", s, field, low, high)
+#define SSDGS__RANGE(field, low, high) \
+    SSDGS__RANGE_OF("settings", float, s, field, low, high) /* as files hold it */
     SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
     SSDGS__RANGE(baked, 0, 1);
     SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
@@ -2600,16 +2609,16 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
     SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(origin[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(origin[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(origin[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
+    SSDGS__RANGE(origin[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    SSDGS__RANGE(origin[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    SSDGS__RANGE(origin[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     const int medium = ssdgs__has_medium(s, s->terms);
     if (medium && !s->transport)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
     for (int i = 0; medium && i < 3; i++) {
         const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
-        if (!(scattering >= (ssdgs_real)1e-12 && scattering <= (ssdgs_real)1e12) ||
-            !(absorption >= 0 && absorption <= (ssdgs_real)1e12))
+        if (!((float)scattering >= (float)1e-12 && (float)scattering <= (float)1e12) ||
+            !(absorption >= 0 && (float)absorption <= (float)1e12))
             return ssdgs__fail(
                 context, SSDGS_ERR_ARGUMENT,
                 "settings: medium.scattering[%d] = %g, medium.absorption[%d] = %g, where 1e-12 .. "
@@ -3940,11 +3949,11 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "render options: not made by ssdgs_render_options_default()");
-    SSDGS__RANGE_OF("render options", o, stop, 0, 1);
-    SSDGS__RANGE_OF("render options", o, alpha_threshold, 0, 1);
-    SSDGS__RANGE_OF("render options", o, max_error, 0, 1);
-    SSDGS__RANGE_OF("render options", o, light_detail, (ssdgs_real)0.01, 8);
-    SSDGS__RANGE_OF("render options", o, transport_detail, (ssdgs_real)0.1, 8);
+    SSDGS__RANGE_OF("render options", double, o, stop, 0, 1);
+    SSDGS__RANGE_OF("render options", double, o, alpha_threshold, 0, 1);
+    SSDGS__RANGE_OF("render options", double, o, max_error, 0, 1);
+    SSDGS__RANGE_OF("render options", double, o, light_detail, (ssdgs_real)0.01, 8);
+    SSDGS__RANGE_OF("render options", double, o, transport_detail, (ssdgs_real)0.1, 8);
     return SSDGS_OK;
 }
 
@@ -8651,13 +8660,16 @@ typedef struct ssdgs__ply {
     ssdgs_context *context;
     const char *name; /* of the file, for messages */
     const unsigned char *begin, *at, *end;
-    int version;       /* that wrote it; 0: it does not say */
-    double origin[3];  /* to be taken from positions */
-    double color_unit; /* of red, green and blue: by their type */
+    int version;          /* that wrote it; 0: it does not say */
+    double origin[3];     /* to be taken from positions */
+    double color_unit[3]; /* of red, green and blue: by their types */
     ssdgs__ply_format format;
     int newline, line, element_count, property_count;
     ssdgs__ply_element elements[SSDGS__PLY_MAX_ELEMENTS], *known[SSDGS__PLY_KINDS];
     ssdgs__ply_property properties[SSDGS__PLY_MAX_PROPERTIES];
+    const ssdgs__ply_property *bad; /* where a row is broken, and how */
+    const char *why;
+    size_t behind; /* bytes behind the last element */
 } ssdgs__ply;
 
 static int ssdgs__ply_space(int c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
@@ -8691,8 +8703,8 @@ static int ssdgs__ply_count(ssdgs__ply_token token, size_t *count) {
     return token.length > 0;
 }
 
-/* A decimal number, nan or inf, whatever the locale. Seventeen digits count; powers of ten are exact, so the
-   error stays near 1e-16. */
+/* A decimal number, nan or inf, whatever the locale. Seventeen digits count. It is off by less than 1e-15 of
+   itself; beyond 1e60 and below 1e-60 it is only large or small. */
 static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
     static const char *const words[3] = {"nan", "inf", "infinity"};
     const unsigned char *p = token.text, *const end = p + token.length;
@@ -8706,7 +8718,7 @@ static int ssdgs__ply_number(ssdgs__ply_token token, double *number) {
         const size_t length = strlen(words[i]);
         size_t k = 0;
         while (k < length && p + k < end && (p[k] | 32) == words[i][k]) k++;
-        if (k < length || p + k != end) continue;
+        if (k < length || (p + k != end && (i || p[k] != '(' || end[-1] != ')'))) continue; /* nan(ind) */
         uint64_t bits =
             (uint64_t)negative << 63 | (i ? UINT64_C(0x7ff0000000000000) : UINT64_C(0x7ff8000000000000));
         memcpy(number, &bits, sizeof bits);
@@ -8814,9 +8826,9 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
             if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 &&
                 property->type != SSDGS__PLY_UINT16)
                 continue;
-            ply->color_unit = property->type == SSDGS__PLY_UINT8    ? 255
-                              : property->type == SSDGS__PLY_UINT16 ? 65535
-                                                                    : 1;
+            ply->color_unit[cursor.word - SSDGS__PLY_RGB] = property->type == SSDGS__PLY_UINT8    ? 255
+                                                            : property->type == SSDGS__PLY_UINT16 ? 65535
+                                                                                                  : 1;
         }
         property->word = cursor.word;
         element->present |= (uint64_t)1 << cursor.word;
@@ -8860,8 +8872,8 @@ static ssdgs_result ssdgs__ply_header(ssdgs__ply *ply) {
     return result;
 }
 
-/* One number less an origin as float bits, or the count of a list; neither = step over it. 0 when the file
-   ends or holds something else. */
+/* Reads a number: less an origin, as a float, to *bits, or a list's length to *count; with neither it is
+   stepped over. 0: the file ends, or this is no number. */
 static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t *bits, size_t *count) {
     const int size = ssdgs__ply_sizes[type], moved = origin < 0 || origin > 0;
     uint64_t raw = 0;
@@ -8887,25 +8899,44 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
     return 1;
 }
 
-/* The known words of one row; NULL = step over it. */
+/* The known words of one row; NULL: it is stepped over. 0: it is broken, as ply->bad and why say. */
 static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, uint32_t *words) {
     const ssdgs__ply_property *property = ply->properties + element->first;
-    int good = 1;
-    for (int i = 0; i < element->properties && good; i++, property++) {
-        size_t count = 0, size = ply->format == SSDGS__PLY_ASCII ? 1 : ssdgs__ply_sizes[property->type];
-        if (property->list < 0) {
-            const int wanted = words && property->word >= 0;
-            const int position =
-                wanted && element->kind == SSDGS__PLY_VERTEX && property->word < SSDGS_ROTATION;
-            good = ssdgs__ply_scalar(ply, property->type, position ? ply->origin[property->word] : 0,
-                                     wanted ? &words[property->word] : NULL, NULL);
-            continue;
+    const int ascii = ply->format == SSDGS__PLY_ASCII;
+    for (int i = 0; i < element->properties; i++, property++) {
+        const size_t size = ascii ? 1 : ssdgs__ply_sizes[property->type];
+        size_t count = 1;
+        ply->bad = property;
+        ply->why = "the file ends, or this is no number";
+        if (property->list >= 0) {
+            if (!ssdgs__ply_scalar(ply, property->list, 0, NULL, &count)) return 0;
+            ply->why = "this list does not end within the file";
+            if (count > (size_t)(ply->end - ply->at) / size) return 0;
         }
-        good = ssdgs__ply_scalar(ply, property->list, 0, NULL, &count) &&
-               count <= (size_t)(ply->end - ply->at) / size;
-        for (; good && count; count--) good = ssdgs__ply_scalar(ply, property->type, 0, NULL, NULL);
+        const int wanted = words && property->list < 0 && property->word >= 0,
+                  position = wanted && element->kind == SSDGS__PLY_VERTEX && property->word < SSDGS_ROTATION;
+        for (; count; count--)
+            if (!ssdgs__ply_scalar(ply, property->type, position ? ply->origin[property->word] : 0,
+                                   wanted ? &words[property->word] : NULL, NULL))
+                return 0;
     }
-    return good;
+    while (ascii && ply->at < ply->end && (*ply->at == ' ' || *ply->at == '\t')) ply->at++;
+    ply->why = "its line ends neither here nor before";
+    return !ascii || ply->at == ply->end || ssdgs__ply_space(*ply->at);
+}
+
+/* Refuses a row, from 0. */
+static ssdgs_result ssdgs__ply_broken(const ssdgs__ply *ply, const ssdgs__ply_element *element, size_t row,
+                                      const char *why) {
+    char names[2][64];
+    const ssdgs__ply_token tokens[2] = {element->name, ply->bad->name};
+    for (int i = 0; i < 2; i++) {
+        const size_t length = tokens[i].length < 63 ? tokens[i].length : 63;
+        memcpy(names[i], tokens[i].text, length);
+        names[i][length] = 0;
+    }
+    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s, row %z, property %s: %s", ply->name,
+                       names[0], row, names[1], why);
 }
 
 /* Finds where every element lies, so that they may come in any order. */
@@ -8920,16 +8951,17 @@ static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
             least += ascii ? 2 : ssdgs__ply_sizes[property->list < 0 ? property->type : property->list];
         element->data = ply->at;
         if (!least) continue;
-        int fits = element->count <= left / least;
-        if (fits && !ascii && !element->lists) ply->at += element->count * least;
+        ply->bad = property - 1;
+        if (element->count > left / least)
+            return ssdgs__ply_broken(ply, element, left / least, "the file is cut short");
+        if (!ascii && !element->lists) ply->at += element->count * least;
         else
-            for (size_t row = 0; fits && row < element->count; row++)
-                fits = ssdgs__ply_row(ply, element, NULL);
-        if (!fits)
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
-                               "%s: element %d of %d is cut short or has a broken list", ply->name, e + 1,
-                               ply->element_count);
+            for (size_t row = 0; row < element->count; row++)
+                if (!ssdgs__ply_row(ply, element, NULL))
+                    return ssdgs__ply_broken(ply, element, row, ply->why);
     }
+    while (ascii && ply->at < ply->end && ssdgs__ply_space(*ply->at)) ply->at++;
+    ply->behind = (size_t)(ply->end - ply->at);
     return SSDGS_OK;
 }
 
@@ -8942,11 +8974,21 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
                                ply->name, ssdgs__ply_kinds[kind], ssdgs__ply_name(&cursor, name),
                                kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
-                                       cursor.word <= SSDGS_OPACITY
+                                       !(ply->known[kind]->present >> SSDGS_ROTATION & 255)
                                    ? ": these are no Gaussian splats, but a point cloud or a mesh"
                                    : "");
     }
     return SSDGS_OK;
+}
+
+/* Whether settings read from a file may be used. */
+static ssdgs_result ssdgs__settings_of_file(ssdgs_context *context, const char *name,
+                                            const ssdgs_settings *settings) {
+    context->subject = name;
+    context->subject_number = -1;
+    const ssdgs_result result = ssdgs__settings_check(context, settings);
+    context->subject = NULL;
+    return result ? SSDGS_ERR_FORMAT : SSDGS_OK;
 }
 
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
@@ -8997,11 +9039,7 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
                            ply->name, settings->version, SSDGS_VERSION);
     ply->version = settings->version;
     settings->version = SSDGS_VERSION;
-    ply->context->subject = ply->name;
-    ply->context->subject_number = -1;
-    const ssdgs_result result = ssdgs__settings_check(ply->context, settings);
-    ply->context->subject = NULL;
-    return result ? SSDGS_ERR_FORMAT : SSDGS_OK;
+    return ssdgs__settings_of_file(ply->context, ply->name, settings);
 }
 
 /* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
@@ -9043,7 +9081,6 @@ static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats)
 /* Fills the model's arrays from an element's rows. */
 static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model *model,
                                          ssdgs_load_stats *stats) {
-    static const char bad[] = "%s: %s %z is not %s";
     ssdgs__ply_element *element = ply->known[kind];
     const int dc = (int)(element->present >> SSDGS__PLY_DC & 1),
               plain = kind == SSDGS__PLY_VERTEX && stats->plain;
@@ -9052,21 +9089,22 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
     for (size_t row = 0; row < element->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
-        if (!ssdgs__ply_row(ply, element, words))
-            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind], row,
-                               "a number");
+        if (!ssdgs__ply_row(ply, element, words)) return ssdgs__ply_broken(ply, element, row, ply->why);
         for (int i = 0; i < 3 && plain; i++)
-            words[SSDGS_DIFFUSE + i] =
-                ssdgs__ply_plain_color(words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit);
+            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(
+                words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit[i]);
         if (kind == SSDGS__PLY_VERTEX &&
             !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats))
             continue;
         ssdgs__ply_cursor cursor;
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
             if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
-            if (!ssdgs__ply_finite(words[cursor.word]))
-                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, bad, ply->name, ssdgs__ply_kinds[kind],
-                                   row, "finite");
+            if (!ssdgs__ply_finite(words[cursor.word])) {
+                char name[32];
+                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
+                                   "%s: element %s, row %z, property %s: it is not finite", ply->name,
+                                   ssdgs__ply_kinds[kind], row, ssdgs__ply_name(&cursor, name));
+            }
             *ssdgs__ply_cell(model, kept, &cursor) = (ssdgs_real)ssdgs__ply_value(words[cursor.word]);
         }
         kept++;
@@ -9075,19 +9113,19 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     return SSDGS_OK;
 }
 
-/* Sets an origin where doubles of a foreign file lie a thousand times their box from 0: floats would be
-   coarse. */
+/* Sets an origin where doubles of a foreign file lie more than 1,000 and a thousand times their box from 0:
+   floats would be coarse. */
 static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     int doubles = 0, far_away = 0;
     for (int i = 0; i < vertex->properties; i++) {
         const ssdgs__ply_property *p = ply->properties + vertex->first + i;
-        doubles += p->type == SSDGS__PLY_FLOAT64 && p->list < 0 && p->word >= 0 && p->word < SSDGS_ROTATION;
+        doubles += p->type == SSDGS__PLY_FLOAT64 && p->word >= 0 && p->word < SSDGS_ROTATION;
     }
+    if (doubles != 3 || !vertex->count) return;
     ply->at = vertex->data;
-    size_t row;
-    for (row = 0; doubles == 3 && row < vertex->count; row++) {
+    for (size_t row = 0; row < vertex->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
         if (!ssdgs__ply_row(ply, vertex, words)) return; /* reading the rows reports it */
         for (int i = 0; i < 3; i++) {
@@ -9097,11 +9135,16 @@ static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
             high[i] = x > high[i] ? x : high[i];
         }
     }
-    for (int i = 0; i < 3 && row && doubles == 3; i++)
-        far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
+    for (int i = 0; i < 3; i++) far_away |= fabs(high[i] + low[i]) > 2000 * (high[i] - low[i]) + 2000;
     for (int i = 0; i < 3 && far_away; i++)
         ply->origin[i] = (double)(settings->origin[i] =
                                       (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
+}
+
+static int ssdgs__has_origin(const ssdgs_settings *s) {
+    int i;
+    for (i = 0; i < 3 && !(s->origin[i] < 0) && !(s->origin[i] > 0); i++) {}
+    return i < 3;
 }
 
 static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
@@ -9109,6 +9152,35 @@ static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *eleme
     for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name);
          i++) {}
     return i < element->properties;
+}
+
+/* Notes what a model will not do that its user may expect. */
+static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, const ssdgs_load_stats *stats) {
+    ssdgs_context *context = model->context;
+    const char *name = ply->name;
+    if (ply->behind)
+        ssdgs__note(context, "%s: %z bytes behind the last element are not read: was it copied as text?",
+                    name, ply->behind);
+    if (stats->dropped)
+        ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite",
+                    name, stats->dropped, stats->dropped + model->count);
+    if (!model->count) ssdgs__note(context, "%s: holds no Gaussians: its pictures are empty", name);
+    else if (model->settings.baked)
+        ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing",
+                    name);
+    if (stats->plain && ssdgs__ply_has(ply, ply->known[SSDGS__PLY_VERTEX], "f_rest_0"))
+        ssdgs__note(context, "%s: colours that change with the view (f_rest) are left out", name);
+    if (!ply->known[SSDGS__PLY_SETTINGS] && ssdgs__has_origin(&model->settings))
+        ssdgs__note(context, "%s: positions are relative to settings.origin, %g, %g, %g", name,
+                    (double)model->settings.origin[0], (double)model->settings.origin[1],
+                    (double)model->settings.origin[2]);
+    if (stats->untrained)
+        ssdgs__note(context,
+                    "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it "
+                    "is not drawn as it "
+                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the "
+                    "original file",
+                    name);
 }
 
 static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_load_stats *stats) {
@@ -9127,6 +9199,10 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
                            "%s: a compressed PLY (packed_position): convert it to a plain one, with "
                            "splat-transform say",
                            ply->name);
+    if (ssdgs__ply_has(ply, vertex, "filter_3D"))
+        return ssdgs__fail(
+            ply->context, SSDGS_ERR_FORMAT,
+            "%s: sizes and opacities are still without their filter (filter_3D): save it fused", ply->name);
 
     const int ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
     stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
@@ -9164,27 +9240,9 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     if (result) return result;
     (*out)->version = ply->version;
-    ssdgs__gaussians_update(*out, ply->version);
+    if (ours) ssdgs__gaussians_update(*out, ply->version);
+    ssdgs__ply_tell(ply, *out, stats);
     return SSDGS_OK;
-}
-
-/* Notes what a model will not do that its user may expect. */
-static void ssdgs__ply_tell(const ssdgs_model *model, const char *name, const ssdgs_load_stats *stats) {
-    ssdgs_context *context = model->context;
-    if (stats->dropped)
-        ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite",
-                    name, stats->dropped, stats->dropped + model->count);
-    if (!model->count) ssdgs__note(context, "%s: holds no Gaussians: its pictures are empty", name);
-    else if (model->settings.baked)
-        ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing",
-                    name);
-    if (stats->untrained)
-        ssdgs__note(context,
-                    "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it "
-                    "is not drawn as it "
-                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the "
-                    "original file",
-                    name);
 }
 
 static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, const void *bytes, size_t size,
@@ -9209,7 +9267,7 @@ static ssdgs_result ssdgs__ply_load(ssdgs_context *context, const char *name, co
         ssdgs__model_drop(*out);
         *out = NULL;
         memset(&own, 0, sizeof own);
-    } else ssdgs__ply_tell(*out, name, &own);
+    }
     if (stats) *stats = own;
     return result;
 }
@@ -9228,7 +9286,7 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
 
 #ifndef SSDGS_NO_STDIO
 
-/* Folders, devices and pipes are not read, which may never end, and not replaced. */
+/* Folders, devices and pipes are neither read, which might never end, nor replaced. */
 static int ssdgs__irregular(const char *path) {
 #ifdef _WIN32
     const DWORD kind = GetFileAttributesA(path);
@@ -9239,10 +9297,11 @@ static int ssdgs__irregular(const char *path) {
 #endif
 }
 
-/* Reads a whole file in pieces; what the system says of its size is a hint. */
-static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, unsigned char **bytes,
-                                     size_t *size) {
-    const uint64_t limit = (uint64_t)8 << 30;
+/* Reads a file in pieces, `most` bytes or, where that is 0, all; what the system says of its size is a hint.
+ */
+static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, size_t most,
+                                     unsigned char **bytes, size_t *size) {
+    const uint64_t limit = (uint64_t)128 << 30; /* a checkpoint of as many Gaussians as there may be */
     unsigned char *buffer = NULL;
     size_t room = 0, used = 0;
     ssdgs_result result = SSDGS_OK;
@@ -9254,18 +9313,17 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, u
     const long hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
     rewind(file);
     unsigned char *larger;
-    while (used == room && !result) { /* a byte more than the file has tells its end */
-        size_t more = room ? room : hint > 0 && (uint64_t)hint <= limit ? (size_t)hint + 1 : 65536;
-        if (more > limit + 1 - room) more = (size_t)(limit + 1 - room);
-        if (!more || more > SIZE_MAX - room) {
-            result = ssdgs__fail(context, SSDGS_ERR_LIMIT, "%s: too large (8 GiB at most)", path);
-        } else if ((larger = (unsigned char *)ssdgs__allocate(context, room + more)) == NULL) {
+    while (used == room && !result && !(most && used)) { /* a byte more than the file has tells its end */
+        const uint64_t more = most ? most : room ? room : hint > 0 ? (uint64_t)hint + 1 : 65536;
+        if (more > limit + 1 - room || more > SIZE_MAX - room) {
+            result = ssdgs__fail(context, SSDGS_ERR_LIMIT, "%s: too large (128 GiB at most)", path);
+        } else if ((larger = (unsigned char *)ssdgs__allocate(context, room + (size_t)more)) == NULL) {
             result = SSDGS_ERR_MEMORY;
         } else {
             if (used) memcpy(larger, buffer, used);
             ssdgs__release(context, buffer);
             buffer = larger;
-            room += more;
+            room += (size_t)more;
             used += fread(buffer + used, 1, room - used, file);
         }
     }
@@ -9291,7 +9349,7 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
     if (result) return result;
     size_t size;
     if (!path || !out) result = ssdgs__null(context, "ssdgs_model_load", path ? "out" : "path");
-    else result = ssdgs__read_file(context, path, &bytes, &size);
+    else result = ssdgs__read_file(context, path, 0, &bytes, &size);
     if (!result) result = ssdgs__ply_load(context, path, bytes, size, out, stats);
     ssdgs__release(context, bytes);
     return ssdgs__leave(context, result);
@@ -9339,6 +9397,12 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     writer->file = -1;
     if (ssdgs__irregular(path))
         return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
+#ifndef _WIN32 /* where replacing it is refused */
+    struct stat old;
+    const int replaces = stat(path, &old) == 0;
+    if (replaces && access(path, W_OK))
+        return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is write-protected", path);
+#endif
     writer->temporary = (char *)ssdgs__allocate(context, room + SSDGS__WRITER_BUFFER);
     if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
     writer->buffer = (unsigned char *)writer->temporary + room;
@@ -9351,6 +9415,9 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     }
     if (writer->file < 0)
         writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be created (errno %d)", path, errno);
+#ifndef _WIN32
+    if (writer->file >= 0 && replaces) chmod(writer->temporary, old.st_mode & 0777); /* stays private */
+#endif
     return writer->result;
 }
 
@@ -9383,8 +9450,9 @@ static ssdgs_result ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, 
 static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
     if (writer->file >= 0) {
         ssdgs__writer_flush(writer);
-        int failed = !writer->result && SSDGS__SYNC(writer->file) != 0 &&
-                     errno != EINVAL; /* some file systems cannot */
+        int failed = 0;
+        while (!writer->result && !failed && SSDGS__SYNC(writer->file) != 0 && errno != EINVAL)
+            failed = errno != EINTR; /* EINVAL: some file systems cannot */
         failed |= SSDGS__CLOSE(writer->file) != 0;
         if (!writer->result && (failed || SSDGS__RENAME(writer->temporary, writer->path) != 0))
             writer->result = ssdgs__fail(writer->context, SSDGS_ERR_IO, "%s: cannot be finished (errno %d)",
@@ -9414,12 +9482,6 @@ static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
     unsigned char bytes[4];
     for (int i = 0; i < 4; i++) bytes[i] = (unsigned char)(word >> 8 * i);
     ssdgs__writer_put(writer, bytes, 4);
-}
-
-static int ssdgs__has_origin(const ssdgs_settings *s) {
-    int i;
-    for (i = 0; i < 3 && !(s->origin[i] < 0) && !(s->origin[i] > 0); i++) {}
-    return i < 3;
 }
 
 static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)raw : log1p(exp((double)raw)); }
@@ -10921,7 +10983,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "train options: not made by ssdgs_train_options_default()");
-#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", o, field, low, high)
+#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", double, o, field, low, high)
     SSDGS__RANGE(iterations, 1, 100000000);
     SSDGS__RANGE(schedule, 0, SSDGS_SCHEDULE_MERGED);
     SSDGS__RANGE(max_gaussians, 0, SSDGS__MAX_GAUSSIANS);
@@ -12386,7 +12448,17 @@ static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t 
     if (memcmp(head->magic, SSDGS__CHECKPOINT_MAGIC, 8) || head->byte_order != SSDGS__BYTE_ORDER ||
         head->real_size != sizeof(ssdgs_real) || head->version != SSDGS_VERSION)
         return "it was written by another version or machine";
-    return size < sizeof *head + 8 ? "it is cut short" : NULL;
+    if (size < sizeof *head + 8) return "it is cut short";
+    int sound = head->count >= 1 && head->count <= SSDGS__MAX_GAUSSIANS && head->iteration >= 0 &&
+                head->iteration <= 1000000000 && head->skipped >= 0 && head->skipped <= head->iteration &&
+                head->start_size >= 0 && head->start_size < 1e30 && head->ambient_steps >= 0 &&
+                head->ambient_steps <= head->iteration && head->exposed >= 0 && head->exposed <= 1 &&
+                head->outlines >= 0 && head->outlines <= 1;
+    for (int i = 0; i < SSDGS__GROUPS; i++)
+        sound = sound && head->steps[i] >= 0 && head->steps[i] <= head->iteration;
+    for (int i = 0; i < 6; i++)
+        sound = sound && head->ambient[i] < 1e300 && head->ambient[i] >= (i > 2 ? 0 : -1e300);
+    return sound ? NULL : "its counts are out of range";
 }
 
 typedef struct ssdgs__checkpoint_io {
@@ -12447,10 +12519,10 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
         ssdgs__correction c;
         memcpy(&c, at, sizeof c);
         for (int j = 0; j < 9; j++)
-            if (!ssdgs__finite((ssdgs_real)c.value[j]) || !ssdgs__finite((ssdgs_real)c.mean[j]) ||
-                !ssdgs__finite((ssdgs_real)c.square[j]) || c.square[j] < 0)
+            if (!(fabs(c.value[j]) < 1e30 && fabs(c.mean[j]) < 1e150 && c.square[j] >= 0 &&
+                  c.square[j] < 1e300))
                 return 0;
-        if (!ssdgs__finite((ssdgs_real)c.value[9]) || !(c.sure >= 0 && c.sure < 1e300)) return 0;
+        if (!(fabs(c.value[9]) < 1e30 && c.sure >= 0 && c.sure < 1e300)) return 0;
         for (int j = 0; j < 2; j++)
             if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
     }
@@ -12463,7 +12535,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     size_t size = 0;
     if (!path) return ssdgs__null(context, "ssdgs_trainer_load", "path");
     ssdgs_result result = ssdgs__trainer_check(trainer);
-    if (!result) result = ssdgs__read_file(context, path, &bytes, &size);
+    if (!result) result = ssdgs__read_file(context, path, 0, &bytes, &size);
     if (result) return result;
     ssdgs__checkpoint_head own;
     ssdgs__checkpoint_describe(trainer, &own);
@@ -12472,42 +12544,25 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
                     head.inputs != own.inputs || !ssdgs__settings_alike(&head.settings, &own.settings)))
         reason = "it belongs to other options, settings or photographs";
-    if (!reason &&
-        (head.count < 1 || head.count > SSDGS__MAX_GAUSSIANS ||
-         (size_t)head.count > size / (sizeof(ssdgs_real) * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1)) ||
-         head.iteration < 0 || head.iteration > 1000000000 || head.skipped < 0 ||
-         head.skipped > head.iteration || !(head.start_size >= 0 && head.start_size < 1e30)))
-        reason = "its counts are out of range";
-    for (int i = 0; i < SSDGS__GROUPS && !reason; i++)
-        if (head.steps[i] < 0 || head.steps[i] > head.iteration) reason = "its counts are out of range";
-    for (int i = 0; i < 6 && !reason; i++)
-        if (!ssdgs__finite((ssdgs_real)head.ambient[i]) || (i > 2 && head.ambient[i] < 0))
-            reason = "its values are out of range";
-    if (!reason && (head.ambient_steps < 0 || head.ambient_steps > head.iteration || head.exposed < 0 ||
-                    head.exposed > 1 || head.outlines < 0 || head.outlines > 1))
-        reason = "its counts are out of range";
     if (!reason) {
-        const size_t expected =
-            sizeof head + 8 + (size_t)head.photo_count * sizeof(ssdgs__correction) +
-            sizeof(ssdgs_real) * ((size_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1) +
-                                  3 * (size_t)head.global_count);
+        const uint64_t expected =
+            sizeof head + 8 + (uint64_t)head.photo_count * sizeof(ssdgs__correction) +
+            sizeof(ssdgs_real) *
+                ((uint64_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1) + 3 * head.global_count);
         uint64_t hash;
         memcpy(&hash, bytes + size - 8, 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(SSDGS__FOLD_START, bytes, size - 8)) reason = "its checksum is wrong";
         else if (!ssdgs__checkpoint_sound(&head, bytes + sizeof head)) reason = "its values are out of range";
-        else if (ssdgs__settings_check(context, &head.settings)) reason = "its settings are out of range";
     }
-    if (reason) {
-        ssdgs__release(context, bytes);
-        return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
-    }
-    result = ssdgs__trainer_grow(trainer, (size_t)head.count);
+    if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
+    if (!result) result = ssdgs__settings_of_file(context, path, &head.settings);
+    if (!result) result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
         if (head.fused != own.fused)
             ssdgs__note(
                 context,
-                "the checkpoint's run rounded otherwise (with or without FMA): it goes on, not bit for bit");
+                "%s: its run rounded otherwise (with or without FMA): it goes on, but not bit for bit", path);
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
         trainer->iteration = head.iteration;
@@ -12543,7 +12598,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
     if (result) return result;
     if (!path || !iteration)
         result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
-    else result = ssdgs__read_file(context, path, &bytes, &size);
+    else result = ssdgs__read_file(context, path, sizeof(ssdgs__checkpoint_head) + 8, &bytes, &size);
     if (!result) {
         ssdgs__checkpoint_head head;
         const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);

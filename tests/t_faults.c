@@ -905,6 +905,27 @@ static void test_checkpoints(void) {
         wrong += !run_refused(whole.data, k, before); /* cut */
     }
     CHECK(!wrong);
+    for (size_t k = 1; k < 4; k++) {
+        CHECK(run_refused(whole.data, k * whole.size / 4, before));
+        CHECK(strstr(ssdgs_error_message(context), ": it is cut short") != NULL);
+    }
+    {
+        int iteration = 0; /* it is in the head: no more is read */
+        const size_t held_bytes = memory.bytes;
+        spill(file_path, whole.data, sizeof h + 8);
+        memory.peak = held_bytes;
+        CHECK(!ssdgs_checkpoint_iteration(context, run_path, &iteration) && iteration == h.iteration);
+        CHECK(memory.peak - held_bytes < 4096);
+        CHECK(!ssdgs_checkpoint_iteration(context, file_path, &iteration) && iteration == h.iteration);
+        spill(file_path, whole.data, sizeof h + 7);
+        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
+        head lie = h;
+        lie.iteration = -5;
+        memcpy(whole.data, &lie, sizeof lie);
+        spill(file_path, whole.data, whole.size);
+        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
+        memcpy(whole.data, &h, sizeof h);
+    }
     ssdgs_settings settings;
     {
         const struct {

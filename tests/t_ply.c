@@ -1,5 +1,6 @@
-/* Model files: the round trip, the variants of PLY a reader meets, hostile files, failing memory and disks.
-   cc -I. -o build/t_ply tests/t_ply.c -lm -lpthread && build/t_ply       (writes under build/) */
+/* Model files: the round trip, the variants of PLY a reader meets, hostile files, failing memory and disks;
+   also as real64. cc -I. -o build/t_ply tests/t_ply.c -lm -lpthread && build/t_ply       (writes under
+   build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* directories, limits */
 #endif
@@ -43,6 +44,7 @@ static ssdgs_model *make_model(int count) {
     settings.eta = (ssdgs_real)(float)1.3;
     settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
+    settings.light_map.bias = (ssdgs_real)(float)0.02;
     for (int c = 0; c < 3; c++) settings.ambient[c] = (ssdgs_real)(float)(0.1 + c);
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     ssdgs_model_view view = ssdgs_model_arrays(model);
@@ -233,8 +235,10 @@ static bytes emit(const document *d, const variant *v) {
                     v->newline, v->newline, v->newline, v->newline);
             text(&to, line);
         }
-        for (int c = 0; v->extras && pass && c < 8; c++)
+        for (int c = 0; v->extras && pass && c < 8; c++) {
             put_value(&to, v, c == 0 || c == 4 ? "uchar" : "int", 3);
+            if (c % 4 == 3 && v->format == ASCII) text(&to, v->newline);
+        }
         for (int t = 0; t < d->tables; t++) {
             const table *from = &d->table[v->reversed ? d->tables - 1 - t : t];
             if (v->skip && !strcmp(from->name, v->skip)) continue;
@@ -278,7 +282,12 @@ static bytes emit(const document *d, const variant *v) {
 
 /* ---- the tests ---- */
 
-static const char path[] = "build/t_ply.ply";
+#ifdef SSDGS_REAL64
+#define FILES_AS "build/t_ply_64"
+#else
+#define FILES_AS "build/t_ply"
+#endif
+static const char path[] = FILES_AS ".ply";
 
 static bytes saved(const ssdgs_model *model) {
     CHECK(ssdgs_model_save(model, path) == SSDGS_OK);
@@ -287,6 +296,22 @@ static bytes saved(const ssdgs_model *model) {
 
 static void test_round_trip(void) {
     static const int counts[3] = {0, 1, 777};
+    ssdgs_settings edge = ssdgs_settings_default(); /* what is allowed can be read again */
+    edge.pixel_variance = (ssdgs_real)0.01;
+    edge.length_unit = (ssdgs_real)1e-15;
+    edge.light_scale = (ssdgs_real)1e30;
+    edge.light_map.bias = (ssdgs_real)1e30;
+    edge.centre[0] = (ssdgs_real)-1e30;
+    edge.origin[2] = (ssdgs_real)1e9;
+    edge.scattering.layers = 0;
+    edge.medium.scattering[1] = (ssdgs_real)1e-12;
+    edge.medium.scattering[0] = edge.medium.scattering[2] = edge.medium.absorption[0] = (ssdgs_real)1e12;
+    ssdgs_model *extreme = NULL, *read = NULL;
+    CHECK(ssdgs_model_create(context, &edge, 1, &extreme) == SSDGS_OK &&
+          ssdgs_model_save(extreme, path) == SSDGS_OK);
+    CHECK(ssdgs_model_load(context, path, &read, NULL) == SSDGS_OK);
+    ssdgs_model_destroy(extreme);
+    ssdgs_model_destroy(read);
     for (int i = 0; i < 3; i++) {
         ssdgs_model *model = make_model(counts[i]), *back = NULL, *again = NULL;
         bytes file = saved(model);
@@ -529,6 +554,7 @@ static void test_edited(void) {
     "property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\n" \
     "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n"
 #define POINT "1 2 3 0 0 0 0 1 0 0 0 "
+#define DC "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n"
 
 static bytes ascii(const char *count, const char *properties, const char *rows) {
     bytes b = {NULL, 0, 0};
@@ -539,6 +565,42 @@ static bytes ascii(const char *count, const char *properties, const char *rows) 
     text(&b, "end_header\n");
     text(&b, rows);
     return b;
+}
+
+/* A row of an ASCII file ends with its line; what follows the last is told. */
+static void test_rows(void) {
+    static const struct {
+        const char *rows, *refused;
+    } files[] = {
+        {POINT "0 0 0\n" POINT "0 0 0", NULL},
+        {POINT "0\n0\t0 \r\n" POINT "0 0 0 \n", NULL}, /* a row may take several */
+        {POINT "0 0 0 99\n" POINT "0 0 0\n", "element vertex, row 0, property f_dc_2: its line ends neither"},
+        {POINT "0 0\n" POINT "0 0 0    \n", "element vertex, row 0, property f_dc_2: its line ends neither"},
+        {POINT "0 0 0\n1 2 x 0 0 0 0 1 0 0 0 0 0 0\n",
+         "element vertex, row 1, property z: the file ends, or"},
+        {POINT "0 0 0\n", "element vertex, row 1, property f_dc_2: the file is cut short"},
+        {"1 2 3\n", "element vertex, row 0, property f_dc_2: the file is cut short"}};
+    ssdgs_load_stats stats;
+    for (size_t k = 0; k < sizeof files / sizeof *files; k++) {
+        bytes b = ascii("2", DC, files[k].rows);
+        ssdgs_model *model = NULL;
+        if (!files[k].refused) CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK && model->count == 2);
+        else if (!CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), files[k].refused)))
+            printf("    %s\n", ssdgs_error_message(context));
+        ssdgs_model_destroy(model);
+        free(b.data);
+    }
+    bytes b = ascii("1", DC, POINT "0 0 0\n \r\n");
+    CHECK(tells(&b, &stats, "plain splats") && !strstr(told, "behind"));
+    text(&b, "1 2\n");
+    CHECK(tells(&b, &stats, "4 bytes behind the last element are not read: was it copied as text?"));
+    free(b.data);
+    ssdgs_model *model = make_model(1);
+    b = saved(model);
+    put(&b, "\n", 1);
+    CHECK(tells(&b, &stats, "1 bytes behind the last element are not read"));
+    free(b.data);
+    ssdgs_model_destroy(model);
 }
 
 static void test_words(void) {
@@ -564,29 +626,49 @@ static void test_words(void) {
         ssdgs_model_destroy(model);
         free(b.data);
     }
-    bytes b = ascii("1", "property int red\nproperty int green\nproperty int blue\n", POINT "1 1 1\n");
+    bytes b =
+        ascii("1", "property uchar red\nproperty float green\nproperty ushort blue\n", POINT "51 0 65535\n");
+    ssdgs_model *mixed = NULL;
+    CHECK(load(b.data, b.size, &mixed, NULL) == SSDGS_OK);
+    for (int c = 0; c < 3 && mixed; c++)
+        CHECK(fabs(log1p(exp((double)mixed->gaussians[(size_t)(SSDGS_DIFFUSE + c) * mixed->capacity])) -
+                   want[c]) < 2e-6);
+    ssdgs_model_destroy(mixed);
+    free(b.data);
+    b = ascii("1", "property int red\nproperty int green\nproperty int blue\n", POINT "1 1 1\n");
     CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "lacks property f_dc_0"));
     free(b.data);
-    b = ascii("3", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n",
-              POINT "0 0 0\nnan " POINT "0 0\n" POINT "nan 0 0\n");
+    b = ascii("3", DC, POINT "0 0 0\nnan " POINT "0 0\n" POINT "nan 0 0\n");
     CHECK(tells(&b, &stats, "2 Gaussians of 3 are left out") && stats.dropped == 2);
     free(b.data);
-    b = ascii("0", "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n", "");
+    b = ascii("0", DC, "");
     CHECK(tells(&b, &stats, "holds no Gaussians"));
     free(b.data);
     b = ascii("1", "property uint packed_position\n", POINT "1\n");
     CHECK(refused(b.data, b.size) &&
           strstr(ssdgs_error_message(context), "a compressed PLY (packed_position): convert it"));
     free(b.data);
+    b = ascii("1", DC "property float filter_3D\n", POINT "0 0 0 1\n");
+    CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "without their filter"));
+    free(b.data);
+    b = ascii("1", DC "property float f_rest_0\n", POINT "0 0 0 1\n");
+    CHECK(tells(&b, &stats, "colours that change with the view (f_rest) are left out"));
+    free(b.data);
     CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
                        "y\nproperty float z\nproperty uchar red\n"
                        "property uchar green\nproperty uchar blue\nend_header\n1 2 3 4 5 6\n") &&
           strstr(ssdgs_error_message(context), "lacks property opacity: these are no Gaussian splats"));
+    CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float "
+                       "y\nproperty float z\n" DC
+                       "property float opacity\nproperty float scale_0\nproperty float scale_1\n"
+                       "end_header\n") &&
+          strstr(ssdgs_error_message(context), "lacks property scale_2") &&
+          !strstr(ssdgs_error_message(context), "no Gaussian splats")); /* flat ones */
     CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\n") &&
           strstr(ssdgs_error_message(context), "the file ends within the header"));
     for (int kind = 0; kind < 3; kind++) { /* one long comment, many, too much of them */
         bytes longer = {NULL, 0, 0};
-        text(&longer, "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n");
+        text(&longer, DC);
         text(&longer, "comment ");
         for (size_t k = 0; k < (kind == 2 ? 1100000 : 70000); k++)
             text(&longer, kind == 1 && k % 100 == 99 ? "\ncomment " : "x");
@@ -702,6 +784,9 @@ static void test_origin(void) {
         memcpy(&value, &bits, sizeof value);
         CHECK(fabs(value - (double)origin[c] - (double)model->gaussians[(size_t)c * model->capacity]) < 1e-9);
     }
+    bytes own = file;
+    own.size--;
+    CHECK(tells(&own, NULL, NULL)); /* who has an origin knows of it */
     CHECK(load(file.data, file.size - 1, &back, NULL) == SSDGS_OK);
     for (int c = 0; c < 3 && back; c++)
         for (int i = 0; i < 7; i++) {
@@ -720,6 +805,7 @@ static void test_origin(void) {
         put(&cut, body, file.size - 1 - at);
         CHECK(load(cut.data, cut.size, &back, NULL) == SSDGS_OK && back &&
               ssdgs_model_adopt(back, model) == SSDGS_OK);
+        CHECK(tells(&cut, NULL, "positions are relative to settings.origin, 5000000, -6"));
         for (int c = 0; c < 3 && back; c++)
             CHECK(fabs((double)back->gaussians[(size_t)c * back->capacity + 6] -
                        (double)model->gaussians[(size_t)c * model->capacity + 6]) < 1e-6);
@@ -820,6 +906,11 @@ static void test_numbers(void) {
                  {"inf", 1, 0x7f800000u},
                  {"-Infinity", 1, 0xff800000u},
                  {"nan", 1, 0x7fc00000u},
+                 {"-nan(ind)", 1, 0xffc00000u},
+                 {"NaN()", 1, 0x7fc00000u},
+                 {"nan(", 0, 0},
+                 {"nan(ind)x", 0, 0},
+                 {"inf(ind)", 0, 0},
                  {"100000000000000000000000000000e-29", 1, 0x3f800000u},
                  {"0.00000000000000000000000000000000000000001e41", 1, 0x3f800000u},
                  {"", 0, 0},
@@ -962,7 +1053,7 @@ static int temporaries(void) {
     DIR *directory = opendir("build");
     struct dirent *entry;
     while (directory && (entry = readdir(directory)) != NULL)
-        count += strstr(entry->d_name, "t_ply") && strstr(entry->d_name, ".tmp.");
+        count += strstr(entry->d_name, &(FILES_AS ".ply.tmp.")[6]) == entry->d_name;
     if (directory) closedir(directory);
 #endif
     return count;
@@ -1004,10 +1095,15 @@ static void test_disk(void) {
     ssdgs_model *model = make_model(2000), *old = make_model(3), *back = NULL;
     const size_t live = memory.live;
     CHECK(ssdgs_model_save(old, path) == SSDGS_OK);
-    CHECK(ssdgs_model_save(model, "build/t_ply.none/t_ply.ply") == SSDGS_ERR_IO);
-    CHECK(strstr(ssdgs_error_message(context), "build/t_ply.none/t_ply.ply"));
-    CHECK(ssdgs_model_load(context, "build/t_ply.absent", &back, NULL) == SSDGS_ERR_IO && !back);
+    CHECK(ssdgs_model_save(model, FILES_AS ".none/a.ply") == SSDGS_ERR_IO);
+    CHECK(strstr(ssdgs_error_message(context), FILES_AS ".none/a.ply"));
+    CHECK(ssdgs_model_load(context, FILES_AS ".absent", &back, NULL) == SSDGS_ERR_IO && !back);
     CHECK(ssdgs_model_load(context, "build", &back, NULL) != SSDGS_OK && !back);
+    char longest[700] = "build/"; /* its end is told, and what is wrong */
+    memset(longest + 6, 'x', 600);
+    strcpy(longest + 606, "/m.ply");
+    CHECK(ssdgs_model_save(model, longest) == SSDGS_ERR_IO);
+    CHECK(strstr(ssdgs_error_message(context), "xxx/m.ply: cannot be created (errno "));
     CHECK(ssdgs_model_save(NULL, path) == SSDGS_ERR_ARGUMENT &&
           ssdgs_model_save(model, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_load(context, NULL, &back, NULL) == SSDGS_ERR_ARGUMENT);
@@ -1015,9 +1111,18 @@ static void test_disk(void) {
     CHECK(ssdgs_model_load_memory(context, NULL, 0, &back, NULL) == SSDGS_ERR_ARGUMENT);
 #ifndef _WIN32
     {
-        mkdir("build/t_ply.folder", 0777);
-        CHECK(ssdgs_model_save(model, "build/t_ply.folder") == SSDGS_ERR_IO); /* the rename fails */
-        rmdir("build/t_ply.folder");
+        struct stat info; /* what is private stays so, what is protected is not replaced */
+        chmod(path, 0600);
+        CHECK(!ssdgs_model_save(model, path) && !stat(path, &info) && (info.st_mode & 0777) == 0600);
+        chmod(path, 0400);
+        if (access(path, W_OK)) /* not as root */
+            CHECK(ssdgs_model_save(old, path) == SSDGS_ERR_IO &&
+                  strstr(ssdgs_error_message(context), "is write-protected"));
+        chmod(path, 0600);
+        CHECK(ssdgs_model_save(old, path) == SSDGS_OK);
+        mkdir(FILES_AS ".folder", 0777);
+        CHECK(ssdgs_model_save(model, FILES_AS ".folder") == SSDGS_ERR_IO); /* the rename fails */
+        rmdir(FILES_AS ".folder");
         signal(SIGXFSZ, SIG_IGN); /* a disk that is full after 100,000 bytes */
         struct rlimit limit;
         getrlimit(RLIMIT_FSIZE, &limit);
@@ -1128,7 +1233,7 @@ int main(void) {
 #endif
     if (ssdgs_context_create(&desc, &context) != SSDGS_OK) return 1;
     test_round_trip();
-    TEST_ROW("81", "every variant of PLY", test_variants());
+    TEST_ROW("81", "every variant of PLY", (test_variants(), test_rows()));
     TEST_ROW("82", "other tools' files", (test_foreign(), test_words(), test_mending()));
     test_edited();
     test_versions();

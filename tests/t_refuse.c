@@ -47,9 +47,9 @@ static const field settings_fields[] = {
     R(centre[0], -1e30, 1e30),
     R(centre[1], -1e30, 1e30),
     R(centre[2], -1e30, 1e30),
-    R(origin[0], -1e30, 1e30),
-    R(origin[1], -1e30, 1e30),
-    R(origin[2], -1e30, 1e30)
+    R(origin[0], -1e9, 1e9),
+    R(origin[1], -1e9, 1e9),
+    R(origin[2], -1e9, 1e9)
 #undef I
 #undef R
 };
