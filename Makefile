@@ -47,7 +47,7 @@ web: $(BUILD)/web.wasm $(MODEL) ## one page that needs no server: build/view.htm
 	  echo '<script type="text/plain" id="model" data-name="$(notdir $(MODEL))">'; base64 <$(MODEL); echo '</script>'; } >$(BUILD)/web.txt
 	sed -e '/<!-- make web/{r $(BUILD)/web.txt' -e 'd;}' examples/view.html >$(BUILD)/view.html
 $(BUILD)/web.wasm: examples/web.c $(HEADERS) | $(BUILD)
-	emcc -O2 -msimd128 -matomics -mbulk-memory --no-entry -sALLOW_MEMORY_GROWTH=1 $< -o $@ \
+	emcc -O2 -msimd128 -matomics -mbulk-memory --no-entry -sALLOW_MEMORY_GROWTH=1 -sTOTAL_STACK=1MB $< -o $@ \
 	  -Wl,--shared-memory,--max-memory=2147483648,--import-memory,--no-check-features
 
 bench: $(BUILD)/bench $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply ## measures speed and shortcuts

@@ -85,16 +85,17 @@ CONVENTIONS
 
 MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
-  Buffers only grow: the same frame again allocates nothing, and others only where more Gaussians meet more
-  tiles than in any before. What a frame keeps for the next belongs to its model or scene, the rest to the
-  context. Pixels, planes and paths stay the caller's.
-  Contexts, models, scenes and trainers may be destroyed in any order.
+  Buffers only grow: the same frame again allocates nothing, another only what it has more of than any
+  before: pixels, lights, Gaussians, tiles that they meet. What a frame keeps for the next belongs to its
+model or scene, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models, scenes
+and trainers may be destroyed in any order.
 
 THREADS
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
   allocator, log, tracer and progress run on the caller's thread, an occluder on any. A call made while
   another is at work on the context, from a hook or another thread, returns ERR_ARGUMENT; progress may call
-  all but the trainer's destruction. After fork() the child may use its copies, without threads.
+  all but the trainer's destruction. After fork() the child may use its copies, without threads, unless a
+  call was at work on them. A call or a task needs up to 96 KiB of stack, unoptimised 150.
 
 DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
@@ -104,7 +105,7 @@ DETERMINISM
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
-  parameter. Nothing exits or prints. Cameras, lights, networks and ASG that are not finite are refused.
+  parameter. Nothing exits or prints. What is used of cameras, lights, networks and ASG must be finite.
   Gaussians that are not finite are not drawn, or black; infinite sizes and opacities are clamped. A training
   step with a gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
@@ -279,8 +280,8 @@ typedef struct ssdgs_context_desc {   /* all zero = defaults */
     ssdgs_parallel parallel;          /* threads of the context's own */
     ssdgs_tracer tracer;              /* none */
     const struct ssdgs_gpu_hook *gpu; /* none; see SSDGS_STAGES. Copied */
-    int threads;   /* its own, the caller counted, up to 1024; 0 = one per CPU. With `parallel`: how many that
-                      has; 0 = 4. It is given thrice as many tasks at once */
+    int threads; /* its own, the caller counted, up to 1024; 0 = one per CPU of the machine. With `parallel`:
+                    how many that has; 0 = 4. It is given thrice as many tasks at once */
     ssdgs_isa isa; /* the best this CPU has; ERR_ISA where one is missing */
 } ssdgs_context_desc;
 
@@ -389,7 +390,7 @@ typedef struct ssdgs_gaussian {
     ssdgs_real specular[3];   /* c_s; deferred, its lobe's height: see ssdgs_gaussian_mirror(). 0 = none */
     ssdgs_real scattering[3]; /* c_sss: scale of the dipole's light */
     ssdgs_real sharpness[2];  /* lambda, mu of a deferred highlight, above 0: 1 = broad, more is narrower */
-    ssdgs_real f0;            /* of a deferred highlight, at normal incidence, above 0, below 1: 0.04 for
+    ssdgs_real f0;            /* of a deferred highlight, at normal incidence, above 0, up to 1: 0.04 for
                                  dielectrics */
     ssdgs_real softness;      /* 0: a deferred shadow is the pixel's, sharp; 1: the Gaussian's */
     ssdgs_real material[SSDGS_MATERIAL_COUNT]; /* code that the networks see */
@@ -1314,7 +1315,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS \
     16 /* partial sums of shared gradients: fixed, so that threads cannot change the result */
-#define SSDGS__GLANCES 2000  /* of a thread before it sleeps: about 0.1 ms */
+#define SSDGS__GLANCES 2000  /* of a thread before it sleeps: about 0.1 ms on x86 */
 #define SSDGS__BAND 16       /* image rows of a task */
 #define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
 #define SSDGS__BIN_CHUNKS 64 /* tasks that make a view's tile lists */
@@ -1572,7 +1573,7 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 /* ---- a light's map of where transmittance falls ---- */
 
 /* Notes where these pixels of a micro-tile fell below levels of transmittance. after: (., 16) transmittances,
-   first before the entries applied, then after each at its index + 1. */
+   row 0 before any entry, row index + 1 after that entry. */
 static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned pixels, uint64_t entries,
                                   ssdgs_real (*after)[16], const ssdgs_real *distance, ssdgs_real *next,
                                   unsigned char *level) {
@@ -1620,8 +1621,8 @@ static SSDGS__INLINE ssdgs_real ssdgs__round(ssdgs_real x) { /* to nearest, ties
 }
 
 static SSDGS__INLINE float ssdgs__pow2(float n) {
-    const uint32_t bits =
-        n > -127 ? (uint32_t)((int)n + 127) << 23 : (uint32_t)1 << 22; /* 2^-127 is subnormal; NaN too */
+    const uint32_t bits = n > -127 ? (uint32_t)((int)n + 127) << 23
+                                   : (uint32_t)1 << 22; /* 2^-127, subnormal, for less and for NaN */
     float x;
     memcpy(&x, &bits, 4);
     return x;
@@ -1744,7 +1745,8 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* ==== >>memory  contexts, errors, aligned allocation ==== */
 
-/* Reads desc's allocator and log. Holds messages, notes and buffers that only grow. Every room calls it. */
+/* Reads desc's allocator and log. Holds messages, notes and buffers that only grow. All other sections call
+ * it. */
 
 #define SSDGS__MESSAGE 512
 
@@ -1753,6 +1755,7 @@ static int ssdgs__finite(ssdgs_real x) {
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
 #define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
+#define SSDGS__PUBLISH_TEXT(p, text) SSDGS__PUBLISH(p, text)
 #define SSDGS__EXCHANGE(p, value) __atomic_exchange_n(p, value, __ATOMIC_ACQ_REL)
 #if SSDGS__X86
 #define SSDGS__PAUSE() __builtin_ia32_pause()
@@ -1762,11 +1765,13 @@ static int ssdgs__finite(ssdgs_real x) {
 #elif defined(_MSC_VER)
 #define SSDGS__GLANCE(p) (*(p))
 #define SSDGS__PUBLISH(p, value) ((void)InterlockedExchange((volatile LONG *)(p), (LONG)(value)))
+#define SSDGS__PUBLISH_TEXT(p, text) ((void)InterlockedExchangePointer((void *volatile *)(p), (void *)(text)))
 #define SSDGS__EXCHANGE(p, value) ((int)InterlockedExchange((volatile LONG *)(p), (LONG)(value)))
 #define SSDGS__PAUSE() YieldProcessor()
 #else
 #define SSDGS__GLANCE(p) (*(p))
 #define SSDGS__PUBLISH(p, value) (*(p) = (value))
+#define SSDGS__PUBLISH_TEXT(p, text) (*(p) = (text))
 static int ssdgs__exchange(volatile int *p, int value) {
     const int old = *p;
     *p = value;
@@ -1785,11 +1790,11 @@ struct ssdgs_context {
     struct ssdgs__pool *pool;
     struct ssdgs__scratch *scratch; /* reused by every frame on this context */
     int isa, threads, groups;       /* groups: of tasks for a job system; 0: there is none */
-    int references;     /* the owner, models, scenes, trainers, calls that destroy: the last to go frees it */
-    volatile int busy;  /* 1 while a call is at work */
-    int telling;        /* 1 while the log hears a message */
-    long process;       /* id of the process that has the threads: a fork has none */
-    uint64_t revisions; /* handed out to models */
+    int references; /* the owner, models, scenes, trainers, calls that destroy: the last to go frees it */
+    volatile int busy, telling;   /* 1 while a call is at work, while the log hears a message */
+    const char *volatile refusal; /* why a call was refused, if nothing failed since */
+    long process;                 /* id of the process that has the threads: a fork has none */
+    uint64_t revisions;           /* handed out to models */
     const char *subject; /* what is being checked, for messages: a file's name, or the one of several things
                             with its number */
     int subject_number;  /* -1: it has none */
@@ -1824,8 +1829,10 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
         return;
     }
     if (bits && (value < 1e-6 || value >= 1e15)) {
-        const double exponent = floor(log10(value));
-        ssdgs__append_number(text, at, value / pow(10, exponent));
+        double exponent = floor(log10(value)), rest = value * (value < 1 ? 1e20 : 1e-20);
+        rest /= pow(10, exponent + (value < 1 ? 20 : -20)); /* two steps: the power may be 0 */
+        if (rest >= 9.9999995) rest /= 10, exponent++;
+        ssdgs__append_number(text, at, rest);
         ssdgs__append(text, at, "e");
         ssdgs__append_number(text, at, exponent);
         return;
@@ -1869,15 +1876,16 @@ static void ssdgs__append_format(char *text, size_t *at, const char *format, va_
 
 static void ssdgs__tell(ssdgs_context *context, ssdgs_result code, const char *message) {
     if (!context->logger.write || context->telling) return;
-    context->telling = 1;
+    SSDGS__PUBLISH(&context->telling, 1);
     context->logger.write(context->logger.user, code, message);
-    context->telling = 0;
+    SSDGS__PUBLISH(&context->telling, 0);
 }
 
 /* Records what went wrong, tells the log, returns the code; without a context, that alone. */
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
     if (!context) return code;
+    SSDGS__PUBLISH_TEXT(&context->refusal, NULL);
     context->message[0] = 0;
     if (context->subject) {
         ssdgs__append(context->message, &at, context->subject);
@@ -1913,18 +1921,18 @@ static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
 static void ssdgs__pool_forked(ssdgs_context *context);
 
 /* A call begins. It is refused while another is at work: one from a hook, a callback or a task, or on another
-   thread. The log does not hear of it, as the log may be who calls. */
-static ssdgs_result ssdgs__enter(ssdgs_context *context, const char *function) {
-    size_t at = 0;
+   thread, which may touch nothing else. The log does not hear of it, as the log may be who calls. */
+static ssdgs_result ssdgs__enter(ssdgs_context *context, const char *refusal) {
+    if (SSDGS__GLANCE(&context->telling)) return SSDGS_ERR_ARGUMENT; /* the message being told stays */
+    if (SSDGS__EXCHANGE(&context->busy, 1)) {
+        SSDGS__PUBLISH_TEXT(&context->refusal, refusal);
+        return SSDGS_ERR_ARGUMENT;
+    }
     ssdgs__pool_forked(context);
-    if (context->telling) return SSDGS_ERR_ARGUMENT; /* the message being told stays */
-    if (!SSDGS__EXCHANGE(&context->busy, 1)) return SSDGS_OK;
-    ssdgs__append(context->message, &at, function);
-    ssdgs__append(
-        context->message, &at,
-        ": another call on this context is at work, and a hook, a callback or a task must not make this one");
-    return SSDGS_ERR_ARGUMENT;
+    return SSDGS_OK;
 }
+#define SSDGS__ENTER(context, function) \
+    ssdgs__enter(context, function ": another call on this context is at work")
 
 /* And ends. */
 static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
@@ -1948,6 +1956,12 @@ static int ssdgs__product_fits(size_t a, size_t b, size_t *product) {
     if (b && a > SIZE_MAX / b) return 0;
     *product = a * b;
     return 1;
+}
+
+/* a b, or SIZE_MAX, which is more than there is. */
+static size_t ssdgs__times(size_t a, size_t b) {
+    size_t product;
+    return ssdgs__product_fits(a, b, &product) ? product : SIZE_MAX;
 }
 
 static void *ssdgs__default_allocate(void *user, size_t bytes) {
@@ -2197,7 +2211,6 @@ static void ssdgs__pool_forked(ssdgs_context *context) {
     ssdgs__release_to(&context->allocator, context->pool->threads);
     ssdgs__release_to(&context->allocator, context->pool);
     ssdgs__context_serial(context);
-    SSDGS__PUBLISH(&context->busy, 0);
 #else
     (void)context;
 #endif
@@ -2212,12 +2225,16 @@ typedef struct ssdgs__group_job {
 
 static void ssdgs__group_task(void *data, int index) {
     const ssdgs__group_job *job = (const ssdgs__group_job *)data;
-    for (int i = index; i < job->count; i += job->groups) job->task(job->data, i);
+    for (int i = index, left = job->count - index; left > 0; left -= job->groups) {
+        job->task(job->data, i);
+        if (left > job->groups) i += job->groups;
+    }
 }
 
 /* Runs tasks: in groups on a job system, where each costs more than on our threads. */
 static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
     ssdgs__group_job job;
+    ssdgs__pool_forked(context); /* within this call, by a callback */
     job.task = task;
     job.data = data;
     job.count = count;
@@ -2230,7 +2247,7 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
 SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
                                          void (*task)(void *data, int index), void *data) {
     if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(context, "ssdgs_context_run");
+    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_context_run");
     if (result) return result;
     if (!task && count > 0) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_context_run", "task"));
     ssdgs__parallel(context, count, task, data);
@@ -2330,31 +2347,42 @@ SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, struct ssdgs__frame_memory *memory);
 static void ssdgs__scratch_destroy(ssdgs_context *context, struct ssdgs__scratch *scratch);
 
+/* Tells why there is no context. */
+static ssdgs_result ssdgs__no_context(const ssdgs_context_desc *asked, ssdgs_result code, const char *why) {
+    char text[SSDGS__MESSAGE] = "ssdgs_context_create: ";
+    size_t at = strlen(text);
+    ssdgs__append(text, &at, why);
+    if (asked->logger.write) asked->logger.write(asked->logger.user, code, text);
+    return code;
+}
+
 SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdgs_context **out) {
     if (!out) return SSDGS_ERR_ARGUMENT;
     *out = NULL;
     ssdgs_context_desc asked;
     memset(&asked, 0, sizeof asked);
     if (desc) asked = *desc;
-    if (!asked.allocator.allocate != !asked.allocator.release || asked.threads < 0 || asked.threads > 1024)
-        return SSDGS_ERR_ARGUMENT;
+    if (!asked.allocator.allocate != !asked.allocator.release)
+        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT, "allocate or release is NULL");
+    if (asked.threads < 0 || asked.threads > 1024)
+        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT, "threads is not within 0 .. 1024");
     if (!asked.allocator.allocate) {
         asked.allocator.allocate = ssdgs__default_allocate;
         asked.allocator.release = ssdgs__default_release;
     }
-    if ((int)asked.isa < 0 || asked.isa >= SSDGS_ISA_COUNT ||
-        (asked.isa != SSDGS_ISA_AUTO && !ssdgs__table((int)asked.isa)))
-        return SSDGS_ERR_ISA;
+    int best = (int)asked.isa;
+    for (int isa = SSDGS_ISA_COUNT - 1; isa > 0 && best == SSDGS_ISA_AUTO; isa--)
+        if (ssdgs__table(isa)) best = isa;
+    if (best < 0 || best >= SSDGS_ISA_COUNT || !ssdgs__table(best))
+        return ssdgs__no_context(&asked, SSDGS_ERR_ISA, "this CPU or this build lacks the isa");
     ssdgs_context *context = (ssdgs_context *)ssdgs__allocate_from(&asked.allocator, sizeof *context);
-    if (!context) return SSDGS_ERR_MEMORY;
+    if (!context) return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "out of memory");
     context->allocator = asked.allocator;
     context->logger = asked.logger;
     context->tracer = asked.tracer;
     if (asked.gpu) context->gpu = *asked.gpu;
-    context->isa = (int)asked.isa;
-    for (int isa = SSDGS_ISA_COUNT - 1; context->isa == SSDGS_ISA_AUTO; isa--)
-        if (ssdgs__table(isa)) context->isa = isa;
-    context->k = ssdgs__table(context->isa);
+    context->isa = best;
+    context->k = ssdgs__table(best);
     context->references = 1;
     ssdgs__context_serial(context);
     if (asked.parallel.run) {
@@ -2368,7 +2396,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
             context->pool = ssdgs__pool_create(&context->allocator, threads);
             if (!context->pool) {
                 ssdgs__release_to(&asked.allocator, context);
-                return SSDGS_ERR_MEMORY;
+                return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "out of memory");
             }
             context->threads = context->pool->thread_count + 1;
             context->parallel.run = ssdgs__pool_run;
@@ -2392,7 +2420,7 @@ static void ssdgs__context_drop(ssdgs_context *context) {
 }
 
 SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
-    if (!context || ssdgs__enter(context, "ssdgs_context_destroy")) return;
+    if (!context || SSDGS__ENTER(context, "ssdgs_context_destroy")) return;
 #ifndef SSDGS_NO_THREADS
     if (context->pool) {
         ssdgs__pool_destroy(&context->allocator, context->pool);
@@ -2409,7 +2437,9 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context) {
 }
 
 SSDGS_API const char *ssdgs_error_message(const ssdgs_context *context) {
-    return context ? context->message : "no context";
+    if (!context) return "no context";
+    const char *refusal = SSDGS__GLANCE(&context->refusal);
+    return refusal ? refusal : context->message;
 }
 SSDGS_API ssdgs_isa ssdgs_context_isa(const ssdgs_context *context) {
     return context ? (ssdgs_isa)context->isa : SSDGS_ISA_AUTO;
@@ -2443,7 +2473,8 @@ struct ssdgs_model {
     double low[3], high[3];            /* the box that holds all that its Gaussians draw */
     ssdgs__bounds bounds;              /* of them to three standard deviations, but for a few strays */
     uint64_t box_revision;             /* of which revision both are */
-    ssdgs_real *exposure; /* (2 x exposure_room) what of an even sky its own Gaussians leave each; scratch */
+    ssdgs_real *exposure; /* (2 x exposure_room) the share of an even sky that each Gaussian gets; as many are
+                             scratch */
     uint64_t exposure_revision; /* for which of its revisions */
     size_t exposure_room;
 };
@@ -2590,12 +2621,16 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(transport, 0, 1);
     SSDGS__RANGE(residual_shadow, 0, 1);
     SSDGS__RANGE(shadow_on_scattering, 0, 1);
-    SSDGS__RANGE(scattering.layers, s->scattering.layers ? 2 : 0, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(scattering.width, 1, SSDGS_MAX_WIDTH);
+    SSDGS__RANGE(scattering.layers, 0, SSDGS_MAX_LAYERS);
+    if (s->scattering.layers == 1)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                           "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed",
+                           SSDGS_MAX_LAYERS);
+    SSDGS__RANGE(scattering.width, s->scattering.layers > 1, SSDGS_MAX_WIDTH);
     SSDGS__RANGE(octaves.view, 0, 8);
     SSDGS__RANGE(octaves.light, 0, 8);
     SSDGS__RANGE(shadow.layers, 0, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(shadow.width, 1, SSDGS_MAX_WIDTH);
+    SSDGS__RANGE(shadow.width, s->shadow.layers > 1, SSDGS_MAX_WIDTH);
     SSDGS__RANGE(light_map.blur, 0, SSDGS_BLUR_FLOOR);
     SSDGS__RANGE(light_map.size, 0, 8192);
     SSDGS__RANGE(light_map.bias, 0, (ssdgs_real)1e30);
@@ -2615,8 +2650,9 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     const int medium = ssdgs__has_medium(s, s->terms);
     if (medium && !s->transport)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
-    for (int i = 0; medium && i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
+        if (!medium && ssdgs__finite(scattering) && ssdgs__finite(absorption)) continue;
         if (!((float)scattering >= (float)1e-12 && (float)scattering <= (float)1e12) ||
             !(absorption >= 0 && (float)absorption <= (float)1e12))
             return ssdgs__fail(
@@ -2731,12 +2767,12 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
                                           ssdgs_model **out) {
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(context, "ssdgs_model_create");
+    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_create");
     return result ? result : ssdgs__leave(context, ssdgs__model_create(context, settings, count, out));
 }
 
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
-    if (!model || ssdgs__enter(model->context, "ssdgs_model_destroy")) return;
+    if (!model || SSDGS__ENTER(model->context, "ssdgs_model_destroy")) return;
     ssdgs_context *context = model->context;
     if (model->references > 1)
         ssdgs__note(context, "ssdgs_model_destroy: a trainer still has the model, which goes with it");
@@ -2827,6 +2863,7 @@ static void ssdgs__turn_to(const ssdgs_real direction[3], const double from[4], 
 }
 
 static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
+    const ssdgs_real most = (ssdgs_real)SSDGS__MOST_LIGHT;
     const ssdgs_real values[] = {g->position[0], g->position[1], g->position[2], g->rotation[0],
                                  g->rotation[1], g->rotation[2], g->rotation[3], g->normal[0],
                                  g->normal[1],   g->normal[2]};
@@ -2834,15 +2871,15 @@ static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
         if (!ssdgs__finite(values[i])) return i < 3 ? "position" : i < 7 ? "rotation" : "normal";
     for (int i = 0; i < 3; i++) {
         if (!(g->scale[i] > 0) || !ssdgs__finite(g->scale[i])) return "scale";
-        if (!(g->diffuse[i] >= 0) || !ssdgs__finite(g->diffuse[i])) return "diffuse";
-        if (!(g->specular[i] >= 0) || !ssdgs__finite(g->specular[i])) return "specular";
-        if (!(g->scattering[i] >= 0) || !ssdgs__finite(g->scattering[i])) return "scattering";
+        if (!(g->diffuse[i] >= 0 && g->diffuse[i] <= most)) return "diffuse";
+        if (!(g->specular[i] >= 0 && g->specular[i] <= most)) return "specular";
+        if (!(g->scattering[i] >= 0 && g->scattering[i] <= most)) return "scattering";
         if (i < 2 && (!(g->sharpness[i] > 0) || !ssdgs__finite(g->sharpness[i]))) return "sharpness";
     }
     for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++)
         if (!ssdgs__finite(g->material[i])) return "material";
     if (!(g->opacity >= 0 && g->opacity <= 1)) return "opacity";
-    if (!(g->f0 > 0 && g->f0 < 1)) return "f0";
+    if (!(g->f0 > 0 && g->f0 <= 1)) return "f0";
     return g->softness >= 0 && g->softness <= 1 ? NULL : "softness";
 }
 
@@ -2974,7 +3011,7 @@ static ssdgs_result ssdgs__gaussian_mirror(ssdgs_model *model, const ssdgs_real 
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                              ssdgs_gaussian *gaussian) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_gaussian_mirror");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_gaussian_mirror");
     return result ? result : ssdgs__leave(model->context, ssdgs__gaussian_mirror(model, roughness, gaussian));
 }
 
@@ -2988,7 +3025,7 @@ static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *
 
 SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdgs_gaussian *gaussian) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_set");
+    ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_set");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
     const char *wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
@@ -3005,7 +3042,7 @@ SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdg
 
 SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdgs_gaussian *gaussian) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_get");
+    ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_get");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
     if (!result)
@@ -3084,7 +3121,7 @@ static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
 
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_sort");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_sort");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
 }
 
@@ -3129,10 +3166,12 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original) {
     if (!model) return SSDGS_ERR_ARGUMENT;
     ssdgs_context *context = model->context, *from = original ? original->context : context;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_adopt");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_adopt");
     if (result) return result;
-    if (from != context) result = ssdgs__enter(from, "ssdgs_model_adopt");
-    if (result) return ssdgs__leave(context, result);
+    if (from != context && SSDGS__ENTER(from, "ssdgs_model_adopt"))
+        return ssdgs__leave(context,
+                            ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                                        "ssdgs_model_adopt: a call on the original's context is at work"));
     result = ssdgs__model_adopt(model, original);
     if (from != context) (void)ssdgs__leave(from, SSDGS_OK);
     return ssdgs__leave(context, result);
@@ -3141,13 +3180,13 @@ SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in
    no order, seldom in ssdgs__split's, however far apart some are. */
 static int ssdgs__in_no_order(const ssdgs_model *model) {
-    enum { FEW = 1024, AROUND = 128 }; /* order of few matters little */
+    enum { few = 1024, around = 128 }; /* order of few matters little */
     const ssdgs_real *x = model->gaussians + SSDGS_POSITION * model->capacity;
     const size_t n = (size_t)model->count;
     size_t further = 0;
-    if (n < FEW) return 0;
-    for (size_t i = AROUND; i < n; i++) {
-        const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (AROUND - 2));
+    if (n < few) return 0;
+    for (size_t i = around; i < n; i++) {
+        const size_t back = 2 + (size_t)(ssdgs__uniform(1, i) * (around - 2));
         double step2 = 0, back2 = 0;
         for (size_t c = 0; c < 3; c++) {
             const ssdgs_real *at = x + c * model->capacity + i;
@@ -3158,7 +3197,7 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
         }
         further += step2 > back2;
     }
-    return further > (n - AROUND) / 3;
+    return further > (n - around) / 3;
 }
 
 /* ==== >>frame  memory of a frame, its views, its cache ==== */
@@ -3243,7 +3282,7 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
     } while (0)
 
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context) {
-    if (!context || ssdgs__enter(context, "ssdgs_context_trim")) return;
+    if (!context || SSDGS__ENTER(context, "ssdgs_context_trim")) return;
     ssdgs__scratch_destroy(context, context->scratch);
     context->scratch = NULL;
     (void)ssdgs__leave(context, SSDGS_OK);
@@ -3269,10 +3308,11 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
 SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
     if (!model || !to) return SSDGS_ERR_ARGUMENT;
     ssdgs_context *from = model->context;
-    ssdgs_result result = ssdgs__enter(from, "ssdgs_model_move");
+    ssdgs_result result = SSDGS__ENTER(from, "ssdgs_model_move");
     if (result || from == to) return result ? result : ssdgs__leave(from, SSDGS_OK);
-    result = ssdgs__enter(to, "ssdgs_model_move");
-    if (result) return ssdgs__leave(from, result);
+    if (SSDGS__ENTER(to, "ssdgs_model_move"))
+        return ssdgs__leave(from, ssdgs__fail(from, SSDGS_ERR_ARGUMENT,
+                                              "ssdgs_model_move: a call on the other context is at work"));
     result = ssdgs__model_move(model, to);
     (void)ssdgs__leave(to, SSDGS_OK);
     if (result) return ssdgs__leave(from, result);
@@ -3283,7 +3323,8 @@ SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
 /* Room for `count` views; what the present ones own is kept. */
 static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_memory *m, int count) {
     if (count <= m->view_room) return SSDGS_OK;
-    ssdgs__view_memory *grown = (ssdgs__view_memory *)ssdgs__allocate(context, (size_t)count * sizeof *grown);
+    ssdgs__view_memory *grown =
+        (ssdgs__view_memory *)ssdgs__allocate(context, ssdgs__times((size_t)count, sizeof *grown));
     if (!grown) return SSDGS_ERR_MEMORY;
     if (m->view_room) memcpy(grown, m->view_memory.memory, (size_t)m->view_room * sizeof *grown);
     ssdgs__release(context, m->view_memory.memory);
@@ -3297,8 +3338,8 @@ static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
     for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* View axes (right, down, forward) looking along `forward` from `eye`; the image's up is the axis least along
-   forward. */
+/* View axes (right, down, forward) looking along `forward` from `eye`. The image's up is `up` or, where that
+   is NULL or along forward, the axis least along forward. */
 static void ssdgs__look_along(const double eye[3], const double forward[3], const double up[3],
                               ssdgs_real view[12]) {
     double best = 2;
@@ -3444,7 +3485,7 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
                                                   const ssdgs_real projection[16], int flags, int width,
                                                   int height, ssdgs_camera *out) {
     if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(context, "ssdgs_camera_from_matrices");
+    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_camera_from_matrices");
     return result ? result
                   : ssdgs__leave(context, ssdgs__camera_from_matrices(context, view, projection, flags, width,
                                                                       height, out));
@@ -3643,11 +3684,11 @@ static void ssdgs__keep_least(double *least, int keep, double number) {
    in 200 of a sample reaches beyond. A light's map that had to hold them would have few pixels left for the
    scene. */
 static void ssdgs__cut_strays(const ssdgs_frame *frame, ssdgs_real faint, ssdgs__bounds *total) {
-    enum { SAMPLE = 4096, KEEP = SAMPLE / 200 + 1 };
-    double least[6][KEEP];
+    enum { sample = 4096, keep = sample / 200 + 1 };
+    double least[6][keep];
     int seen = 0;
-    for (int i = 0; i < 6 * KEEP; i++) least[i / KEEP][i % KEEP] = 1e300;
-    for (int i = 0; i < frame->count; i += 1 + (frame->count - 1) / SAMPLE) {
+    for (int i = 0; i < 6 * keep; i++) least[i / keep][i % keep] = 1e300;
+    for (int i = 0; i < frame->count; i += 1 + (frame->count - 1) / sample) {
         const ssdgs_placed *o = ssdgs__object_of(frame, i);
         double low[3], high[3], log_scale;
         if (i - o->first >= o->gaussians.count ||
@@ -3655,8 +3696,8 @@ static void ssdgs__cut_strays(const ssdgs_frame *frame, ssdgs_real faint, ssdgs_
             continue;
         seen++;
         for (int j = 0; j < 3; j++) {
-            ssdgs__keep_least(least[j], KEEP, low[j]);
-            ssdgs__keep_least(least[3 + j], KEEP, -high[j]);
+            ssdgs__keep_least(least[j], keep, low[j]);
+            ssdgs__keep_least(least[3 + j], keep, -high[j]);
         }
     }
     for (int j = 0; j < 3 && seen; j++) {
@@ -3949,11 +3990,21 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "render options: not made by ssdgs_render_options_default()");
+    SSDGS__RANGE_OF("render options", double, o, terms, 0, SSDGS_ALL_TERMS);
+    SSDGS__RANGE_OF("render options", double, o, antialias, 0, 1);
     SSDGS__RANGE_OF("render options", double, o, stop, 0, 1);
     SSDGS__RANGE_OF("render options", double, o, alpha_threshold, 0, 1);
     SSDGS__RANGE_OF("render options", double, o, max_error, 0, 1);
     SSDGS__RANGE_OF("render options", double, o, light_detail, (ssdgs_real)0.01, 8);
     SSDGS__RANGE_OF("render options", double, o, transport_detail, (ssdgs_real)0.1, 8);
+    for (int i = 0; i < 3; i++)
+        if (!ssdgs__finite(o->background[i]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: background[%d] is not finite",
+                               i);
+    for (int i = 0; i < 27; i++)
+        if (!ssdgs__finite(o->ambient[i / 3][i % 3]))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: ambient[%d][%d] is not finite",
+                               i / 3, i % 3);
     return SSDGS_OK;
 }
 
@@ -4073,7 +4124,7 @@ static double ssdgs__boundary(double eta) {
    share of diffuse light that the surface lets in and out. */
 static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucency,
                                   ssdgs_real weights[3 * SSDGS__LENGTHS]) {
-    enum { PLACES = 24, ROUNDS = 100 };
+    enum { places = 24, rounds = 100 };
     const double eta = (double)s->eta, boundary = ssdgs__boundary(eta), pi = 3.14159265358979323846;
     const double passed =
         1 + 0.4399 - eta * (0.7099 - eta * (0.3319 - eta * 0.0636)); /* Egan and Hilgeman's */
@@ -4081,10 +4132,10 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
         const double scattering = (double)s->medium.scattering[c],
                      all = scattering + (double)s->medium.absorption[c];
         const double albedo = scattering / all, root = sqrt(3 * (1 - albedo));
-        double kernel[PLACES][SSDGS__LENGTHS], rest[PLACES], found[SSDGS__LENGTHS];
+        double kernel[places][SSDGS__LENGTHS], rest[places], found[SSDGS__LENGTHS];
         double missing = albedo / 2 * (1 + exp(-boundary * root)) * exp(-root);
-        for (int i = 0; i < PLACES; i++) {
-            const double r = 0.5 * pow(2, 5.0 * i / (PLACES - 1)); /* mean free paths */
+        for (int i = 0; i < places; i++) {
+            const double r = 0.5 * pow(2, 5.0 * i / (places - 1)); /* mean free paths */
             double dipole = 0;
             for (int source = 0; source < 2; source++) {
                 const double z = source ? 1 + boundary : 1, d = sqrt(r * r + z * z);
@@ -4098,16 +4149,16 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
             rest[i] = 1;
         }
         memset(found, 0, sizeof found);
-        for (int round = 0; round < ROUNDS * SSDGS__LENGTHS; round++) { /* none below 0 */
+        for (int round = 0; round < rounds * SSDGS__LENGTHS; round++) { /* none below 0 */
             const int k = round % SSDGS__LENGTHS;
             double along = 0, length2 = 0;
-            for (int i = 0; i < PLACES; i++) {
+            for (int i = 0; i < places; i++) {
                 along += kernel[i][k] * rest[i];
                 length2 += kernel[i][k] * kernel[i][k];
             }
             const double step = length2 > 0 && found[k] + along / length2 > 0 ? along / length2 : -found[k];
             found[k] += step;
-            for (int i = 0; i < PLACES; i++) rest[i] -= step * kernel[i][k];
+            for (int i = 0; i < places; i++) rest[i] -= step * kernel[i][k];
         }
         double sum = 0;
         for (int k = 0; k < SSDGS__LENGTHS; k++) sum += found[k];
@@ -4202,7 +4253,7 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
     const int lights = frame->light_count;
     ssdgs__lighting *table, *pixels;
     SSDGS__RESERVE(frame->scratch->lightings, table, ssdgs__lighting,
-                   2 * (size_t)frame->object_count * (size_t)(lights + 1) + 1);
+                   ssdgs__times(2 * ((size_t)frame->object_count + 1), (size_t)lights + 1));
     pixels = table + frame->object_count * (ptrdiff_t)(lights + 1);
     frame->material_count = 0;
     for (int i = 0; i < frame->object_count; i++) {
@@ -4434,7 +4485,7 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int same, unsigned cha
     ssdgs_context *context = frame->context;
     const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
     unsigned char *reach;
-    const size_t size = ((size_t)count + 1) * (size_t)rows;
+    const size_t size = ssdgs__times((size_t)count + 1, (size_t)rows);
     const int known = same && frame->memory->reach.bytes >= size;
     SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, size);
     *stirred = reach + (ptrdiff_t)count * rows;
@@ -4502,12 +4553,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
                            frame->stride, camera->width);
     frame->scene_depth = image ? image->scene_depth : NULL;
     frame->image = image;
-    for (int i = 0; i < 3; i++)
-        if (!ssdgs__finite(frame->options.background[i]))
-            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "the background is not finite");
-    for (int i = 0; i < 27; i++)
-        if (!ssdgs__finite(frame->options.ambient[i / 3][i % 3]))
-            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "ambient[%d] is not finite", i / 3);
     frame->context = context;
     frame->memory = m;
     frame->scratch = w;
@@ -4589,7 +4634,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     memset(m->cache.counts, 0, sizeof m->cache.counts);
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
-    SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    const size_t lit = ssdgs__times(n, (size_t)frame->light_count + 1);
+    SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, lit);
     int deferred = 0, cue = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
@@ -4597,24 +4643,22 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         cue |= (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
         transport |= ssdgs__has_transport(o);
     }
-    if (cue) SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, n * (size_t)(frame->light_count + 1));
-    if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, n * (size_t)(frame->light_count + 1));
+    if (cue) SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, lit);
+    if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, lit);
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
     if (deferred) {
         frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
-        SSDGS__RESERVE(w->layers, frame->layers, ssdgs_real, n * 4 * (size_t)frame->layer_count);
+        const size_t layers = ssdgs__times(n * 4, (size_t)frame->layer_count);
+        SSDGS__RESERVE(w->layers, frame->layers, ssdgs_real, layers);
         if (components || training) {
+            const size_t lit_pixels = ssdgs__times(pixels, (size_t)frame->light_count);
             SSDGS__RESERVE(w->layer_pixels, frame->layer_pixels, ssdgs_real,
-                           pixels * 3 * (size_t)(frame->layer_count + 1));
-            SSDGS__RESERVE(w->pixel_visibility, frame->pixel_visibility, ssdgs_real,
-                           pixels * (size_t)frame->light_count);
-            SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real,
-                           pixels * (size_t)frame->light_count);
+                           ssdgs__times(pixels * 3, (size_t)frame->layer_count + 1));
+            SSDGS__RESERVE(w->pixel_visibility, frame->pixel_visibility, ssdgs_real, lit_pixels);
+            SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real, lit_pixels);
         }
-        if (training)
-            SSDGS__RESERVE(w->layer_gradient, frame->layer_gradient, ssdgs_real,
-                           n * 4 * (size_t)frame->layer_count);
+        if (training) SSDGS__RESERVE(w->layer_gradient, frame->layer_gradient, ssdgs_real, layers);
     }
     if (components && !frame->layer_count) {
         SSDGS__RESERVE(w->component[0], frame->diffuse, ssdgs_real, n * 4);
@@ -4627,7 +4671,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     SSDGS__RESERVE(w->transmittance, frame->transmittance, ssdgs_real, pixels);
     if (image && image->median_depth) SSDGS__RESERVE(w->median, frame->median_depth, ssdgs_real, pixels);
     if (training) {
-        SSDGS__RESERVE(w->pixel_gradient, frame->pixel_gradient, ssdgs_real, pixels * 4);
+        SSDGS__RESERVE(w->pixel_gradient, frame->pixel_gradient, ssdgs_real, ssdgs__times(pixels, 4));
         SSDGS__RESERVE(w->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
         SSDGS__RESERVE(w->color_gradient, frame->color_gradient, ssdgs_real, n * 4);
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
@@ -6020,7 +6064,10 @@ static ssdgs__reaching ssdgs__reaching_of(const ssdgs_light *light, const ssdgs_
                                           double scale) {
     const double inverse_range = light->range > 0 ? scale / (double)light->range : 0;
     ssdgs__reaching r;
-    for (int c = 0; c < 3; c++) r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] : 0;
+    double length2 = 0; /* near 1 */
+    for (int c = 0; c < 3; c++) length2 += (double)direction[c] * (double)direction[c];
+    for (int c = 0; c < 3; c++)
+        r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] / sqrt(length2) : 0;
     r.range2 = inverse_range * inverse_range;
     const double inner = (double)light->cone[0], outer = (double)light->cone[1];
     r.outer = light->kind == SSDGS_LIGHT_SPOT ? cos(outer) : 0;
@@ -7530,7 +7577,7 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
                                        ssdgs_render_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_render");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_render");
     return result ? result
                   : ssdgs__leave(model->context, ssdgs__render_model(model, camera, lights, light_count,
                                                                      options, image, stats));
@@ -7571,7 +7618,7 @@ SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
 SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **out) {
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_scene_create");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_scene_create");
     if (result) return result;
     if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_scene_create", "out"));
     *out = (ssdgs_scene *)ssdgs__allocate(context, sizeof **out);
@@ -7582,11 +7629,17 @@ SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **
 }
 
 SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene) {
-    if (!scene || ssdgs__enter(scene->context, "ssdgs_scene_destroy")) return;
+    if (!scene || SSDGS__ENTER(scene->context, "ssdgs_scene_destroy")) return;
     ssdgs_context *context = scene->context;
     ssdgs__frame_memory_destroy(context, scene->frame);
     ssdgs__release(context, scene);
     ssdgs__leave_and_drop(context);
+}
+
+/* Ends a call on a scene. One that failed leaves no maps: those there are belong to an earlier frame. */
+static ssdgs_result ssdgs__scene_leave(ssdgs_scene *scene, ssdgs_result result) {
+    if (result && scene->frame) scene->frame->cache.lights_ready = 0;
+    return ssdgs__leave(scene->context, result);
 }
 
 SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
@@ -7597,7 +7650,7 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     if (stats) memset(stats, 0, sizeof *stats);
     if (!scene) return SSDGS_ERR_ARGUMENT;
     ssdgs_context *context = scene->context;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_scene_render");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_scene_render");
     if (result) return result;
     if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
     if (!result) result = ssdgs__objects_check(context, objects, object_count);
@@ -7608,11 +7661,11 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     request.occluder = ssdgs__occluder_of(scene);
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
-    return ssdgs__leave(context, result);
+    return ssdgs__scene_leave(scene, result);
 }
 
 SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder) {
-    if (!scene || ssdgs__enter(scene->context, "ssdgs_scene_occlude")) return;
+    if (!scene || SSDGS__ENTER(scene->context, "ssdgs_scene_occlude")) return;
     memset(&scene->occluder, 0, sizeof scene->occluder);
     if (occluder) scene->occluder = *occluder;
     (void)ssdgs__leave(scene->context, SSDGS_OK);
@@ -7623,10 +7676,7 @@ static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request 
     ssdgs_frame frame;
     ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
-    if (result) {
-        if (scene->frame) scene->frame->cache.lights_ready = 0; /* maps of an earlier frame */
-        return result;
-    }
+    if (result) return result;
     const int kept = frame.views[0].cached;
     frame.views[0].cached = 1;
     result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
@@ -7638,7 +7688,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options) {
     if (!scene) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_light");
+    const ssdgs_result result = SSDGS__ENTER(scene->context, "ssdgs_scene_light");
     if (result) return result;
     const int seen = scene->frame && scene->frame->cache.camera.width > 0; /* else by no camera so far */
     const ssdgs_camera camera = seen ? scene->frame->cache.camera : ssdgs__no_camera();
@@ -7646,7 +7696,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
     request.maps = scene->maps = 1;
     request.mirrored = 1;
     request.occluder = ssdgs__occluder_of(scene);
-    return ssdgs__leave(scene->context, ssdgs__scene_light(scene, &request));
+    return ssdgs__scene_leave(scene, ssdgs__scene_light(scene, &request));
 }
 
 typedef struct ssdgs__shadow_job {
@@ -7692,7 +7742,7 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction) {
     if (!scene) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(scene->context, "ssdgs_scene_shadow");
+    const ssdgs_result result = SSDGS__ENTER(scene->context, "ssdgs_scene_shadow");
     return result ? result
                   : ssdgs__leave(scene->context, ssdgs__scene_shadow(scene, light, points, count, fraction));
 }
@@ -7950,7 +8000,7 @@ SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_rea
                                          int height, const ssdgs_real *to_world, ssdgs_light *lights,
                                          int light_count, ssdgs_real ambient[9][3]) {
     if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_environment");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_environment");
     if (result) return result;
     ssdgs__environment e;
     memset(&e, 0, sizeof e);
@@ -8010,7 +8060,7 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
 
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_bounds");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_bounds");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_bounds(model, low, high));
 }
 
@@ -8188,18 +8238,18 @@ typedef struct ssdgs__line {
 } ssdgs__line;
 
 static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
-    enum { OCTAVE = 64, POINTS = OCTAVE + 16 };
-    ssdgs_real from[POINTS];
-    for (int begin = 0; begin < SSDGS__LINES; begin += OCTAVE) {
-        for (int i = 0; i < POINTS; i++) {
+    enum { octave = 64, points = octave + 16 };
+    ssdgs_real from[points];
+    for (int begin = 0; begin < SSDGS__LINES; begin += octave) {
+        for (int i = 0; i < points; i++) {
             const uint32_t bits = (uint32_t)(SSDGS__LINES_FIRST + begin + i) << 17;
             float start;
             memcpy(&start, &bits, sizeof start);
             from[i] = (ssdgs_real)start;
         }
-        ssdgs_real encoded[POINTS];
-        SSDGS__SRGB_ENCODE(encoded, NULL, from, POINTS);
-        for (int i = 0; i < OCTAVE; i++) {
+        ssdgs_real encoded[points];
+        SSDGS__SRGB_ENCODE(encoded, NULL, from, points);
+        for (int i = 0; i < octave; i++) {
             const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
             lines[begin + i].slope = slope;
             lines[begin + i].at = begin ? encoded[i] - slope * from[i]
@@ -8405,7 +8455,7 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
                                      const ssdgs_real *reference, int width, int height,
                                      ssdgs_metrics *metrics) {
     if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(context, "ssdgs_compare");
+    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_compare");
     return result ? result
                   : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
 }
@@ -8993,27 +9043,27 @@ static ssdgs_result ssdgs__settings_of_file(ssdgs_context *context, const char *
 
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
-    enum { ADDED = 7 };
+    enum { additions = 7 };
     static const struct {
         size_t at;
         int count;
         double before;
-    } added[ADDED] = {/* settings of later files, and what held before them */
-                      {offsetof(ssdgs_settings, transport), 1, 0},
-                      {offsetof(ssdgs_settings, octaves), 2, 4},
-                      {offsetof(ssdgs_settings, pixel_variance), 1, 0.3},
-                      {offsetof(ssdgs_settings, ambient), 3, 0},
-                      {offsetof(ssdgs_settings, origin), 3, 0},
-                      {offsetof(ssdgs_settings, medium.scattering), 3, 0},
-                      {offsetof(ssdgs_settings, medium.absorption), 3, 0}};
+    } added[additions] = {/* settings of later files, and what held before them */
+                          {offsetof(ssdgs_settings, transport), 1, 0},
+                          {offsetof(ssdgs_settings, octaves), 2, 4},
+                          {offsetof(ssdgs_settings, pixel_variance), 1, 0.3},
+                          {offsetof(ssdgs_settings, ambient), 3, 0},
+                          {offsetof(ssdgs_settings, origin), 3, 0},
+                          {offsetof(ssdgs_settings, medium.scattering), 3, 0},
+                          {offsetof(ssdgs_settings, medium.absorption), 3, 0}};
     int next = 0;
     uint32_t words[SSDGS__PLY_WORDS];
     memset(words, 0, sizeof words);
-    for (int i = 0; i <= ADDED; i++) {
-        const int word = i < ADDED ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
+    for (int i = 0; i <= additions; i++) {
+        const int word = i < additions ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
         const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
         if (result) return result;
-        for (next = word; i < ADDED && next < word + added[i].count; next++)
+        for (next = word; i < additions && next < word + added[i].count; next++)
             words[next] = ssdgs__ply_bits(added[i].before);
     }
     ply->at = element->data;
@@ -9277,7 +9327,7 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_load_memory");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_load_memory");
     if (result) return result;
     if (!bytes || !out) result = ssdgs__null(context, "ssdgs_model_load_memory", bytes ? "out" : "bytes");
     else result = ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
@@ -9345,7 +9395,7 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_model_load");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_load");
     if (result) return result;
     size_t size;
     if (!path || !out) result = ssdgs__null(context, "ssdgs_model_load", path ? "out" : "path");
@@ -9584,7 +9634,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
 
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_save");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_save");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_save(model, path));
 }
 #endif /* SSDGS_NO_STDIO */
@@ -10965,7 +11015,7 @@ static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
 
 SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_model_reduce");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_reduce");
     return result ? result : ssdgs__leave(model->context, ssdgs__model_reduce(model, count));
 }
 
@@ -11039,7 +11089,7 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
    photograph, or a tenth, is transparent. One that is transparent at more than a third of them has a wrong
    mask or pose. */
 static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
-    enum { PLACES = 2048, FEW = 30 };
+    enum { places = 2048, few = 30 };
     const int photos = trainer->photo_count;
     int *shown =
         (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos);
@@ -11048,7 +11098,7 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     int *refused = shown + photos;
     unsigned char *side = (unsigned char *)(refused + photos);
     for (int i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
-    for (int place = 0; place < PLACES && outlined >= 8; place++) {
+    for (int place = 0; place < places && outlined >= 8; place++) {
         double u[3];
         ssdgs_real x[3];
         int seen = 0, outside = 0;
@@ -11068,7 +11118,7 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
         }
     }
     for (int i = photos - 1; i >= 0; i--) {
-        if (shown[i] < FEW || 3 * refused[i] <= shown[i]) continue;
+        if (shown[i] < few || 3 * refused[i] <= shown[i]) continue;
         trainer->transparent[i] = 1;
         first = i;
         wrong++;
@@ -11087,7 +11137,7 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
    their normals point away from the centre; in the order of ssdgs__split. Those outside of the object's
    outlines are left out, and where few would be left others are drawn. */
 static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
-    enum { ROUNDS = 16, LEAST = 4 }; /* more than one in so many is left, or so many rounds are drawn */
+    enum { rounds = 16, least = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)(o->initial_points < trainer->budget ? o->initial_points : trainer->budget);
@@ -11106,7 +11156,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     double u[3];
     ssdgs_real x[3];
     int round;
-    for (round = 0; round < ROUNDS && kept <= n / LEAST && !result; round++) {
+    for (round = 0; round < rounds && kept <= n / least && !result; round++) {
         for (size_t i = kept; i < n; i++) {
             draws[i] = (uint64_t)round * n + i;
             ssdgs__draw_place(o, draws[i], u, x);
@@ -11174,7 +11224,7 @@ static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
 }
 
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
-    if (!trainer || ssdgs__enter(trainer->context, "ssdgs_trainer_destroy")) return;
+    if (!trainer || SSDGS__ENTER(trainer->context, "ssdgs_trainer_destroy")) return;
     ssdgs_context *context = trainer->context;
     context->references++;
     if (!trainer->running) ssdgs__trainer_drop(trainer);
@@ -11516,7 +11566,7 @@ static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__read
    captures agree to 0.8 and more, wrong readings to 0.5 or so; on a floor seen from above one that puts the
    lights below it may agree to 0.86. */
 static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const double centre[3]) {
-    enum { FEW = 6, ENOUGH = 12 };
+    enum { few = 6, enough = 12 };
     static const ssdgs__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
     static const char *const axes[2][3] = {{"x", "y", "z"}, {"-x", "-y", "-z"}};
     ssdgs_context *context = trainer->context;
@@ -11528,9 +11578,9 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
     int n = 0;
     for (int i = 0; i < trainer->photo_count; i++)
         n += ssdgs__shading_of(trainer->photos + i, trainer->model->settings.transfer, centre, s + n);
-    if (n >= FEW) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
+    if (n >= few) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
     ssdgs__reading reading;
-    for (int way = 0; way < 4 && n >= ENOUGH; way++)
+    for (int way = 0; way < 4 && n >= enough; way++)
         for (int order = 0; order < 6; order++)
             for (int signs = 0; signs < 8; signs++) {
                 for (int i = 0; i < 3; i++) {
@@ -11549,7 +11599,7 @@ static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const doub
                 best = agrees_so;
                 found = reading;
             }
-    const int behind = n >= ENOUGH && agrees < 0.88 && facing < -0.1;
+    const int behind = n >= enough && agrees < 0.88 && facing < -0.1;
     const int contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
     if (contradicts)
         ssdgs__note(context,
@@ -11841,7 +11891,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
     if (out) *out = NULL;
     if (!model) return SSDGS_ERR_ARGUMENT;
     ssdgs_context *context = model->context;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_trainer_create");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_trainer_create");
     if (result) return result;
     if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_trainer_create", "out"));
     ssdgs_trainer *trainer = (ssdgs_trainer *)ssdgs__allocate(context, sizeof *trainer);
@@ -12168,7 +12218,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_step");
+    ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_step");
     if (result) return result;
     result = ssdgs__trainer_step(trainer, stats);
     if (stats) {
@@ -12182,7 +12232,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
     int bad = 0;
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_run");
+    ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_run");
     if (result) return result;
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
@@ -12216,7 +12266,7 @@ static ssdgs_result ssdgs__trainer_refined(const ssdgs_trainer *trainer, int ind
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
                                              ssdgs_light *light) {
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_refined");
+    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_refined");
     return result ? result
                   : ssdgs__leave(trainer->context, ssdgs__trainer_refined(trainer, index, camera, light));
 }
@@ -12266,7 +12316,7 @@ SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *pho
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_evaluate");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_evaluate");
     return result ? result
                   : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
 }
@@ -12333,7 +12383,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations) {
     if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(model->context, "ssdgs_refine_photo");
+    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_refine_photo");
     return result ? result
                   : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
 }
@@ -12500,7 +12550,7 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
 
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_save");
+    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_save");
     return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_save(trainer, path));
 }
 
@@ -12585,7 +12635,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
 
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
     if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = ssdgs__enter(trainer->context, "ssdgs_trainer_load");
+    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_load");
     return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_load(trainer, path));
 }
 
@@ -12594,7 +12644,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
     size_t size = 0;
     if (iteration) *iteration = 0;
     if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = ssdgs__enter(context, "ssdgs_checkpoint_iteration");
+    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_checkpoint_iteration");
     if (result) return result;
     if (!path || !iteration)
         result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
@@ -12619,10 +12669,12 @@ SSDGS__SMALL_END
 #endif
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wignored-pragmas"
-#pragma float_control(pop)
+#pragma float_control(pop) /* on x86 this gives back the includer's FP_CONTRACT too */
 #pragma clang diagnostic pop
 #endif
+#if __clang_major__ < 12 || !SSDGS__X86
 #pragma STDC FP_CONTRACT DEFAULT
+#endif
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC pop_options
 #endif

@@ -2421,11 +2421,12 @@ static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_l
               ranged = !directional && l->range > 0, focused = !directional && l->focus > 0;
     const double inner = (double)l->cone[0], outer = (double)l->cone[1],
                  width = 2 * sin((inner + outer) / 2) * sin((outer - inner) / 2); /* of their cosines */
-    double norm2 = 0;
+    double length2 = 0, norm2 = 0;
+    for (int i = 0; i < 3; i++) length2 += (double)l->direction[i] * (double)l->direction[i];
     for (int i = 0; i < 3; i++) {
         lamp->place[i] = (float)l->position[i];
         lamp->intensity[i] = (float)(l->intensity[i] * frame->settings.light_scale);
-        lamp->cone[i] = (float)(spot || focused ? l->direction[i] : 0);
+        lamp->cone[i] = (float)(spot || focused ? l->direction[i] / sqrt(length2) : 0);
         norm2 += (double)lamp->cone[i] * (double)lamp->cone[i];
     }
     lamp->place[3] = (float)directional;

@@ -5,6 +5,7 @@
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* fork, alarm */
 #endif
+#include <limits.h>
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
@@ -85,6 +86,7 @@ static ssdgs_result render_scene(int objects) {
 }
 
 static void count_task(void *data, int index) { ((int *)data)[index]++; }
+static void count_high(void *data, int index) { ((int *)data)[index >> 29]++; }
 
 /* A call has come back, as it must: the message says of this function why. */
 static void refused(ssdgs_result result, const char *function) {
@@ -337,7 +339,8 @@ static void test_run(void) {
         CHECK(all.tries > 0 && all.calls == all.tries);
         for (int i = 0; i < 1000; i++) CHECK(done[i] == 1);
         CHECK(!ssdgs_context_run(all.context, 0, NULL, NULL));
-        CHECK(ssdgs_context_run(all.context, 1, NULL, done) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_context_run(all.context, 1, NULL, done) == SSDGS_ERR_ARGUMENT &&
+              strstr(ssdgs_error_message(all.context), "task is NULL")); /* no longer of those refused */
         CHECK(ssdgs_context_run(NULL, 1, count_task, done) == SSDGS_ERR_ARGUMENT && done[0] == 1);
         tear_down();
     }
@@ -450,6 +453,114 @@ static void test_fork(void) {
         tear_down();
     }
 #endif
+}
+
+/* Forks while a call is at work: the child may not use what that call has half made. A child whose callback
+   returns goes on, without threads. */
+#if !defined(_WIN32) && !defined(SSDGS_NO_THREADS)
+static int forks_at, fork_status, is_child;
+
+static void fork_now(void *user, const char *name) {
+    (void)user;
+    if (!name || --forks_at) return;
+    fflush(stdout);
+    const pid_t child = fork();
+    if (!child) {
+        alarm(20); /* hangs */
+        is_child = 1;
+        if (render() != SSDGS_ERR_ARGUMENT) _exit(2);
+    } else if (child < 0 || waitpid(child, &fork_status, 0) != child) fork_status = -1;
+}
+#endif
+
+static void test_fork_within(void) {
+#if !defined(_WIN32) && !defined(SSDGS_NO_THREADS)
+    static ssdgs_real first[SIDE * SIDE * 3];
+    for (int round = 0; round < 24; round++) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.threads = 4;
+        desc.tracer.stage = fork_now;
+        forks_at = 0;
+        set_up(&desc, 1);
+        CHECK(!render());
+        memcpy(first, color, sizeof first);
+        ssdgs_model_arrays(all.model); /* all is made again */
+        forks_at = 1 + round % 6;
+        const ssdgs_result result = render();
+        const int same = !result && !memcmp(first, color, sizeof first);
+        if (is_child) _exit(same ? 0 : 1);
+        CHECK(same && WIFEXITED(fork_status) && WEXITSTATUS(fork_status) == 0);
+        tear_down();
+    }
+#endif
+}
+
+/* ---- no context ---- */
+
+static void hear_code(void *user, ssdgs_result code, const char *message) {
+    ((int *)user)[code] += strstr(message, "ssdgs_context_create: ") == message;
+}
+
+static void *no_memory(void *user, size_t bytes) {
+    (void)user, (void)bytes;
+    return NULL;
+}
+static void nothing_back(void *user, void *memory) { (void)user, (void)memory; }
+
+static void test_no_context(void) {
+    int told[SSDGS_RESULT_COUNT];
+    for (int i = 0; i < 5; i++) {
+        const ssdgs_result want = i < 3 ? SSDGS_ERR_ARGUMENT : i < 4 ? SSDGS_ERR_ISA : SSDGS_ERR_MEMORY;
+        ssdgs_context_desc desc;
+        ssdgs_context *none = all.context;
+        memset(&desc, 0, sizeof desc);
+        memset(told, 0, sizeof told);
+        desc.logger.write = hear_code;
+        desc.logger.user = told;
+        if (i < 2) desc.threads = i ? 1025 : -1;
+        if (i == 2 || i == 4) desc.allocator.allocate = no_memory;
+        if (i == 4) desc.allocator.release = nothing_back;
+        if (i == 3) desc.isa = SSDGS_ISA_COUNT;
+        CHECK(ssdgs_context_create(&desc, &none) == want && !none && told[want] == 1);
+    }
+}
+
+/* ---- numbers ---- */
+
+static void test_odd_numbers(void) {
+    static const struct {
+        double value;
+        const char *text;
+    } numbers[] = {{0, "0"},
+                   {-7, "-7"},
+                   {1e30, "1e30"},
+                   {9.9999999e30, "1e31"},
+                   {-2.5e-9, "-2.5e-9"},
+                   {0.125, "0.125"},
+                   {1e-300, "1e-300"},
+                   {1.5e300, "1.5e300"}};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        char text[SSDGS__MESSAGE] = "";
+        size_t at = 0;
+        ssdgs__append_number(text, &at, numbers[i].value);
+        if (!CHECK(!strcmp(text, numbers[i].text))) printf("    %s, not %s\n", text, numbers[i].text);
+    }
+    if (test_denormal() > 0) {
+        char text[SSDGS__MESSAGE] = "";
+        size_t at = 0;
+        ssdgs__append_number(text, &at, 5e-324);
+        CHECK(!strncmp(text, "4.94", 4) && strstr(text, "e-324") != NULL);
+    }
+    CHECK(ssdgs__times(6, 7) == 42 && ssdgs__times(SIZE_MAX / 2, 3) == SIZE_MAX && ssdgs__times(0, 3) == 0);
+    int done[8] = {0}; /* in groups, up to the last int */
+    ssdgs__group_job job;
+    job.task = count_high;
+    job.data = done;
+    job.count = INT_MAX;
+    job.groups = 1 << 29;
+    ssdgs__group_task(&job, 5);
+    for (int i = 0; i < 8; i++) CHECK(done[i] == (i < 4));
 }
 
 /* ---- arguments ---- */
@@ -890,6 +1001,9 @@ int main(void) {
     test_progress();
     test_order();
     test_fork();
+    test_fork_within();
+    test_no_context();
+    test_odd_numbers();
     test_null();
     test_shared();
     test_bytes();

@@ -112,7 +112,7 @@ static void test_kept(void) {
     render(model, &b, lights, 2, &options, image[0], NULL);
     ssdgs_render_stats stats;
     render(model, &b, lights, 2, &options, image[0], &stats);
-    CHECK(stats.shadows_cached >= 2 * stats.shaded); /* whole blocks */
+    CHECK(stats.shadows_cached >= 2 * (size_t)stats.shaded); /* whole blocks */
     check_same(model, &a, lights, 2, &options, 0, 2, "kept shadows, back again");
     FIRST();
     options.max_error = 0;

@@ -150,9 +150,14 @@ static void test_focus(ssdgs_model *single, const ssdgs_camera *camera) {
     }
     light.kind = SSDGS_LIGHT_SPOT; /* beside a cone so narrow that its cosines are 1 it is dark */
     light.cone[0] = 0, light.cone[1] = (ssdgs_real)1e-9;
+    light.direction[0] = (ssdgs_real)sin(0.01);
+    light.direction[1] = (ssdgs_real)(1.0004 * cos(0.01) * sqrt(0.5)); /* not quite a unit vector */
+    light.direction[2] = -light.direction[1];
     alone(single, camera, &light, 1, &options, shot);
     middle_of(shot, 0, lit);
     CHECK(lit[0] == 0 && lit[1] == 0 && lit[2] == 0);
+    light.direction[1] = (ssdgs_real)(cos(0.01) * sqrt(0.5));
+    light.direction[2] = -light.direction[1];
     light.kind = SSDGS_LIGHT_POINT;
     light.focus = 3;
     alone(single, camera, &light, 1, &options, shot);

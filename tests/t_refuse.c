@@ -65,9 +65,16 @@ static const field medium_fields[] = {/* of settings, where no network scatters 
 };
 static const field render_fields[] = {
 #define R(name, low, high) REAL(ssdgs_render_options, name, low, high)
-    R(stop, 0, 1), R(alpha_threshold, 0, 1), R(max_error, 0, 1), R(light_detail, 0.01, 8),
-    R(transport_detail, 0.1, 8)
+    R(stop, 0, 1),
+    R(alpha_threshold, 0, 1),
+    R(max_error, 0, 1),
+    R(light_detail, 0.01, 8),
+    R(transport_detail, 0.1, 8),
 #undef R
+#define I(name, low, high) WHOLE(ssdgs_render_options, name, low, high)
+    I(terms, 0, 15),
+    I(antialias, 0, 1)
+#undef I
 };
 static const field train_fields[] = {
 #define I(name, low, high) WHOLE(ssdgs_train_options, name, low, high)
@@ -610,6 +617,19 @@ static void test_gaussian(void) {
             printf("    %s: %s\n", bad[i].name, ssdgs_error_message(context));
     }
     CHECK(ssdgs_model_get(two, 0, &again) == SSDGS_OK && again.scale[0] == back.scale[0]);
+    back = g; /* what is read can be written: an f0 that rounds to 1 */
+    back.f0 = 1;
+    CHECK(!ssdgs_model_set(two, 0, &back) && !ssdgs_model_get(two, 0, &again) &&
+          again.f0 > (ssdgs_real)0.99999 && !ssdgs_model_set(two, 0, &again));
+    ssdgs_settings odd = settings; /* numbers that are not used are finite too, as files need them */
+    odd.medium.absorption[1] = (ssdgs_real)NAN;
+    ssdgs_model *none = NULL;
+    CHECK(ssdgs_model_create(context, &odd, 1, &none) == SSDGS_ERR_ARGUMENT && !none);
+    odd = settings; /* and widths that are not used may be 0 */
+    odd.scattering.layers = odd.shadow.layers = odd.scattering.width = odd.shadow.width = 0;
+    odd.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    CHECK(!ssdgs_model_create(context, &odd, 1, &none));
+    ssdgs_model_destroy(none);
     CHECK(ssdgs_model_set(two, 2, &g) == SSDGS_ERR_ARGUMENT &&
           ssdgs_model_get(two, -1, &g) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_set(two, 0, NULL) == SSDGS_ERR_ARGUMENT &&

@@ -763,6 +763,11 @@ static void test_ahead(void) {
         CHECK(ssdgs_scene_light(ahead, i ? &object : NULL, 1, i ? NULL : lights, 2, NULL) ==
               SSDGS_ERR_ARGUMENT);
         CHECK(ssdgs_scene_shadow(ahead, 1, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+        CHECK(!ssdgs_scene_light(ahead, &object, 1, lights, 2, NULL));
+        CHECK(!ssdgs_scene_shadow(ahead, 1, point, 1, &fraction));
+        CHECK(ssdgs_scene_render(ahead, i ? &object : NULL, 1, i ? NULL : &camera, lights, 2, NULL, &image,
+                                 NULL) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_scene_shadow(ahead, 1, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
     }
     ssdgs_scene_occlude(NULL, NULL);
     ssdgs_scene_destroy(ahead);
