@@ -104,10 +104,10 @@ DETERMINISM
   does.
 
 ERRORS
-  Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
-  parameter. Nothing exits or prints. What is used of cameras, lights, networks and ASG must be finite.
-  Gaussians that are not finite are not drawn, or black; infinite sizes and opacities are clamped. A training
-  step with a gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
+  Calls return SSDGS_OK, which is 0, or a code, and then *out is NULL; ssdgs_error_message() names the file,
+byte, argument or parameter. Nothing exits or prints. What is used of cameras, lights, networks and ASG must
+be finite. Gaussians that are not finite are not drawn, or black; infinite sizes and opacities are clamped. A
+training step with a gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
@@ -137,8 +137,13 @@ SCENES, as engines have them: examples/engine.c is one
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
   A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range:
-  they cost what they reach, and keep their maps while nothing there moves. Lights without shadow have no
-  map.
+  they cost what they reach, and keep their maps while nothing there moves. Directional light reaches all
+  objects of the array: leave out what is far away. The bias of all shadows is the largest object's: leave
+  giants out. Maps are made anew when the number of lights or objects, a model, options.stop,
+  alpha_threshold or light_detail changes, and those of later lights when one goes dark: lights that flicker
+  come last. Lights without shadow have no map.
+  Lights and ambient light are multiplied by each model's own settings.light_scale. Where models differ in
+  it, tints make up for it.
   options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
   An object says how rough, bright and translucent its model is here. In models made in code
   settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: a ball of
@@ -373,6 +378,7 @@ SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_se
                                           ssdgs_model **out);
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model); /* NULL is fine */
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model);
+SSDGS_API int ssdgs_model_count(const ssdgs_model *model); /* Gaussians */
 /* Hands a model to another context, after loading it on another thread for instance, while no call is at work
    on either. Both must have the same allocator. ERR_ARGUMENT: they have not, or a trainer has the model. */
 SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to);
@@ -467,7 +473,8 @@ typedef struct ssdgs_light {
                          beneath a plane */
 } ssdgs_light;
 
-/* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. */
+/* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. fx
+   is 0, which rendering refuses, where eye is target or fov_x not within 0 .. pi. */
 SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
                                             const ssdgs_real up[3], ssdgs_real fov_x, int width, int height);
 /* A camera of an engine's matrices, (4,4) each: clip = projection x view x point. flags: SSDGS_COLUMN_MAJOR
@@ -499,7 +506,8 @@ typedef struct ssdgs_image {
     ssdgs_real *shadow;            /* (h,w) sum of weight x S, averaged over the lights */
     ssdgs_real *median_depth;      /* (h,w) camera depth where transmittance falls below 1/2; 0: nowhere */
     const ssdgs_real *scene_depth; /* (h,w) read: camera depth of meshes and the like, which hide Gaussians
-                                      whose centres are behind them; may be NULL or infinite */
+                                      whose centres are behind them; NaN, 0 and less: nothing does. May be
+                                      NULL */
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
@@ -517,8 +525,8 @@ typedef struct ssdgs_render_options {
 /* ambient: the irradiance on a surface with the world's normal x y z is the sum of ambient[0] .. [8] times 1,
    y, z, x, xy, yz, 3zz - 1, xz, xx - yy. Of radiance in real spherical harmonics these are the coefficients
    times 0.886227, then thrice 1.023327, 0.858086, 0.858086, 0.247708, 0.858086, 0.429043. A Gaussian gets
-   what of an even sky its own model leaves it, which is found once a model. Shadows do not change it;
-   image.scattering has it. */
+   what of an even sky its own model leaves it, which is found anew after each change of the model. Shadows do
+   not change it; image.scattering has it. */
 
 /* For games (max_error 1/16, stop 1/1024, transport_detail 0.7), the method as written, for speed (max_error
    1/4, stop 1/256, light_detail 0.7, transport_detail 0.6) and for previews (max_error 1/2, stop 1/64,
@@ -572,15 +580,16 @@ typedef struct ssdgs_object {
 } ssdgs_object;
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* where and as it was trained */
 
-/* A scene holds no objects: it keeps what its last frame found. Renders of one view in turn belong on one
-   scene, other views on their own. */
+/* A scene holds no objects: it keeps what its last frame found. Views of one frame share the lights' maps on
+   one scene, which is best while lights or objects move; while they rest a scene for each view is faster. To
+   shrink one destroy it and make another. */
 SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **out);
 SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene); /* NULL is fine */
 /* As ssdgs_render_ex(), of several objects. Their Gaussians are sorted and blended together and shadow each
-   other. Light scatters within each alone. A model that is scaled stays as bright: a light's E at a place is
-   the same for all. objects may be NULL when object_count is 0. ERR_ARGUMENT: a transform is none of the
-   above, a tint is negative, or the models mix settings.transfer (baked ones may). ERR_NONFINITE: a transform
-   or a background is not finite. ERR_LIMIT: 2^28 Gaussians in all, 65,535 objects. */
+   other. Light scatters within each alone. A model that is scaled stays as bright. objects may be NULL when
+   object_count is 0. ERR_ARGUMENT: a transform is none of the above, a tint is negative, or the models mix
+   settings.transfer (baked ones may). ERR_NONFINITE: a transform or a background is not finite. ERR_LIMIT:
+   2^28 Gaussians in all, 65,535 objects. */
 SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                           const ssdgs_camera *camera, const ssdgs_light *lights,
                                           int light_count, const ssdgs_render_options *options,
@@ -591,8 +600,9 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
 typedef struct ssdgs_occluder {
     void (*shadow)(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction);
     void *user;
-    uint64_t revision; /* another one whenever the answer for a light may differ; until then what was found is
-                          kept. Lights that move, come or go need none */
+    uint64_t
+        revision; /* another one whenever the answer for a light may differ; until then what was found for
+                     Gaussians is kept. Pixels ask in every frame. Lights that move, come or go need none */
 } ssdgs_occluder;
 /* For the frames from now on: Gaussians, what scatters in them and pixels get what it leaves. NULL: nothing
    else. Copied. */
@@ -627,8 +637,8 @@ SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
 typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8, SSDGS_RGBA16F, SSDGS_RGBA32F } ssdgs_format;
 /* color and alpha of a rendering without background as pixels of straight alpha; without image->alpha opaque.
-   Bytes are encoded by transfer, halves and floats stay linear. pitch: bytes from row to row, negative where
-   `pixels` is the first row of an image stored bottom row first. */
+   Bytes are encoded by transfer, halves and floats stay linear. pitch: bytes from row to row,
+   negative where `pixels` is the first row of an image stored bottom row first. */
 SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
                                ssdgs_format format, void *pixels, ptrdiff_t pitch);
 /* Lays such a rendering over a framebuffer: pixels become color + (1 - alpha) x what they hold, by light, so
@@ -3051,6 +3061,8 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
     return ssdgs__leave(model->context, result);
 }
 
+SSDGS_API int ssdgs_model_count(const ssdgs_model *model) { return model ? model->count : 0; }
+
 SSDGS_API const ssdgs_settings *ssdgs_model_settings(const ssdgs_model *model) {
     return model ? &model->settings : NULL;
 }
@@ -3391,7 +3403,9 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     ssdgs__look_along(e, f, u, camera.view);
     camera.width = width;
     camera.height = height;
-    camera.fx = camera.fy = (ssdgs_real)(0.5 * width / tan(0.5 * (double)fov_x));
+    const int sees =
+        fov_x > 0 && (double)fov_x < 3.14159265358979323846 && f[0] * f[0] + f[1] * f[1] + f[2] * f[2] > 0;
+    camera.fx = camera.fy = sees ? (ssdgs_real)(0.5 * width / tan(0.5 * (double)fov_x)) : 0;
     camera.cx = (ssdgs_real)width / 2;
     camera.cy = (ssdgs_real)height / 2;
     return camera;
@@ -3762,11 +3776,13 @@ static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *va
 
 SSDGS__SMALL_BEGIN
 
-/* Whether a light has a map: one that is dark needs none. */
-static int ssdgs__casts(const ssdgs_light *light) {
-    return !light->unshadowed &&
-           (light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0);
+/* Whether a light is not dark. */
+static int ssdgs__shines(const ssdgs_light *light) {
+    return light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0;
 }
+
+/* Whether it has a map. */
+static int ssdgs__casts(const ssdgs_light *light) { return !light->unshadowed && ssdgs__shines(light); }
 
 /* Whether a light's direction matters. */
 static int ssdgs__aimed(const ssdgs_light *light) {
@@ -5061,7 +5077,10 @@ static void ssdgs__tile_scene_depth(const ssdgs_frame *frame, ssdgs__tile *tile,
     for (int i = 0; i < 256; i++) {
         const int x = tile->x + (i / 16 & 3) * 4 + (i & 3), y = tile->y + i / 64 * 4 + (i % 16 >> 2);
         const int inside = x < tile->width && y < tile->height;
-        values[i] = inside ? frame->scene_depth[(size_t)y * (size_t)frame->stride + (size_t)x] : 0;
+        const ssdgs_real depth =
+            inside ? frame->scene_depth[(size_t)y * (size_t)frame->stride + (size_t)x] : 0;
+        /* median_depth's 0, or a depth by no alpha, hides nothing */
+        values[i] = inside && !(depth > 0) ? (ssdgs_real)FLT_MAX : depth;
     }
     tile->scene_depth = values;
 }
@@ -6338,9 +6357,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         const int off = ssdgs__beyond(frame, light, o);
         const int limited = ssdgs__limited(source), casts = ssdgs__casts(source);
         ssdgs_real reach[SSDGS__BLOCK];
-        const int lit =
-            o->light_count && !off &&
-            (!limited || ssdgs__reach_row(frame, o, light, gauss, reach, NULL) || frame->training);
+        int lit = o->light_count && !off && (ssdgs__shines(source) || frame->training);
+        if (lit && limited) lit = ssdgs__reach_row(frame, o, light, gauss, reach, NULL) || frame->training;
         for (int s = 0; frame->layer_count && !(lit && lighting->deferred) && s < live; s++) {
             for (int i = 0; i < SSDGS__PER_LIGHT; i++)
                 memset(ssdgs__layer(frame, layer + i) + 4 * at[s], 0, 3 * sizeof(ssdgs_real));
@@ -7054,7 +7072,7 @@ static void ssdgs__median_store(const ssdgs_frame *frame, const ssdgs__tile *til
 /* Whether a light reaches any of the objects that a tile blends. */
 static int ssdgs__reaches_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light) {
     const unsigned char *reach = ssdgs__reach(frame, light);
-    int any = !reach;
+    int any = !reach && ssdgs__shines(frame->lights + light);
     for (uint32_t i = 0; i < tile->count && !any; i++)
         any = tile->seen[i] && reach[frame->object_of[tile->list[i].gaussian / SSDGS__BLOCK]];
     return any;
@@ -7502,7 +7520,7 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     stats->instances = frame->views[0].instances;
     stats->light_instances = frame->light_instances;
     for (int i = 0; i < frame->object_count; i++)
-        stats->objects += !ssdgs__beyond(frame, -1, frame->objects + i);
+        stats->objects += frame->reach ? !ssdgs__beyond(frame, -1, frame->objects + i) : stats->visible > 0;
     for (int i = 0; i < frame->shaded_count; i++)
         stats->blackened += frame->color[4 * (size_t)frame->shaded[i] + 3] > 0;
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
@@ -8024,11 +8042,10 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
     ssdgs_context *context = model->context;
     const ssdgs_object object = ssdgs_object_default(model);
     ssdgs_placed placed;
-    ssdgs__bounds bounds;
     if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
-    const ssdgs_result result =
-        ssdgs__bounds_of_model(model, &bounds); /* without strays, of balls: too wide */
+    const ssdgs_result result = ssdgs__model_box(model);
     if (result) return result;
+    const ssdgs__bounds bounds = model->bounds; /* without strays, of balls: too wide */
     ssdgs__place(&object, &placed);
     ssdgs_real least[3] = {0, 0, 0}, most[3] = {0, 0, 0};
     for (int i = 0, none = 1; i < model->count; i++) {

@@ -2418,7 +2418,8 @@ static int gpu_casts(const ssdgs_light *l) {
 
 static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_light *l) {
     const int spot = l->kind == SSDGS_LIGHT_SPOT, directional = l->kind == SSDGS_LIGHT_DIRECTIONAL,
-              ranged = !directional && l->range > 0, focused = !directional && l->focus > 0;
+              ranged = !directional && l->range > 0, focused = !directional && l->focus > 0,
+              dark = !(l->intensity[0] > 0 || l->intensity[1] > 0 || l->intensity[2] > 0);
     const double inner = (double)l->cone[0], outer = (double)l->cone[1],
                  width = 2 * sin((inner + outer) / 2) * sin((outer - inner) / 2); /* of their cosines */
     double length2 = 0, norm2 = 0;
@@ -2431,10 +2432,10 @@ static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_l
     }
     lamp->place[3] = (float)directional;
     lamp->intensity[3] = (float)gpu_casts(l);
-    lamp->cone[3] = ranged ? (float)(1 / l->range) : 0;
+    lamp->cone[3] = dark ? 1e15f : ranged ? (float)(1 / l->range) : 0; /* a dark one reaches nothing */
     lamp->rim[0] = spot ? (float)(((1 + norm2) / 2 - cos(outer)) / width) : 1;
     lamp->rim[1] = spot ? (float)(0.5 / width) : 0;
-    lamp->rim[2] = (float)(spot || ranged || focused);
+    lamp->rim[2] = (float)(spot || ranged || focused || dark);
     lamp->rim[3] = focused ? (float)l->focus : 0;
 }
 

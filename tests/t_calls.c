@@ -620,6 +620,13 @@ static void test_null(void) {
           ssdgs_model_adopt(NULL, all.model) && ssdgs_model_save(NULL, FILE_NAME) &&
           ssdgs_trainer_step(NULL, NULL) && ssdgs_trainer_run(NULL, NULL, NULL) &&
           ssdgs_trainer_create(NULL, &photo, 1, NULL, &none) && ssdgs_stage_cpu(NULL, SSDGS_STAGE_SORT));
+    const ssdgs_real there[3] = {0, 1, 0};
+    for (int i = 0; i < 6; i++) { /* what sees nothing is refused */
+        static const double fov[6] = {1, 0, -1, 3.15, 40, (double)NAN};
+        camera = ssdgs_camera_look_at(three, i ? there : three, three, (ssdgs_real)fov[i], 4, 4);
+        CHECK(camera.fx == 0 &&
+              ssdgs_render(all.model, &camera, &photo.light, 1, &image) == SSDGS_ERR_ARGUMENT);
+    }
     camera = ssdgs_camera_look_at(NULL, three, three, 1, 4, 4);
     CHECK(camera.width == 0 && ssdgs_render(all.model, &camera, NULL, 0, &image) == SSDGS_ERR_ARGUMENT);
     camera = ssdgs_camera_look_at(three, NULL, three, 1, 4, 4);

@@ -501,13 +501,12 @@ static void test_scene_depth(void) {
         ssdgs_model_destroy(nearer);
     }
     for (int i = 0; i < PIXELS; i++) depth[i] = (ssdgs_real)plane[(i + i / SIDE) % 2];
-    depth[0] = (ssdgs_real)NAN; /* hides all */
     image.scene_depth = depth;
     for (int frame = 0; frame < 2; frame++) { /* the second one keeps nothing that the depths may change */
         if (frame)
             for (int i = 0; i < PIXELS; i++) depth[i] = (ssdgs_real)plane[(i + i / SIDE + 1) % 2];
         CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, &shot[2].stats));
-        for (int i = !frame; i < PIXELS; i++) {
+        for (int i = 0; i < PIXELS; i++) {
             const ssdgs_real *want = shot[(i + i / SIDE + frame) % 2].value;
             int equal = 1;
             for (int triple = 0; triple < 5; triple++)
@@ -517,7 +516,6 @@ static void test_scene_depth(void) {
                 }
             CHECK(equal && fabs((double)(shot[2].value[15 * PIXELS + i] - want[15 * PIXELS + i])) < 1e-6);
         }
-        if (!frame) CHECK(shot[2].value[15 * PIXELS] == 0);
     }
     CHECK(shot[2].stats.shaded < 300);
     enum { STRIDE = SIDE + 5 }; /* rows of the caller's */
@@ -553,6 +551,38 @@ static void test_scene_depth(void) {
             depth[i] = median[i] * (ssdgs_real)(1 + 1e-6);
         }
     }
+    for (int i = 0; i < PIXELS; i++) /* a depth by no alpha, or none: nothing is hidden */
+        depth[i] = i % 3 ? (ssdgs_real)(i % 3 - 2) : (ssdgs_real)NAN;
+    CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, NULL));
+    image.scene_depth = NULL;
+    memcpy(shot, shot + 2, sizeof *shot);
+    CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, NULL));
+    CHECK(same(shot, shot + 2));
+    ssdgs_model_destroy(model);
+}
+
+/* A dark light costs no networks and changes no picture; what is in sight is counted for one object too. */
+static void test_dark(void) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    const ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    ssdgs_light lights[2];
+    lights[0] = point_light(2, -2, 2);
+    lights[1] = point_light(-2, -2, 2);
+    for (int c = 0; c < 3; c++) lights[1].intensity[c] = 0;
+    CHECK(ssdgs_model_count(model) == 300 && ssdgs_model_count(NULL) == 0);
+    alone(model, &camera, lights, 1, &options, shot);
+    const double work = shot[0].stats.network_work;
+    alone(model, &camera, lights, 2, &options, shot + 1);
+    for (int i = 0; i < 12 * PIXELS; i++) CHECK(fabs((double)(shot[0].value[i] - shot[1].value[i])) < 1e-6);
+    CHECK(shot[1].stats.light_views == shot[0].stats.light_views && work > 0 &&
+          shot[1].stats.network_work >= work && shot[1].stats.network_work <= work);
+    CHECK(shot[1].stats.objects == 1);
+    ssdgs_camera behind = camera;
+    for (int c = 0; c < 4; c++) behind.view[c] = -behind.view[c], behind.view[8 + c] = -behind.view[8 + c];
+    alone(model, &behind, lights, 1, &options, shot);
+    CHECK(shot[0].stats.objects == 0 && shot[0].stats.visible == 0);
     ssdgs_model_destroy(model);
 }
 
@@ -1790,6 +1820,7 @@ int main(void) {
     test_shadows();
     test_baked();
     test_scene_depth();
+    test_dark();
     test_query();
     test_occluder();
     test_ahead();
