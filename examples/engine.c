@@ -21,11 +21,12 @@ typedef struct level {
     ssdgs_camera camera;
     ssdgs_light lights[LIGHTS];
     ssdgs_object objects[OBJECTS];
-    float light_scale; /* of the models: what their photographs' intensities are multiplied by */
+    float light_scale; /* of the first model: what its photographs' intensities are multiplied by */
     float box_low[3], box_high[3];
     /* the library's */
     ssdgs_context *context;
     ssdgs_model *models[2];
+    ssdgs_real low[2][3], high[2][3]; /* their bounds */
     ssdgs_scene *scene;
     float *color, *alpha;
 } level;
@@ -229,21 +230,21 @@ static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **o
 }
 
 /* An object of this height that stands on the floor at x, y, turned about the vertical. */
-static ssdgs_result place(ssdgs_model *model, float height, float x, float y, float turn,
-                          ssdgs_object *object) {
-    ssdgs_real low[3], high[3];
-    *object = ssdgs_object_default(model);
-    const ssdgs_result result = ssdgs_model_bounds(model, low, high);
+static ssdgs_object place(const level *l, int model, float height, float x, float y, float turn) {
+    const ssdgs_real *low = l->low[model], *high = l->high[model];
     const float s = height / (high[2] - low[2]), c = s * cosf(turn), d = s * sinf(turn);
     const float rows[12] = {c, -d, 0, x, d, c, 0, y, 0, 0, s, -s * low[2]};
     const float middle[2] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2};
-    memcpy(object->to_world, rows, sizeof rows);
+    ssdgs_object object = ssdgs_object_default(l->models[model]);
+    memcpy(object.to_world, rows, sizeof rows);
     for (int i = 0; i < 2; i++)
-        object->to_world[4 * i + 3] -= rows[4 * i] * middle[0] + rows[4 * i + 1] * middle[1];
-    return result;
+        object.to_world[4 * i + 3] -= rows[4 * i] * middle[0] + rows[4 * i + 1] * middle[1];
+    for (int i = 0; i < 3; i++) /* all are lit alike */
+        object.tint[i] = l->light_scale / ssdgs_model_settings(object.model)->light_scale;
+    return object;
 }
 
-static ssdgs_result move(level *l, float t) { /* t: 0 .. 1 */
+static void move(level *l, float t) { /* t: 0 .. 1 */
     const float turn = 6.2831853f * t, sun[3] = {0.48f, -0.36f, 0.8f}, aim[3] = {0, 0.2f, 0.4f};
     const float eye[3] = {3.2f * sinf(0.5f * sinf(turn)), -3.2f * cosf(0.5f * sinf(turn)), 1.7f};
     ssdgs_light *spot = l->lights, *far_away = l->lights + 1;
@@ -262,26 +263,24 @@ static ssdgs_result move(level *l, float t) { /* t: 0 .. 1 */
         far_away->intensity[c] = (c ? 0.5f + 0.1f * (float)c : 0.5f) / l->light_scale;
         far_away->position[c] = sun[c];
     }
-    ssdgs_result result = place(l->models[0], 1.0f, -0.75f, 0.1f, turn, l->objects);
-    if (!result) result = place(l->models[1], 0.8f, 0.85f, 0.3f, 0.6f, l->objects + 1);
-    if (!result) result = place(l->models[0], 0.5f, 0.15f, -0.8f, 2 - turn, l->objects + 2);
-    l->objects[2].tint[0] = 0.5f; /* the same model, bluer */
-    return result;
+    l->objects[0] = place(l, 0, 1.0f, -0.75f, 0.1f, turn);
+    l->objects[1] = place(l, 1, 0.8f, 0.85f, 0.3f, 0.6f);
+    l->objects[2] = place(l, 0, 0.5f, 0.15f, -0.8f, 2 - turn);
+    l->objects[2].tint[0] /= 2; /* the same model, bluer */
 }
 
 /* What an engine does for a frame. */
 static ssdgs_result draw_frame(level *l, float t) {
     ssdgs_image image;
     ssdgs_render_options options = ssdgs_render_options_default();
-    ssdgs_result result = move(l, t);
+    move(l, t);
     for (int i = 0; i < 9; i++) options.ambient[i / 3][i % 3] = sky[i / 3][i % 3] / l->light_scale;
     memset(&image, 0, sizeof image);
     image.color = l->color;
     image.alpha = l->alpha;
     image.scene_depth = l->depth;
-    if (!result)
-        result = ssdgs_camera_from_matrices(l->context, l->view, l->projection, SSDGS_COLUMN_MAJOR, l->width,
-                                            l->height, &l->camera);
+    ssdgs_result result = ssdgs_camera_from_matrices(l->context, l->view, l->projection, SSDGS_COLUMN_MAJOR,
+                                                     l->width, l->height, &l->camera);
     if (!result) result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, l->lights, LIGHTS, &options);
     if (!result) draw_meshes(l);
     if (!result) result = shade_meshes(l);
@@ -307,6 +306,7 @@ static ssdgs_result open_level(level *l, const char *const models[2]) {
     for (int i = 0; i < 2 && !result; i++)
         result = models[i] ? ssdgs_model_load(l->context, models[i], l->models + i, NULL)
                            : make_ball(l->context, i, l->models + i);
+    for (int i = 0; i < 2 && !result; i++) result = ssdgs_model_bounds(l->models[i], l->low[i], l->high[i]);
     if (!result) result = ssdgs_scene_create(l->context, &l->scene);
     if (result) return result;
     ssdgs_scene_occlude(l->scene, &meshes);

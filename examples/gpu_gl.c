@@ -2427,7 +2427,7 @@ static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_l
     for (int i = 0; i < 3; i++) {
         lamp->place[i] = (float)l->position[i];
         lamp->intensity[i] = (float)(l->intensity[i] * frame->settings.light_scale);
-        lamp->cone[i] = (float)(spot || focused ? l->direction[i] / sqrt(length2) : 0);
+        lamp->cone[i] = (float)(spot || focused ? (double)l->direction[i] / sqrt(length2) : 0);
         norm2 += (double)lamp->cone[i] * (double)lamp->cone[i];
     }
     lamp->place[3] = (float)directional;
