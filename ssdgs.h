@@ -101,7 +101,7 @@ DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
   training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, SIMD128 of
   WebAssembly and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm
-  does.
+  does; not so clang's with -ffast-math or -ffp-contract=fast, nor x87.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code, and then *out is NULL; ssdgs_error_message() names the file,
@@ -3239,7 +3239,7 @@ typedef struct ssdgs__cache {
 /* A light of the last frame; kept: this frame's is the same, and its views are the last one's. */
 typedef struct ssdgs__cached_light {
     ssdgs_light light;
-    int views, kept, shadows_ready, transport_ready;
+    int first, views, kept, shadows_ready, transport_ready; /* first: of its views among the frame's */
 } ssdgs__cached_light;
 
 /* Of a model or a scene, kept from frame to frame: what the last one found is there for the next. */
@@ -4615,6 +4615,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
             cached[i].kept = cached[i].kept && !moved;
             moved |= views != cached[i].views;
             cached[i].views = views;
+            cached[i].first = frame->view_count;
             frame->view_count += views;
         }
     }
@@ -6928,13 +6929,6 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     return (1 - w) * row[0] + w * row[1];
 }
 
-/* The first view of a light, or where it would be: views are in the order of lights. */
-static int ssdgs__first_view(const ssdgs_frame *frame, int light) {
-    int first = 1;
-    while (first < frame->view_count && frame->views[first].light < light) first++;
-    return first;
-}
-
 /* Transmittance from a light to a place in the world, by its maps from its first view on; -1 where none knows
    it. slope as above. */
 static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, int first, const ssdgs_real at[3],
@@ -6969,7 +6963,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
-    const int first = ssdgs__first_view(frame, light);
+    const int first = ssdgs__cached_lights(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i);
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
@@ -7160,7 +7154,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
     const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
-    const int first = ssdgs__first_view(frame, light);
+    const int first = ssdgs__cached_lights(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
@@ -7168,7 +7162,12 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
         const ssdgs_real z = pixels[layer] / cover;
         ssdgs__place_of_pixel(k, tile, i, z, ray, at);
-        if (ssdgs__passed_from(frame, light, first, at, slope) < 0) continue;
+        if (ssdgs__passed_from(frame, light, first, at, slope) < 0) { /* it is the Gaussians' */
+            const int own = (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16;
+            gradient[own] += dv[lane] / cover;
+            gradient[layer + 32] -= dv[lane] * pixels[own] / (cover * cover);
+            continue;
+        }
         for (int c = 0; c < 3; c++) { /* at = eye + z (x, y, 1) R */
             const ssdgs_real d = dv[lane] * slope[c];
             along += d * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
@@ -7746,8 +7745,7 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
                            light);
     const ssdgs__cached_light *lights = (const ssdgs__cached_light *)m->cached_lights.memory;
-    job.view = (const ssdgs_splat_view *)m->views.memory + 1; /* behind the camera's */
-    for (int i = 0; i < light; i++) job.view += lights[i].views;
+    job.view = (const ssdgs_splat_view *)m->views.memory + lights[light].first;
     job.end = job.view + lights[light].views;
     job.points = points;
     job.fraction = fraction;
@@ -13008,7 +13006,7 @@ SSDGS__FI void F(sincos)(V x, V *s, V *c) {
 }
 SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
-/* 2^x for x < 126, saturating below -126: degree 5 on [-1/2, 1/2], 2.2e-7 relative. */
+/* 2^x for x up to 127, saturating below -126: degree 5 on [-1/2, 1/2], 2.4e-7 relative. */
 SSDGS__FI V F(exp2)(V x) {
     x = VMAX(VSET(-126), x);
     const V whole = VROUND(x);
@@ -13159,7 +13157,7 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
 /* What both directions need of a projection, per lane. */
 typedef struct F(projection) {
     V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det,
-        opacity; /* cross = m0 x m1 */
+        opacity, clear; /* cross = m0 x m1; clear: 1 - opacity */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
@@ -13179,7 +13177,8 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
     p->inverse_z = k->orthographic ? VSET(1) : VDIV(VSET(1), VMAX(p->t[2], VSET(k->near_plane)));
-    for (int i = 0; i < 2; i++) { /* rows of J W */
+    p->inverse_z = VSEL(off, VSET(0), p->inverse_z); /* the world's 0 may be behind the camera */
+    for (int i = 0; i < 2; i++) {                    /* rows of J W */
         V focal = VMUL(VSET(i ? k->fy : k->fx), p->inverse_z);
         V slope = k->orthographic ? VSET(0) : VMUL(p->t[i], p->inverse_z);
         for (int j = 0; j < 3; j++)
@@ -13208,7 +13207,9 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     }
     p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
     p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));
-    p->opacity = F(sigmoid)(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), p->opacity)));
+    p->clear = VEXP(VNEG(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), p->opacity))));
+    p->opacity = VDIV(VSET(1), VADD(VSET(1), p->clear));
+    p->clear = VMUL(p->clear, p->opacity);
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
@@ -13279,21 +13280,20 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         const size_t v = i / SSDGS__VW % SSDGS__NV;
-        R lane[8][SSDGS__VW], any = 0;
+        R lane[8][SSDGS__VW];
         for (int l = 0; l < SSDGS__VW; l++)
-            for (int j = 0; j < 8; j++) {
+            for (int j = 0; j < 8; j++)
                 lane[j][l] = j == 6 ? 0 : splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
-                any = lane[j][l] != 0 ? 1 : any;
-            }
-        if (any == 0) continue;
         V total = VSET(0);
         V g[8];
         for (int j = 0; j < 8; j++) {
             g[j] = VLOAD(lane[j]);
             total = VADD(total, VABS(g[j]));
         }
+        const VM off = VGE(VSET(0), total); /* NaN stays in, to be refused */
+        if (VBITS(off) == (1 << SSDGS__VW) - 1) continue;
         F(projection) p;
-        F(project_lanes)(&p, k, gaussians + i, stride, VGE(VSET(0), total)); /* NaN stays in, to be refused */
+        F(project_lanes)(&p, k, gaussians + i, stride, off);
         const V inverse_det = VDIV(VSET(1), p.det);
         const V ka = VMUL(VADD(p.c, p.h), inverse_det);
         const V kb = VNEG(VMUL(p.b, inverse_det));
@@ -13343,8 +13343,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
             R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
             V raw = VLOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
-            V logit =
-                VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), VMUL(g[5], VSUB(VSET(1), p.opacity)), VSET(0));
+            V logit = VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), VMUL(g[5], p.clear), VSET(0));
             VSTORE(d, VADD(VLOAD(d), logit));
         }
         V dt[3];
@@ -13522,8 +13521,8 @@ SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, R depth, V al
     return VSEL(nearer, alpha, VSET(0));
 }
 
-/* Within a batch transmittance runs on below the stop: no select in the chain of products. Between batches,
-   -1 marks it. */
+/* Within a batch transmittance runs on below the stop: no select in the chain of products. Between batches
+   -1 marks a pixel that has stopped. */
 SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
 
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
@@ -13600,8 +13599,9 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
 
 /* Light walk, eqs. 6, 7, the depth cue and the flux if asked for: per entry, sums (n, 4) of rho v, rho, rho
    x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
-   in the transmittance, and takes part in it once its own distance is reached: two batches run along the
-   list, the nearer one leaves what it has met after each of its entries for the other to pick from.
+   in the transmittance, and takes part in it once its own distance is reached. So two cursors run along the
+   list: `applying` multiplies entries into the transmittance and notes it after each; `sampling`, ahead of it
+   by the bias, reads what was noted last before its own distance - bias.
    Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. An entry all
    of whose micro-tiles are dark is not sampled either, unless its Gaussian lies in other tiles too. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
@@ -14322,6 +14322,12 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     }
 }
 
+/* Where least_distance2 holds the length that a direction was divided by: it is shorter than 1 there. */
+SSDGS__FI VM F(held)(const V direction[3]) {
+    return VLT(VDOT3(direction[0], direction[1], direction[2], direction[0], direction[1], direction[2]),
+               VSET(0.99));
+}
+
 /* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3),
    the eye (3) and the bases (8 x 12), each (16 lanes). */
 SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, const R *drows, R *dgauss,
@@ -14394,7 +14400,9 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         if (!k->directional)
             along_light = VFMA(VMUL(VSET(2), g.irradiance),
                                VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), along_light);
-        const V along_eye = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+        along_light = VSEL(F(held)(g.wi), VSET(0), along_light);
+        const V along_eye =
+            VSEL(F(held)(g.wo), VSET(0), VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]));
         for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
             const V to_light = VMUL(VFNMA(g.wi[i], along_light, dwi[i]), g.inverse_light);
@@ -14414,9 +14422,10 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
        e_j = exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))
 
    D = (c_d / pi) f_d E and M = c_s sqrt(lambda mu) E are blended, and so are the normal n and, over the
-   pixel's alpha, F0 and Q = lambda xx' + mu yy' of the frames' axes. sqrt(lambda mu): as much light is sent
-   back, however narrow the lobe. p is h less its part along n: t_j chooses between the normals' mean, right
-   for smooth surfaces, and all of them, right for rough ones. n.wi / (wo.h)^2 is what shadowing and masking
+   pixel's alpha, F0 and Q = lambda xx' + mu yy' of the frames' axes. With the factor
+   sqrt(lambda mu) a lobe sends back as much light, however narrow it is. p is h less its part along n. With
+   t_j = 0 a lobe sees the normals' mean, right for smooth surfaces; with 1 each Gaussian's own, right for
+   rough ones. n.wi / (wo.h)^2 is what shadowing and masking
    of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0, wo.h >= SSDGS__GRAZING.
 
    S is eq. 8's of two blended things: the shadow network's answers, and (1 - soft) v + soft v_g. v is the
@@ -14511,7 +14520,7 @@ SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2], V lobes[SSDGS_ASG_CO
 
 /* Eq. 8: S of a visibility and the shadow network's answer. */
 SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, V visibility, V answer) {
-    const V v = VMAX(VSET(0.01), VMIN(VSET(0.99), visibility));
+    const V v = VMAX(VMIN(visibility, VSET(0.99)), VSET(0.01)); /* NaN: 0.99 */
     if (!k->shadow) return VSET(1);
     if (!k->refined_shadow) return visibility;
     return F(sigmoid)(k->residual_shadow ? VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), answer) : answer);
@@ -14682,7 +14691,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 dwo[i] = VADD(dwo[i], dsum);
                 dh[i] = VFMA(dcosine, g.n[i], dsum);
             }
-            const V along_light = VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]);
+            const V along_light =
+                VSEL(F(held)(g.wi), VSET(0), VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]));
             const V along_eye = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
             V ddepth = VSET(0);
             V dat[3];
@@ -14944,7 +14954,8 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
 /* ==== >>image_kernels  SSIM, normals from depths, Adam ==== */
 
 /* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of
-   "black"; values are stored less 1/2, which leaves variances as they are and keeps them from cancelling.
+   "black"; values are stored less 1/2, which leaves variances as they are and keeps them from
+   cancelling in photographs of 0 .. 1.
    Writes d(SSIM)/d(mean, E[i^2], E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows
    of the stride. */
 SSDGS__FN void F(ssim_row)(const ssdgs__ssim_row *at, R sums[3]) {

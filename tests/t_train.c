@@ -218,7 +218,7 @@ static void test_resume(void) {
         ssdgs_train_options other = options;
         unsigned char *bytes = NULL;
         size_t size = 0;
-        CHECK(!ssdgs__read_file(context, "build/t_train.ckpt", &bytes, &size));
+        CHECK(!ssdgs__read_file(context, "build/t_train.ckpt", 0, &bytes, &size));
         CHECK(!ssdgs_model_create(context, &settings, 0, &model));
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
         for (int i = 0; i < 200; i++) {
