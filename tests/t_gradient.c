@@ -630,6 +630,115 @@ static void test_octaves(void) {
     free(gauss);
 }
 
+/* A light nearer to a Gaussian than the least distance: what its length is held at has no gradient. */
+static void test_held(void) {
+    static ssdgs_real gauss[SSDGS_CHANNELS * SSDGS__BLOCK], rows[SSDGS__ROWS * SSDGS__BLOCK],
+        drows[SSDGS__ROWS * SSDGS__BLOCK], dgauss[SSDGS_CHANNELS * SSDGS__BLOCK], sums[SSDGS__LANE_SUMS * 16];
+    const ssdgs__kernels *kernels = ssdgs__table(SSDGS_ISA_SCALAR);
+    for (int s = 0; s < SSDGS__BLOCK; s++)
+        gauss[SSDGS_FRAME * SSDGS__BLOCK + s] = 1, gauss[(SSDGS_FRAME + 2) * SSDGS__BLOCK + s] = 0.9;
+    drows[SSDGS__IRRADIANCE * SSDGS__BLOCK] = 1e-6, drows[SSDGS__COSINE * SSDGS__BLOCK] = 1;
+    for (int inside = 0; inside < 2; inside++) {
+        ssdgs__lighting k;
+        memset(&k, 0, sizeof k);
+        memset(dgauss, 0, sizeof dgauss);
+        k.least_distance2 = 1e-6, k.eye[2] = -2;
+        k.light[0] = inside ? 0.3e-3 : 1.2e-3, k.light[1] = inside ? 0.4e-3 : 1.6e-3;
+        kernels->reflect_backward(&k, gauss, drows, dgauss, sums);
+        for (int c = 0; c < 3; c++) {
+            double value[2];
+            for (int side = 0; side < 2; side++) {
+                gauss[c * SSDGS__BLOCK] = side ? -1e-8 : 1e-8;
+                kernels->reflect(&k, gauss, rows);
+                value[side] =
+                    1e-6 * rows[SSDGS__IRRADIANCE * SSDGS__BLOCK] + rows[SSDGS__COSINE * SSDGS__BLOCK];
+            }
+            gauss[c * SSDGS__BLOCK] = 0;
+            const double want = (value[0] - value[1]) / 2e-8;
+            if (!CHECK(fabs(dgauss[c * SSDGS__BLOCK] - want) < 1e-3 + 1e-4 * fabs(want)))
+                printf("    inside %d, %d: %g, not %g\n", inside, c, dgauss[c * SSDGS__BLOCK], want);
+        }
+    }
+}
+
+/* A stray, which the light's map does not cover, in front of a cloud: its pixels' visibility is its own. */
+enum { STRAYS = 300, STRAY_SIDE = 24 };
+static double stray_loss(ssdgs_model *model, ssdgs_frame *frame, int *without) {
+    ssdgs_camera camera;
+    ssdgs_light light;
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    const int pixels = STRAY_SIDE * STRAY_SIDE;
+    double sum = 0;
+    memset(&camera, 0, sizeof camera);
+    memset(&light, 0, sizeof light);
+    camera.width = camera.height = STRAY_SIDE, camera.fx = camera.fy = 60, camera.cx = camera.cy = 12;
+    camera.near_plane = 0.02, camera.view[0] = camera.view[5] = camera.view[10] = 1;
+    light.position[0] = 3, light.position[2] = 2;
+    for (int c = 0; c < 3; c++) light.intensity[c] = 9;
+    CHECK(!ssdgs__frame_of_model(frame, model, &camera, &light, 1, &options, 0, 1) &&
+          !ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
+    for (int i = 0; i < STRAYS; i++) frame->seen[i] = 1, frame->visibility[i] = i ? 0.2 : 1; /* held fixed */
+    CHECK(!ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
+    for (int i = 0; i < 3 * pixels; i++) {
+        frame->pixel_gradient[i] = 1 + 0.5 * sin(0.37 * i);
+        sum += frame->pixel_gradient[i] * frame->pixels[i];
+    }
+    memset(frame->pixel_gradient + 3 * pixels, 0, (size_t)pixels * sizeof(ssdgs_real));
+    frame->normal_gradient = NULL;
+    for (int i = 0; without && i < pixels; i++) {
+        const double alpha = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2)[i],
+                     z = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0)[i] / alpha,
+                     at[3] = {(i % STRAY_SIDE + 0.5 - 12) / 60 * z, (i / STRAY_SIDE + 0.5 - 12) / 60 * z, z};
+        *without += alpha > 1e-3 && ssdgs__passed_from(frame, 0, 1, at, NULL) < 0;
+    }
+    return sum;
+}
+
+static void test_stray(void) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
+    settings.transfer = SSDGS_TRANSFER_NONE;
+    ssdgs_model *model = NULL;
+    static ssdgs_frame frame, other;
+    int without = 0;
+    if (!CHECK(!ssdgs_model_create(context, &settings, STRAYS, &model))) return;
+    ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t i = 0; i < STRAYS; i++) {
+        ssdgs_real *p = v.gaussians + i;
+        for (size_t j = 0; j < 3; j++) {
+            p[j * v.stride] = 0.4 * (draw(3 * i + j) - 0.5) + (j == 2 ? 2 : 0);
+            p[(SSDGS_LOG_SCALE + j) * v.stride] = -3.5;
+        }
+        p[SSDGS_OPACITY * v.stride] = -2 + 0.01 * (double)i;
+        p[(SSDGS_ASG_WEIGHT + 3) * v.stride] = -1;
+    }
+    for (size_t j = 0; j < 3; j++) {
+        v.gaussians[j * v.stride] = j == 2 ? 0.1 : 0.002;
+        v.gaussians[(SSDGS_LOG_SCALE + j) * v.stride] = -4.3;
+    }
+    ssdgs_real *opacity = v.gaussians + SSDGS_OPACITY * v.stride;
+    *opacity = 0;
+    (void)stray_loss(model, &frame, &without);
+    CHECK(without > 20);
+    CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD));
+    double found[5];
+    for (int i = 0; i < 5; i++)
+        found[i] = frame.gradient[SSDGS_OPACITY * frame.gaussians.stride + 60 * (size_t)i];
+    for (int i = 0; i < 5; i++) {
+        double value[2];
+        for (int side = 0; side < 2; side++) {
+            opacity[60 * i] += side ? -2e-6 : 1e-6;
+            ssdgs_model_arrays(model);
+            value[side] = stray_loss(model, &other, NULL);
+        }
+        opacity[60 * i] += 1e-6;
+        const double want = (value[0] - value[1]) / 2e-6;
+        if (!CHECK(fabs(found[i] - want) < 1e-5 + 1e-4 * fabs(want)))
+            printf("    stray's %d: %g, not %g\n", 60 * i, found[i], want);
+    }
+    ssdgs_model_destroy(model);
+}
+
 int main(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
@@ -760,6 +869,8 @@ int main(void) {
         for (int c = 0; c < 3; c++) s.options.ambient[0][c] = 0.4 + 0.9 * c;
         run(&s);
     }
+    test_held();
+    test_stray();
     ssdgs_context_destroy(context);
     test_row(0, "53", "gradients of every group under every option");
     TEST_END();

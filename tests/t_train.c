@@ -2675,6 +2675,50 @@ static void test_budget(void) {
     ssdgs_context_destroy(context);
 }
 
+/* An object a thousand times its size from the world's origin, which lies behind the cameras: the lanes of
+   Gaussians that are not drawn stand there. */
+static void test_far_origin(void) {
+    enum { W = 48, N = 4 };
+    static unsigned char bytes[W * W * 4];
+    static ssdgs_photo shots[N];
+    const double size = 1e-6;
+    const ssdgs_real at[3] = {(ssdgs_real)(-500 * size), (ssdgs_real)(-500 * size), (ssdgs_real)(500 * size)},
+                     up[3] = {0, 1, 0};
+    ssdgs_train_options options = ssdgs_train_options_default();
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    ssdgs_context *context = NULL;
+    ssdgs_train_stats stats;
+    options.iterations = 20;
+    options.initial_points = 300;
+    for (int c = 0; c < 3; c++) {
+        options.bounds_min[c] = at[c] - (ssdgs_real)(0.5 * size);
+        options.bounds_max[c] = at[c] + (ssdgs_real)(0.5 * size);
+    }
+    for (int i = 0; i < W * W; i++) {
+        for (int c = 0; c < 3; c++) bytes[4 * i + c] = (unsigned char)(80 + i % W + 2 * (i / W));
+        bytes[4 * i + 3] = 255;
+    }
+    for (int i = 0; i < N; i++) {
+        const ssdgs_real eye[3] = {at[0] + (ssdgs_real)(0.6 * size * sin(i)),
+                                   at[1] + (ssdgs_real)(0.6 * size * cos(i)), at[2] - (ssdgs_real)(2 * size)};
+        memset(shots + i, 0, sizeof *shots);
+        shots[i].camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.3, W, W);
+        for (int c = 0; c < 3; c++) {
+            shots[i].light.position[c] = eye[c] + (ssdgs_real)size;
+            shots[i].light.intensity[c] = (ssdgs_real)(5 * size * size);
+        }
+        shots[i].pixels = bytes;
+    }
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model) &&
+          !ssdgs_trainer_create(model, shots, N, &options, &trainer));
+    for (int i = 0; i < options.iterations && trainer; i++)
+        CHECK(!ssdgs_trainer_step(trainer, &stats) && stats.skipped_steps == 0);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     make_photos();
     test_adam(0);
@@ -2718,5 +2762,6 @@ int main(void) {
     test_anchor();
     test_schedule();
     test_published_rates();
+    test_far_origin();
     TEST_END();
 }
