@@ -948,7 +948,8 @@ typedef struct ssdgs_gpu_hook { /* set to 0 first */
        frame.image and frame.statistics ask for; without an image, and after other stages, all. NULL: it is
        there. */
     ssdgs_result (*fetch)(void *user, struct ssdgs_frame *frame, ssdgs_stage stage);
-    /* A model, or the memory of some frames (frame.memory), is gone. NULL: nobody listens. */
+    /* A model, or the memory of some frames (frame.memory), is gone. NULL: nobody listens. So user must live
+       until the context and all that was made on it are gone. */
     void (*released)(void *user, const void *gone);
 } ssdgs_gpu_hook;
 

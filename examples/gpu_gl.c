@@ -28,9 +28,11 @@
 
 typedef struct gpu gpu;
 gpu *gpu_create(char *message, size_t size); /* NULL: message says why, as where there is no OpenGL 4.3 */
-void gpu_destroy(gpu *g);                    /* after the contexts that have its hook; NULL is fine */
-ssdgs_gpu_hook gpu_hook(gpu *g);    /* for several contexts, in one call at a time. Once the device fails all
-                                       frames are the CPU's */
+void gpu_destroy(
+    gpu *g); /* after the contexts that have its hook, and all that was made on them; NULL is fine */
+/* May serve several contexts, one call at a time, on threads without a GLX context. A frame in which the
+   device fails ends with its message; those after it are the CPU's. */
+ssdgs_gpu_hook gpu_hook(gpu *g);
 const char *gpu_name(const gpu *g); /* of the device */
 /* 1: each stage ends when the device is done with it, for timing. 0, the default: the device gets a frame's
    stages all at once. */
@@ -216,7 +218,7 @@ struct gpu {
     size_t instance_room; /* of each view */
     const void *model;    /* which one, of which revision, is uploaded */
     uint64_t revision;
-    int exposed;         /* with what of ambient light comes to its Gaussians */
+    int exposed;         /* 1: the buffer `exposures` is this model's */
     uint32_t revisions;  /* that flux has had so far */
     double detail;       /* options.transport_detail that transport has */
     int busy;            /* 1: programs may still run */
@@ -237,8 +239,8 @@ struct gpu {
 enum { GPU_PARTS = 9 };
 /* clang-format off */
 
-/* What all programs begin with. A group is 256 threads, or a tile's pixels. Of more groups than a dimension can
-   have, group() is the number. */
+/* What all programs begin with. A group is 256 threads, or a tile's pixels. group() counts
+   through groups, where they are more than a dimension can have, too. */
 static const char gpu_common[] = "#version 430\n" GPU_GLSL(
 layout(local_size_x = 256) in;
 uint lane() { return gl_LocalInvocationIndex; }
@@ -708,7 +710,9 @@ float reach_of(lamp l, vec3 at) {
     float far = distance2 * l.cone.w * l.cone.w;
     way /= sqrt(distance2 > 0.0 ? distance2 : 1.0);
     vec3 beside = way - l.cone.xyz;
-    float share = clamp(l.rim.x - l.rim.y * dot(beside, beside), 0.0, 1.0);
+    /* amid it the cosine is 0 */
+    float beside2 = distance2 > 0.0 ? dot(beside, beside) : 1.0 + dot(l.cone.xyz, l.cone.xyz);
+    float share = clamp(l.rim.x - l.rim.y * beside2, 0.0, 1.0);
     float focused = l.rim.w > 0.0 ? pow(max(dot(way, l.cone.xyz), 0.0), l.rim.w) : 1.0;
     return share * share * focused * max(0.0, 1.0 - far * far);
 }
@@ -871,7 +875,7 @@ void add_light(int i) {
         find_geometry(l);
         uint at = uint(counts.x) * uint(i) + me;
         if (shadowed) visibility = visibilities[at];
-        if (casts && on(depth_cue)) cue = cues[at];
+        if (casts && on(depth_cue) && on(scattering_term)) cue = cues[at];
         for (int k = 0; k < lengths && on(transport); k++) {
             float brought = casts ? transported[uint(counts.x) * uint(lengths * i + k) + me] : 0.0;
             if (casts) arrives[k] = irradiance > 0.0 ? brought / irradiance : 0.0;
@@ -1277,21 +1281,23 @@ layout(std430, binding = 3) buffer of_gaussians { pair of_gaussian[]; };
 layout(std430, binding = 4) buffer groups { uint before[]; };
 
 uvec4 box(splat s) {
-    vec2 last = vec2(16u * tiles_x - 1u, 16u * tiles_y - 1u), low = vec2(s.x - s.extent_x, s.y - s.extent_y) - 1,
-         high = vec2(s.x + s.extent_x, s.y + s.extent_y) + 1;
+    vec2 last = vec2(16u * tiles_x - 1u, 16u * tiles_y - 1u);
+    precise vec2 low = vec2(s.x - s.extent_x, s.y - s.extent_y) - 1,
+                 high = vec2(s.x + s.extent_x, s.y + s.extent_y) + 1;
     return uvec4(clamp(low, vec2(0), last), clamp(high, vec2(0), last)) / 16u;
 }
 uint touched(splat s, uint tx, uint ty) {
-    float a = s.xx * 0.999996, b = s.xy, c = s.yy * 0.999996; /* more than their rounding */
-    float best_x = -s.xy / (2 * s.xx), best_y = -s.xy / (2 * s.yy);
+    /* precise: two programs ask, and must get the same answer */
+    precise float a = s.xx * 0.999996, b = s.xy, c = s.yy * 0.999996; /* more than their rounding */
+    precise float best_x = -s.xy / (2 * s.xx), best_y = -s.xy / (2 * s.yy);
     float least = log2_threshold - s.log2_opacity - 1e-3;
     uint mask = 0u;
     for (uint micro = 0u; micro < 16u; micro++) {
-        vec2 low = vec2(16u * tx + 4u * (micro & 3u), 16u * ty + 4u * (micro >> 2u)) + 0.5 - vec2(s.x, s.y),
+        precise vec2 low = vec2(16u * tx + 4u * (micro & 3u), 16u * ty + 4u * (micro >> 2u)) + 0.5 - vec2(s.x, s.y),
              high = low + 3, near = clamp(vec2(0), low, high);
-        float on_x = clamp(best_x * near.y, low.x, high.x), on_y = clamp(best_y * near.x, low.y, high.y);
-        float p = (c * on_y + b * near.x) * on_y + a * near.x * near.x;
-        float q = (c * near.y + b * on_x) * near.y + a * on_x * on_x;
+        precise float on_x = clamp(best_x * near.y, low.x, high.x), on_y = clamp(best_y * near.x, low.y, high.y);
+        precise float p = (c * on_y + b * near.x) * on_y + a * near.x * near.x;
+        precise float q = (c * near.y + b * on_x) * near.y + a * on_x * on_x;
         if (max(p, q) >= least) mask |= 1u << micro;
     }
     return mask;
@@ -1598,9 +1604,9 @@ float added(uint which, uint entry) {
 );
 
 /* Eqs. 6, 7 and the depth cue. Per entry the sums of rho v, rho and rho x cue. It is sampled once all that is
-   nearer than its distance - bias is in the transmittance, so two windows run along the list; a thread takes of them what its
-   micro-tile has. In the dark nothing is applied any more, and what is in
-   no other tile is not sampled, unless for its cue: v = 0 / 1. */
+   nearer than its distance - bias is in the transmittance, so two windows run along the list; a thread takes
+   of them what its micro-tile has. In the dark nothing is applied any more, and what is in no other tile is
+   not sampled, unless for its cue: v = 0 / 1. */
 static const char gpu_walk_light[] = GPU_GLSL(
 layout(std430, binding = 3) readonly buffer depths { float depth[]; };
 layout(std430, binding = 4) readonly buffer of_gaussians { pair of_gaussian[]; };
@@ -1949,14 +1955,13 @@ void gpu_wait(gpu *g, int waits) { g->waits = waits; }
 
 #ifdef _WIN32 /* where drivers have no EGL */
 static void *gpu_open_egl(void) { return NULL; }
-static void gpu_close_egl(void *library) { (void)library; }
 static void *gpu_find(void *library, const char *name) {
     (void)library, (void)name;
     return NULL;
 }
 #else
+/* It stays open: loaded again it would make its displays anew, which are never closed. */
 static void *gpu_open_egl(void) { return dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL); }
-static void gpu_close_egl(void *library) { dlclose(library); }
 static void *gpu_find(void *library, const char *name) { return dlsym(library, name); }
 #endif
 
@@ -2080,7 +2085,7 @@ gpu *gpu_create(char *message, size_t size) {
     gpu *g = (gpu *)calloc(1, sizeof *g);
     const char *missing = "memory";
     if (g && !gpu_load_egl(&g->egl)) missing = "libEGL.so.1";
-    else if (g && !gpu_find_display(g)) missing = "a display with OpenGL 4.3";
+    else if (g && !gpu_find_display(g)) missing = "display with OpenGL 4.3 and 11 storage blocks a program";
     else if (g) return g;
     if (size) snprintf(message, size, "no GPU: there is no %s", missing);
     gpu_destroy(g);
@@ -2114,8 +2119,8 @@ static void gpu_reserve(gpu *g, gpu_buffer *b, size_t size) {
     const size_t more = b->size + b->size / 2;
     if (size < more && more <= (size_t)g->most) size = more;
     if (size > (size_t)g->most) { /* so that 32 bits count the values of any buffer, too */
-        gpu_fail(g, SSDGS_ERR_MEMORY, "a buffer of %lu bytes, where programs can see %lu",
-                 (unsigned long)size, (unsigned long)g->most);
+        gpu_fail(g, SSDGS_ERR_LIMIT, "a buffer of %lu bytes, where programs can see %lu", (unsigned long)size,
+                 (unsigned long)g->most);
         return;
     }
     g->owner = NULL; /* it may have been something that is kept */
@@ -2541,7 +2546,10 @@ static void gpu_reserve_transport(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve_lights(g, frame->light_count);
     gpu_reserve(g, &f->nodes, lights * all * 8 * sizeof(float));
     gpu_reserve(g, &f->transport, lights * GPU_LENGTHS * n * sizeof(float));
-    if (f->arrived.size < arrived) gpu_upload(g, &f->arrived, gpu_host(g, arrived), arrived);
+    if (f->arrived.size < arrived) { /* 0: what later models find behind these too */
+        gpu_reserve(g, &f->arrived, arrived);
+        gpu_upload(g, &f->arrived, gpu_host(g, f->arrived.size), f->arrived.size);
+    }
     for (int i = 0; i < f->lights && (g->detail < detail || g->detail > detail); i++) f->light[i].ready = 0;
     g->detail = detail;
 }
@@ -2905,10 +2913,9 @@ static void gpu_upload_model(gpu *g, const ssdgs_placed *o) {
     g->revision = o->revision;
 }
 
-/* What all stages find on the device. A view whose last frame's results it has stays `cached`; host memory
-   has none of theirs, which a record of NULL marks. */
+/* What all stages find on the device. A view stays `cached` if the device still has its results; a record of
+   NULL says that host memory has not. */
 static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
-    const gpu_fact none = {0, 0, 0};
     const size_t n = (size_t)frame->count, lights = (size_t)frame->light_count;
     gpu_frame *f = &g->frame;
     gpu_reserve(g, &f->facts, (size_t)frame->view_count * sizeof(gpu_fact));
@@ -2923,7 +2930,6 @@ static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
         v->cached = v->cached && !v->record && g->owner == frame->memory;
         v->record = NULL;
         v->light_map = NULL;
-        if (!v->cached) gpu_write(g, &f->facts, (size_t)i * sizeof none, &none, sizeof none);
     }
 }
 
@@ -2984,9 +2990,10 @@ static int gpu_had_room(gpu *g, ssdgs_frame *frame) {
         v->instances = facts[i].instances;
         v->nearest = (ssdgs_real)facts[i].nearest;
     }
-    if (most > UINT32_MAX / 2) gpu_fail(g, SSDGS_ERR_LIMIT, "too many splats for the image");
+    if (most > UINT32_MAX / 2) gpu_fail(g, SSDGS_ERR_LIMIT, "too many splats for the image or a light's map");
     if (g->result || most <= g->instance_room) return 1;
-    g->instance_room = most + most / 4;
+    const size_t fits = (size_t)g->most / 16; /* of 16 bytes, at most */
+    g->instance_room = most + most / 4 > fits && most <= fits ? fits : most + most / 4;
     return 0;
 }
 
@@ -3019,6 +3026,19 @@ static int gpu_is(ssdgs_real value, double expected) {
     return !((double)value < expected || (double)value > expected);
 }
 
+/* Do a frame's buffers, but for lists of instances, fit what programs can see? */
+static int gpu_holds(const gpu *g, const ssdgs_frame *frame) {
+    const ssdgs_placed *o = frame->objects;
+    const double n = frame->count, lights = frame->light_count, layers = frame->layer_count + 1,
+                 pixels = (double)frame->camera.width * frame->camera.height,
+                 sizes[4] = {3 * pixels * layers, 4 * n * layers,
+                             (double)o->gaussians.stride * SSDGS_CHANNELS,
+                             n * lights * (frame->flux ? GPU_LENGTHS : 1)};
+    int holds = 1;
+    for (int i = 0; i < 4; i++) holds = holds && sizes[i] * sizeof(float) <= g->most;
+    return holds && pixels * lights * sizeof(float) <= g->most;
+}
+
 /* Does the backend do this frame? Others are the CPU's. */
 static int gpu_takes(const gpu *g, const ssdgs_frame *frame) {
     const ssdgs_placed *o = frame->objects;
@@ -3026,6 +3046,7 @@ static int gpu_takes(const gpu *g, const ssdgs_frame *frame) {
     if (g->lost || frame->training || frame->last != SSDGS_STAGE_COMPOSITE || frame->maps) return 0;
     if (!plain || frame->occluder || frame->scene_depth) return 0;
     if (frame->diffuse || frame->layer_pixels || frame->median_depth) return 0;
+    if (!gpu_holds(g, frame)) return 0;
     for (int i = 0; i < 3; i++) plain = plain && gpu_is(o->offset[i], 0) && gpu_is(o->tint[i], 1);
     plain = plain && gpu_is(o->roughness, 1) && gpu_is(o->specular, 1) && gpu_is(o->translucency, 1);
     return plain && !o->turned && gpu_is(o->scale, 1) && !o->settings.baked && !o->mask && o->gaussians.count;
@@ -3107,7 +3128,6 @@ void gpu_destroy(gpu *g) {
     if (!g) return;
     if (g->egl.context)
         g->egl.DestroyContext(g->egl.display, g->egl.context); /* with its buffers and programs */
-    if (g->egl.library) gpu_close_egl(g->egl.library);
     free(g->frame.light);
     free(g->host);
     free(g);
