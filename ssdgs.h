@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.2 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.3 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -175,6 +175,9 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
+  0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
+         lights cost nothing; scene_depth of 0 or NaN hides nothing. Files of 2^28 Gaussians; broken rows are
+         named. ssdgs_model_count(). A forked child is kept from half-made state.
   0.2.2  The scattering network is 128 wide, not 64: metal and plastic train better. The trainer's options
          densify_shadow and prune_weight are gone; they had come to be worth nothing. What a spot, range or
          focus misses no longer darkens what it blends with; ambient highlights are as bright as lamps'.
@@ -203,7 +206,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 202 /* 0.2.2; written into files */
+#define SSDGS_VERSION 203 /* 0.2.3; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
