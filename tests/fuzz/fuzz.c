@@ -671,7 +671,7 @@ static void fuzz_checkpoint(const unsigned char *data, size_t size) {
         unsigned char *read = NULL;
         HOLDS(!ssdgs_trainer_step(trainer, NULL));
         const char *path = put_file("fuzz.checkpoint", "", 0);
-        HOLDS(!ssdgs_trainer_save(trainer, path) && !ssdgs__read_file(context, path, &read, &saved_size));
+        HOLDS(!ssdgs_trainer_save(trainer, path) && !ssdgs__read_file(context, path, 0, &read, &saved_size));
         saved = copy_of(read, saved_size);
         ssdgs__release(context, read);
     }
