@@ -7070,7 +7070,8 @@ static void ssdgs__median_store(const ssdgs_frame *frame, const ssdgs__tile *til
 /* Whether a light reaches any of the objects that a tile blends. */
 static int ssdgs__reaches_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light) {
     const unsigned char *reach = ssdgs__reach(frame, light);
-    int any = !reach && ssdgs__shines(frame->lights + light);
+    if (!ssdgs__shines(frame->lights + light)) return 0;
+    int any = !reach;
     for (uint32_t i = 0; i < tile->count && !any; i++)
         any = tile->seen[i] && reach[frame->object_of[tile->list[i].gaussian / SSDGS__BLOCK]];
     return any;

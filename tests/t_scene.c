@@ -579,6 +579,17 @@ static void test_dark(void) {
     CHECK(shot[1].stats.light_views == shot[0].stats.light_views && work > 0 &&
           shot[1].stats.network_work >= work && shot[1].stats.network_work <= work);
     CHECK(shot[1].stats.objects == 1);
+    static ssdgs_real color[2][3 * PIXELS]; /* and without a plane of each term */
+    const ssdgs_object twice[2] = {ssdgs_object_default(model), placed(model, 0.7, 0.5, 1, 0.9, -0.2, 0.1)};
+    for (int count = 1; count < 3; count++) {
+        for (int i = 0; i < 2; i++) {
+            ssdgs_image image;
+            memset(&image, 0, sizeof image);
+            image.color = color[i];
+            CHECK(!ssdgs_scene_render(scene, twice, count, &camera, lights, 1 + i, &options, &image, NULL));
+        }
+        CHECK(!memcmp(color[0], color[1], sizeof color[0]));
+    }
     ssdgs_camera behind = camera;
     for (int c = 0; c < 4; c++) behind.view[c] = -behind.view[c], behind.view[8 + c] = -behind.view[8 + c];
     alone(model, &behind, lights, 1, &options, shot);
