@@ -120,10 +120,10 @@ FILES
   may leave PATH.tmp and numbers.
 
 OUTLINES
-  Photographs should be transparent where the object is not. One of which a hundredth, but not all, is
-  wholly transparent shows an outline; of eight outlines or more those that contradict the others are left
-  out. With too few outlines borders decide: if they have options.background's colour, that colour is empty
-  and Gaussians of it fade; else all is opaque. A note says which.
+  Photographs should be transparent where the object is not. One shows an outline where more than a hundredth
+  of its pixels, but not all, are wholly transparent; of eight outlines or more those that contradict the
+  others are left out. With too few outlines borders decide: if they have options.background's colour, that
+  colour is empty and Gaussians of it fade; else all is opaque. A note says which.
 
 SCENES, as engines have them: examples/engine.c is one
   ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
@@ -302,7 +302,8 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
    models and scenes keep stays theirs. */
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context);
 /* Lends the context's threads: runs task(data, 0) .. task(data, count - 1) on them, in any order, and returns
-   when all are done. Tasks may not call into the context. ERR_ARGUMENT: no task. */
+   when all are done. Tasks may not call into the context. ERR_ARGUMENT: no task, but a count
+   above 0. */
 SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
                                          void (*task)(void *data, int index), void *data);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
@@ -626,9 +627,9 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
    first column at the x axis, from where columns go towards y: to_world (3,3), row-major, turns it, a
    rotation or reflection; NULL = as it is. lights (light_count) become directional ones, each for a part of
    the sky; ambient may be options.ambient or NULL. With both, ambient takes of each pixel what is below twice
-   the sky's mean, the lights take the rest. Pictures of two trained models were, from those under 256 lights,
-   with ambient alone 32 and 25 dB, under 4 lights 33 and 27, 16 lights 40 and 34, 64 lights 48 and 40; under
-   2 lights with ambient 34 and 27. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT,
+   the sky's mean, the lights take the rest. Beside 256 lights, pictures of two trained models had 32 and 25
+   dB with ambient alone, 33 and 27 under 4 lights, 40 and 34 under 16, 48 and 40 under 64; 34 and 27 under 2
+   lights with ambient. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT,
    ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_real *pixels, int width,
                                          int height, const ssdgs_real *to_world, ssdgs_light *lights,

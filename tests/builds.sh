@@ -13,6 +13,7 @@ compiles() {
 # Names of defined global symbols; macOS puts a _ before them, names with __ are the compiler's, test_kernels_ is kernels.h's.
 exported() { nm -gP "$1" | awk '$2 ~ /^[TDBRCS]$/ { sub(/^_/, "", $1); if ($1 !~ /^(_|test_kernels_)/) print $1 }'; }
 
+check "nm finds no function" "$(exported "$build/ssdgs.o" | grep -qx ssdgs_render || echo nothing)"
 check "exported without the prefix" "$(exported "$build/ssdgs.o" | grep -v '^ssdgs_[a-z]')"
 check "exported, not in compile_c.c" \
     "$(for name in $(exported "$build/ssdgs.o"); do grep -qw "$name" tests/compile_c.c || echo "$name"; done)"

@@ -7,7 +7,7 @@ shift 3
 i=0
 while [ $i -lt "$readings" ]; do
     for program in "$old" "$new"; do
-        said=$("$program" --quick "$@" 2>&1) || { echo "$said" | tail -n 3 >&2; exit 1; }
+        said=$("$program" --quick "$@" 2>&1) || { echo "$said" | tail -n 3 >&2; echo '! ! !'; exit 1; }
         # the facts: lines of a key and a number; a table's rows have more
         echo "$said" | awk -v side="$program" 'NF == 2 && $1 ~ /^[a-z0-9_]+$/ && $2 ~ /^[-+0-9.e]+$/ { print side, $1, $2 }'
     done
@@ -24,7 +24,8 @@ done | sort -k2,2 -k1,1 -k3,3g | awk -v old="$old" -v new="$new" '
             printf "%-46s %10.4g +-%4.1f%% %10.4g +-%4.1f%%  %s\n", key, median[old], spread(old) / 2, median[new], spread(new) / 2,
                    median[old] ? sprintf("%.3f", median[new] / median[old]) : "-"
     }
+    $1 == "!" { failed = 1; exit 1 }
     $2 != key { if (key) print_key(); key = $2; side = $1 }
     $1 != side { close_series(); side = $1 }
     { v[++n] = $3 + 0 }
-    END { if (key) print_key() }'
+    END { if (key && !failed) print_key() }'

@@ -1,6 +1,6 @@
 #!/bin/sh
 # usage: gltf.sh BUILD [install]: an exported GLB before Khronos' validator, gltf-validator of npm. It does not know the attributes of
-# KHR_gaussian_splatting, which is no fault of the file's; one with a wrong size must be one. Closes with "N passed, N failed".
+# KHR_gaussian_splatting, which is no fault of the file's; one with a wrong mode must be one. Closes with "N passed, N failed".
 set -u
 build=$1 work=$1/gltf passed=0 failed=0
 check() { # check NAME COMMAND...

@@ -18,7 +18,9 @@ for compiler in gcc clang; do
     base=$(seconds $compiler -O2 -c "$out/reference.c" -o "$out/object.o")
     printf '%-8s %-48s %8.2f s\n' $compiler "the file that never changes" "$base"
     for flags in "" -DSSDGS_NO_TRAINER "-DSSDGS_NO_TRAINER -DSSDGS_NO_AVX512" "-DSSDGS_NO_TRAINER -DSSDGS_NO_SIMD"; do
+        rm -f "$out/object.o"
         time=$(seconds $compiler -O2 -I. $flags -c "$out/whole.c" -o "$out/object.o")
+        [ -s "$out/object.o" ] || { echo "$compiler $flags: no object file" >&2; exit 1; }
         bytes=$(size "$out/object.o" | awk 'NR == 2 { print $1 }')
         echo "$time $base $bytes" | awk -v compiler=$compiler -v flags="${flags:-everything}" \
             '{ printf "%-8s %-48s %8.2f s %6.2f x %8d bytes\n", compiler, flags, $1, $1 / $2, $3 }'

@@ -45,6 +45,8 @@ static ssdgs_model *make_model(int count) {
     settings.pixel_variance = (ssdgs_real)(float)0.7;
     settings.light_scale = (ssdgs_real)(float)1e-7;
     settings.light_map.bias = (ssdgs_real)(float)0.02;
+    settings.light_map.size = 300;
+    settings.shadow_on_scattering = 1;
     for (int c = 0; c < 3; c++) settings.ambient[c] = (ssdgs_real)(float)(0.1 + c);
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     ssdgs_model_view view = ssdgs_model_arrays(model);
