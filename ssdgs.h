@@ -87,8 +87,8 @@ MEMORY
   All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
   Buffers only grow: the same frame again allocates nothing, another only what it has more of than any
   before: pixels, lights, Gaussians, tiles that they meet. What a frame keeps for the next belongs to its
-model or scene, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models, scenes
-and trainers may be destroyed in any order.
+  model or scene, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models,
+  scenes and trainers may be destroyed in any order.
 
 THREADS
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
@@ -104,10 +104,11 @@ DETERMINISM
   does; not so clang's with -ffast-math or -ffp-contract=fast, nor x87.
 
 ERRORS
-  Calls return SSDGS_OK, which is 0, or a code, and then *out is NULL; ssdgs_error_message() names the file,
-byte, argument or parameter. Nothing exits or prints. What is used of cameras, lights, networks and ASG must
-be finite. Gaussians that are not finite are not drawn, or black; infinite sizes and opacities are clamped. A
-training step with a gradient that is not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
+  Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
+  parameter. Where making or loading something fails, *out becomes NULL. Nothing exits or prints. What is
+  used of cameras, lights, networks and ASG must be finite. Gaussians that are not finite are not drawn, or
+  black; infinite sizes and opacities are clamped. A training step with a gradient that is not finite changes
+  nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
@@ -117,7 +118,7 @@ FILES
   colours: drawn as they are, not trained. With settings.origin x y z are doubles. Checkpoints have native
   byte order and are refused by other versions, precisions, options, cameras or lights. Files are written
   under another name and renamed when complete: a link is replaced, not followed. A process that is killed
-  may leave PATH.tmp and numbers.
+  may leave a file PATH.tmp.*
 
 OUTLINES
   Photographs should be transparent where the object is not. One shows an outline where more than a hundredth
@@ -137,11 +138,11 @@ SCENES, as engines have them: examples/engine.c is one
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
   A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range:
-  they cost what they reach, and keep their maps while nothing there moves. Directional light reaches all
-  objects of the array: leave out what is far away. The bias of all shadows is the largest object's: leave
-  giants out. Maps are made anew when the number of lights or objects, a model, options.stop,
-  alpha_threshold or light_detail changes, and those of later lights when one goes dark: lights that flicker
-  come last. Lights without shadow have no map.
+  they cost what they reach, and keep their maps while nothing there moves. A directional light's map covers
+  all objects of the array: leave out what is far away. What is nearer to a surface than the largest object's
+  light_map.bias casts no shadow on it: leave giants out. All maps are made anew when the number of lights or
+  objects, a model, options.stop, alpha_threshold or light_detail changes. When a light goes dark those of the
+  lights behind it in the array are: let lights that flicker be last. Lights without shadow have no map.
   Lights and ambient light are multiplied by each model's own settings.light_scale. Where models differ in
   it, tints make up for it.
   options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
@@ -302,8 +303,8 @@ SSDGS_API void ssdgs_context_destroy(ssdgs_context *context);
    models and scenes keep stays theirs. */
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context);
 /* Lends the context's threads: runs task(data, 0) .. task(data, count - 1) on them, in any order, and returns
-   when all are done. Tasks may not call into the context. ERR_ARGUMENT: no task, but a count
-   above 0. */
+   when all are done. Tasks may not call into the context. ERR_ARGUMENT: count is above 0, and
+   there is no task. */
 SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
                                          void (*task)(void *data, int index), void *data);
 /* What the last failure was about: the file, key, byte, argument or parameter. Never NULL. */
@@ -2240,9 +2241,9 @@ typedef struct ssdgs__group_job {
 
 static void ssdgs__group_task(void *data, int index) {
     const ssdgs__group_job *job = (const ssdgs__group_job *)data;
-    for (int i = index, left = job->count - index; left > 0; left -= job->groups) {
+    for (int i = index; i < job->count; i += job->groups) {
         job->task(job->data, i);
-        if (left > job->groups) i += job->groups;
+        if (job->count - i <= job->groups) return; /* i + groups may be beyond INT_MAX */
     }
 }
 
@@ -2362,12 +2363,9 @@ SSDGS_API const char *ssdgs_isa_string(ssdgs_isa isa) {
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, struct ssdgs__frame_memory *memory);
 static void ssdgs__scratch_destroy(ssdgs_context *context, struct ssdgs__scratch *scratch);
 
-/* Tells why there is no context. */
+/* Tells the log why there is no context. */
 static ssdgs_result ssdgs__no_context(const ssdgs_context_desc *asked, ssdgs_result code, const char *why) {
-    char text[SSDGS__MESSAGE] = "ssdgs_context_create: ";
-    size_t at = strlen(text);
-    ssdgs__append(text, &at, why);
-    if (asked->logger.write) asked->logger.write(asked->logger.user, code, text);
+    if (asked->logger.write) asked->logger.write(asked->logger.user, code, why);
     return code;
 }
 
@@ -2378,9 +2376,11 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     memset(&asked, 0, sizeof asked);
     if (desc) asked = *desc;
     if (!asked.allocator.allocate != !asked.allocator.release)
-        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT, "allocate or release is NULL");
+        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT,
+                                 "ssdgs_context_create: allocate or release is NULL");
     if (asked.threads < 0 || asked.threads > 1024)
-        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT, "threads is not within 0 .. 1024");
+        return ssdgs__no_context(&asked, SSDGS_ERR_ARGUMENT,
+                                 "ssdgs_context_create: threads is not within 0 .. 1024");
     if (!asked.allocator.allocate) {
         asked.allocator.allocate = ssdgs__default_allocate;
         asked.allocator.release = ssdgs__default_release;
@@ -2389,9 +2389,10 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
     for (int isa = SSDGS_ISA_COUNT - 1; isa > 0 && best == SSDGS_ISA_AUTO; isa--)
         if (ssdgs__table(isa)) best = isa;
     if (best < 0 || best >= SSDGS_ISA_COUNT || !ssdgs__table(best))
-        return ssdgs__no_context(&asked, SSDGS_ERR_ISA, "this CPU or this build lacks the isa");
+        return ssdgs__no_context(&asked, SSDGS_ERR_ISA,
+                                 "ssdgs_context_create: this CPU or this build lacks the isa");
     ssdgs_context *context = (ssdgs_context *)ssdgs__allocate_from(&asked.allocator, sizeof *context);
-    if (!context) return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "out of memory");
+    if (!context) return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "ssdgs_context_create: out of memory");
     context->allocator = asked.allocator;
     context->logger = asked.logger;
     context->tracer = asked.tracer;
@@ -2411,7 +2412,7 @@ SSDGS_API ssdgs_result ssdgs_context_create(const ssdgs_context_desc *desc, ssdg
             context->pool = ssdgs__pool_create(&context->allocator, threads);
             if (!context->pool) {
                 ssdgs__release_to(&asked.allocator, context);
-                return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "out of memory");
+                return ssdgs__no_context(&asked, SSDGS_ERR_MEMORY, "ssdgs_context_create: out of memory");
             }
             context->threads = context->pool->thread_count + 1;
             context->parallel.run = ssdgs__pool_run;
@@ -6089,10 +6090,10 @@ static ssdgs__reaching ssdgs__reaching_of(const ssdgs_light *light, const ssdgs_
                                           double scale) {
     const double inverse_range = light->range > 0 ? scale / (double)light->range : 0;
     ssdgs__reaching r;
-    double length2 = 0; /* near 1 */
+    double length2 = 0; /* 1, to a thousandth */
     for (int c = 0; c < 3; c++) length2 += (double)direction[c] * (double)direction[c];
-    for (int c = 0; c < 3; c++)
-        r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] / sqrt(length2) : 0;
+    const double unit = 1 / sqrt(length2);
+    for (int c = 0; c < 3; c++) r.direction[c] = ssdgs__aimed(light) ? (double)direction[c] * unit : 0;
     r.range2 = inverse_range * inverse_range;
     const double inner = (double)light->cone[0], outer = (double)light->cone[1];
     r.outer = light->kind == SSDGS_LIGHT_SPOT ? cos(outer) : 0;
@@ -8992,13 +8993,12 @@ static int ssdgs__ply_row(ssdgs__ply *ply, const ssdgs__ply_element *element, ui
                 return 0;
     }
     while (ascii && ply->at < ply->end && (*ply->at == ' ' || *ply->at == '\t')) ply->at++;
-    ply->why = "its line ends neither here nor before";
+    ply->why = "the line should end here: it has more or fewer values than the row";
     return !ascii || ply->at == ply->end || ssdgs__ply_space(*ply->at);
 }
 
-/* Refuses a row, from 0. */
-static ssdgs_result ssdgs__ply_broken(const ssdgs__ply *ply, const ssdgs__ply_element *element, size_t row,
-                                      const char *why) {
+/* Refuses a row, counted from 0, as ply->bad and why say. */
+static ssdgs_result ssdgs__ply_broken(const ssdgs__ply *ply, const ssdgs__ply_element *element, size_t row) {
     char names[2][64];
     const ssdgs__ply_token tokens[2] = {element->name, ply->bad->name};
     for (int i = 0; i < 2; i++) {
@@ -9007,7 +9007,7 @@ static ssdgs_result ssdgs__ply_broken(const ssdgs__ply *ply, const ssdgs__ply_el
         names[i][length] = 0;
     }
     return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s, row %z, property %s: %s", ply->name,
-                       names[0], row, names[1], why);
+                       names[0], row, names[1], ply->why);
 }
 
 /* Finds where every element lies, so that they may come in any order. */
@@ -9023,13 +9023,12 @@ static ssdgs_result ssdgs__ply_survey(ssdgs__ply *ply) {
         element->data = ply->at;
         if (!least) continue;
         ply->bad = property - 1;
-        if (element->count > left / least)
-            return ssdgs__ply_broken(ply, element, left / least, "the file is cut short");
+        ply->why = "the file is cut short";
+        if (element->count > left / least) return ssdgs__ply_broken(ply, element, left / least);
         if (!ascii && !element->lists) ply->at += element->count * least;
         else
             for (size_t row = 0; row < element->count; row++)
-                if (!ssdgs__ply_row(ply, element, NULL))
-                    return ssdgs__ply_broken(ply, element, row, ply->why);
+                if (!ssdgs__ply_row(ply, element, NULL)) return ssdgs__ply_broken(ply, element, row);
     }
     while (ascii && ply->at < ply->end && ssdgs__ply_space(*ply->at)) ply->at++;
     ply->behind = (size_t)(ply->end - ply->at);
@@ -9160,7 +9159,7 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
     for (size_t row = 0; row < element->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
-        if (!ssdgs__ply_row(ply, element, words)) return ssdgs__ply_broken(ply, element, row, ply->why);
+        if (!ssdgs__ply_row(ply, element, words)) return ssdgs__ply_broken(ply, element, row);
         for (int i = 0; i < 3 && plain; i++)
             words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(
                 words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit[i]);
@@ -9368,8 +9367,8 @@ static int ssdgs__irregular(const char *path) {
 #endif
 }
 
-/* Reads a file in pieces, `most` bytes or, where that is 0, all; what the system says of its size is a hint.
- */
+/* Reads a file in pieces: `most` bytes, or all where that is 0. What the system says of its size is a
+   hint. */
 static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, size_t most,
                                      unsigned char **bytes, size_t *size) {
     const uint64_t limit = (uint64_t)128 << 30; /* a checkpoint of as many Gaussians as there may be */
@@ -14428,11 +14427,11 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
        e_j = exp(-s_j ((1 - t_j) p.Q p + t_j h.Q h))
 
    D = (c_d / pi) f_d E and M = c_s sqrt(lambda mu) E are blended, and so are the normal n and, over the
-   pixel's alpha, F0 and Q = lambda xx' + mu yy' of the frames' axes. With the factor
-   sqrt(lambda mu) a lobe sends back as much light, however narrow it is. p is h less its part along n. With
-   t_j = 0 a lobe sees the normals' mean, right for smooth surfaces; with 1 each Gaussian's own, right for
-   rough ones. n.wi / (wo.h)^2 is what shadowing and masking
-   of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0, wo.h >= SSDGS__GRAZING.
+   pixel's alpha, F0 and Q = lambda xx' + mu yy' of the frames' axes. With the factor sqrt(lambda mu) a lobe
+   sends back as much light, however narrow it is. p is h less its part along n. With t_j = 0 a lobe sees the
+   normals' mean, right for smooth surfaces; with 1 each Gaussian's own, right for rough ones. n.wi / (wo.h)^2
+   is what shadowing and masking of microfacets come to (Kelemen and Szirmay-Kalos 2001); n.wi >= 0,
+   wo.h >= SSDGS__GRAZING.
 
    S is eq. 8's of two blended things: the shadow network's answers, and (1 - soft) v + soft v_g. v is the
    transmittance to the place at the pixel's depth, from the light map. v_g is the Gaussians' own. Softness is
@@ -14960,10 +14959,9 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
 /* ==== >>image_kernels  SSIM, normals from depths, Adam ==== */
 
 /* One row of SSIM. image and reference point at the row in planes with a border of 5 rows and 16 columns of
-   "black"; values are stored less 1/2, which leaves variances as they are and keeps them from
-   cancelling in photographs of 0 .. 1.
-   Writes d(SSIM)/d(mean, E[i^2], E[ij]) and returns the sums of SSIM, |i - j| and (i - j)^2. scratch: 5 rows
-   of the stride. */
+   "black"; values are stored less 1/2, which leaves variances as they are and, where values are 0 .. 1, keeps
+   them from cancelling. Writes d(SSIM)/d(mean, E[i^2], E[ij]) and returns the sums of SSIM, |i - j| and
+   (i - j)^2. scratch: 5 rows of the stride. */
 SSDGS__FN void F(ssim_row)(const ssdgs__ssim_row *at, R sums[3]) {
     const R *image = at->image, *reference = at->reference;
     R *scratch = at->scratch, *d_mean = at->d_mean, *d_square = at->d_square, *d_product = at->d_product;

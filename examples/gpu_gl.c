@@ -710,7 +710,7 @@ float reach_of(lamp l, vec3 at) {
     float far = distance2 * l.cone.w * l.cone.w;
     way /= sqrt(distance2 > 0.0 ? distance2 : 1.0);
     vec3 beside = way - l.cone.xyz;
-    /* amid it the cosine is 0 */
+    /* at the light itself the cosine counts as 0 */
     float beside2 = distance2 > 0.0 ? dot(beside, beside) : 1.0 + dot(l.cone.xyz, l.cone.xyz);
     float share = clamp(l.rim.x - l.rim.y * beside2, 0.0, 1.0);
     float focused = l.rim.w > 0.0 ? pow(max(dot(way, l.cone.xyz), 0.0), l.rim.w) : 1.0;

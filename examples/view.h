@@ -292,8 +292,8 @@ static void view__welcome(view_server *s) {
     const view__socket socket = accept(s->listener, NULL, NULL);
     const int one = 1;
     view__visitor *v = s->visitors;
-    int serves = socket != VIEW__NO_SOCKET && view__blocks_not(socket);
     if (socket == VIEW__NO_SOCKET) return;
+    int serves = view__blocks_not(socket);
 #ifndef _WIN32
     serves = serves && socket < FD_SETSIZE;
 #endif
