@@ -892,8 +892,8 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    row b / 4 of the tile. A mask may have bits too many, never too few. A Gaussian's instances are in the
    order of tiles.
 
-   WALK, COMPOSITE  p = xx dx^2 + xy dx dy + yy dy^2 + log2_opacity, at most log2_opacity; alpha = 2^p, at
-   most 0.999, and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry
+   WALK, COMPOSITE  u = ux dx + uy dy, w = wy dy, p = log2_opacity - u^2 - w^2; alpha = 2^p, at most 0.999,
+   and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry
    to entry. Below options.stop nothing more is blended; with scene_depth only what is nearer.
 
    WALK of the camera  A pixel passes over weights alpha T up to max_error / 32 while all that it passes over
@@ -958,7 +958,9 @@ typedef struct ssdgs_gpu_hook { /* set to 0 first */
     void (*released)(void *user, const void *gone);
 } ssdgs_gpu_hook;
 
-#define SSDGS_SPLAT_GRADIENTS 8 /* x, y, conic a, b, c, ln opacity, sum of blend weights, camera depth */
+/* dL/d(x, y); the sums of u^2, u w, w^2 x dL/d(ln alpha); dL/d(ln opacity); the sum of blend weights;
+   dL/d(camera depth) */
+#define SSDGS_SPLAT_GRADIENTS 8
 
 typedef struct ssdgs_tile_entry {
     uint32_t gaussian, mask; /* bits: which of the tile's 4x4 micro-tiles it can touch */
@@ -974,11 +976,12 @@ typedef struct ssdgs_instances {
 
 enum { SSDGS_SEEN = 1, SSDGS_SKIPPED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
-/* A Gaussian projected: alpha at pixel (x + dx, y + dy) is 2^(xx dx^2 + xy dx dy + yy dy^2 +
-   log2_opacity). */
+/* A Gaussian projected: alpha at pixel (x + dx, y + dy) is 2^(log2_opacity - u^2 - w^2), u = ux dx + uy dy, w
+   = wy dy. That is the conic K of eq. 1 by its Cholesky factor, K = 2 ln(2) (ux, uy; 0, wy)' (ux, uy; 0, wy):
+   K itself would lose the alpha of needles to rounding. */
 typedef struct ssdgs_record {
     ssdgs_real x, y;       /* px: the centre */
-    ssdgs_real xx, xy, yy; /* the conic (eq. 1), its exponent times log2(e) */
+    ssdgs_real ux, uy, wy; /* 1 / px */
     ssdgs_real log2_opacity;
     ssdgs_real extent_x, extent_y; /* px: half the box that it touches */
 } ssdgs_record;
@@ -7249,7 +7252,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     const ssdgs__uncomposite_job *job = (const ssdgs__uncomposite_job *)data;
     const ssdgs_frame *frame = job->frame;
     const ssdgs_splat_view *v = frame->views;
-    const ssdgs_real ln2 = (ssdgs_real)0.69314718055994531;
+    const ssdgs_real by_log2 = (ssdgs_real)(2 * 0.69314718055994531);
     int begin, end;
     ssdgs__bin_range(frame->count, index, &begin, &end);
     for (size_t g = (size_t)begin; g < (size_t)end; g++) {
@@ -7257,7 +7260,6 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         const ssdgs_record *r = v->record + g;
         ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g;
         if (!of.count) continue;
-        const ssdgs_real a = -2 * ln2 * r->xx, b = -ln2 * r->xy, c = -2 * ln2 * r->yy; /* the conic */
         ssdgs_real sum[8];
         memset(sum, 0, sizeof sum);
         for (uint32_t instance = of.first; instance < of.first + of.count; instance++) {
@@ -7271,12 +7273,10 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
                 for (int i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
             }
         }
-        /* ln alpha = ln o - (a dx^2 + 2 b dx dy + c dy^2) / 2, dx = pixel - centre */
-        d[0] = a * sum[1] + b * sum[2];
-        d[1] = b * sum[1] + c * sum[2];
-        d[2] = (ssdgs_real)-0.5 * sum[3];
-        d[3] = -sum[4];
-        d[4] = (ssdgs_real)-0.5 * sum[5];
+        /* ln alpha = ln o - ln(2) (u^2 + w^2), of pixel - centre */
+        d[0] = by_log2 * r->ux * sum[1];
+        d[1] = by_log2 * (r->uy * sum[1] + r->wy * sum[2]);
+        for (int i = 2; i < 5; i++) d[i] = sum[i + 1];
         d[5] = sum[0];
         d[6] = sum[6];
         d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER - 1)[4 * g] : 0;
@@ -13162,7 +13162,9 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
 /* What both directions need of a projection, per lane. */
 typedef struct F(projection) {
     V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det,
-        opacity, clear; /* cross = m0 x m1; clear: 1 - opacity */
+        inverse_det, ux, uy, wy, opacity, clear;
+    /* cross = m0 x m1; the inverse of (a + h, b; b, c + h) is L' L, L = (ux, uy; 0, wy); clear: 1 - opacity
+     */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
@@ -13211,6 +13213,11 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
         p->h = VMAX(VSET(0), VSUB(VSET(k->variance), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
     }
     p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
+    p->inverse_det = VDIV(VSET(1), p->det);
+    const V high = VADD(p->c, p->h), inverse_high = VDIV(VSET(1), high);
+    p->ux = VSQRT(VMUL(high, p->inverse_det));
+    p->uy = VMUL(p->ux, VNEG(VMUL(p->b, inverse_high)));
+    p->wy = VSQRT(inverse_high);
     p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));
     p->clear = VEXP(VNEG(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), p->opacity))));
     p->opacity = VDIV(VSET(1), VADD(VSET(1), p->clear));
@@ -13219,12 +13226,11 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
                           size_t end, ssdgs_record *record, R *depth) {
-    const V log2e = VSET(1.44269504088896341);
+    const V log2e = VSET(1.44269504088896341), unit = VSET(0.84932180028801904); /* sqrt(log2(e) / 2) */
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
-        const V inverse_det = VDIV(VSET(1), p.det);
-        const V opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, inverse_det))) : p.opacity;
+        const V opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, p.inverse_det))) : p.opacity;
         const V log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
         const V x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
         const V y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
@@ -13256,9 +13262,9 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         R fields[8][SSDGS__VW];
         VSTORE(fields[0], x);
         VSTORE(fields[1], y);
-        VSTORE(fields[2], VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.c, p.h), inverse_det)));
-        VSTORE(fields[3], VMUL(log2e, VMUL(p.b, inverse_det)));
-        VSTORE(fields[4], VMUL(VMUL(VSET(-0.5), log2e), VMUL(VADD(p.a, p.h), inverse_det)));
+        VSTORE(fields[2], VMUL(unit, p.ux));
+        VSTORE(fields[3], VMUL(unit, p.uy));
+        VSTORE(fields[4], VMUL(unit, p.wy));
         VSTORE(fields[5], log2_opacity);
         VSTORE(fields[6], ex);
         VSTORE(fields[7], ey);
@@ -13273,8 +13279,8 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
     }
 }
 
-/* splat (n, SSDGS__SPLAT): dL/d(x, y, conic a, b, c, ln opacity, -, depth). Adds to the gradient planes;
-   view_slot (12) is overwritten. */
+/* splat (n, SSDGS__SPLAT): see SSDGS_SPLAT_GRADIENTS. Adds to the gradient planes; view_slot (12) is
+   overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride,
                                    size_t begin, size_t end, const ssdgs__project_gradient *out) {
     const R *splat = out->splat;
@@ -13299,33 +13305,29 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         if (VBITS(off) == (1 << SSDGS__VW) - 1) continue;
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, off);
-        const V inverse_det = VDIV(VSET(1), p.det);
-        const V ka = VMUL(VADD(p.c, p.h), inverse_det);
-        const V kb = VNEG(VMUL(p.b, inverse_det));
-        const V kc = VMUL(VADD(p.a, p.h), inverse_det);
-        const V half_g = VMUL(VSET(0.5), g[3]);
+        for (int j = 2; j < 5; j++) g[j] = VMUL(VSET(2 * 0.69314718055994531), g[j]);
         const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         V du[2][3];
         for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
-        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C, dL/dm = -2 K G K m, dL/d(ln s_j) = -2
-           u_j.G u_j with u = K m. G = dL/dK. Products K G K and K m of a thin Gaussian cancel; u = (h m + (m1
-           x X, X x m0)) / det with X = m0 x m1 does not. */
+        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C = L' L. With M = sum of dL/d(ln alpha) v
+           v', v = L (pixel - centre), and n = L m: dL/dm = L' M n, dL/d(ln s_j) = n_j.M n_j. Products K m of
+           a thin Gaussian cancel; (h m + (m1 x X, X x m0)) / det with X = m0 x m1 does not. */
         V dr[9];
         for (int j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
             const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
                     across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
-            const V u0 = VMUL(VFMA(p.h, p.m[0][j], across0), inverse_det),
-                    u1 = VMUL(VFMA(p.h, p.m[1][j], across1), inverse_det);
-            const V gu0 = VFMA(g[2], u0, VMUL(half_g, u1)), gu1 = VFMA(half_g, u0, VMUL(g[4], u1));
-            V dm0 = VMUL(VSET(-2), VFMA(ka, gu0, VMUL(kb, gu1))),
-              dm1 = VMUL(VSET(-2), VFMA(kb, gu0, VMUL(kc, gu1)));
+            const V km0 = VMUL(VFMA(p.h, p.m[0][j], across0), p.inverse_det),
+                    km1 = VMUL(VFMA(p.h, p.m[1][j], across1), p.inverse_det);
+            const V n0 = VDIV(km0, p.ux), n1 = VMUL(p.wy, p.m[1][j]);
+            const V mn0 = VFMA(g[2], n0, VMUL(g[3], n1)), mn1 = VFMA(g[3], n0, VMUL(g[4], n1));
+            V dm0 = VMUL(p.ux, mn0), dm1 = VFMA(p.uy, mn0, VMUL(p.wy, mn1));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
             V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
-              ds = VMUL(VSET(-2), VFMA(u0, gu0, VMUL(u1, gu1)));
+              ds = VFMA(n0, mn0, VMUL(n1, mn1));
             if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
-                const V push0 = VMUL(g[5], VSUB(VMUL(across0, inverse_det0), u0)),
-                        push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), u1));
+                const V push0 = VMUL(g[5], VSUB(VMUL(across0, inverse_det0), km0)),
+                        push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), km1));
                 dm0 = VADD(dm0, push0);
                 dm1 = VADD(dm1, push1);
                 ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));
@@ -13385,11 +13387,10 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
 
 /* Lists the instances of Gaussians begin .. end, numbered from `at` on: the tiles of a Gaussian's box, row by
    row, where some pixel's alpha may reach the threshold, with a mask of such micro-tiles (lanes). Over
-   the rectangle of a micro-tile's pixel centres, p = a dx^2 + b dx dy + c dy^2 + log2 opacity is largest on
-   the sides that face the centre: nearest dx with the best dy for it, or nearest dy with the best dx. */
+   the rectangle of a micro-tile's pixel centres, u^2 + w^2 is least on the sides that face the centre:
+   nearest dx with the best dy for it, or nearest dy with the best dx. */
 SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
                           int end, uint32_t at) {
-    const R margin = (R)0.999996; /* of a, c: more than their rounding, so no pixel that blends is missed */
     const V zero = VSET(0), side = VSET(3);
     for (int g = begin; g < end; g++) {
         const ssdgs_record *record = view->record + g;
@@ -13399,12 +13400,12 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
         of->first = at;
         of->count = 0;
         if (!left) continue;
-        const V a = VSET(record->xx * margin);
-        const V b = VSET(record->xy);
-        const V c = VSET(record->yy * margin);
-        const V best_x = VSET(-record->xy / (2 * record->xx));
-        const V best_y = VSET(-record->xy / (2 * record->yy));
-        const V least = VSET(log2_threshold - record->log2_opacity - (R)1e-3);
+        const V ux = VSET(record->ux), uy = VSET(record->uy), wy = VSET(record->wy);
+        const V best_x = VSET(-record->uy / record->ux);
+        const V best_y = VSET(-record->ux * record->uy / (record->uy * record->uy + record->wy * record->wy));
+        const V terms = VFMA(ux, VSET(record->extent_x), VMUL(VABS(uy), VSET(record->extent_y)));
+        /* with more than the rounding of u^2, so no pixel that blends is missed */
+        const V most = VFMA(VSET(4e-6), terms, VSET(record->log2_opacity - log2_threshold + (R)1e-3));
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
@@ -13415,9 +13416,12 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
                 V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
                 V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
                   on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
-                V p = VFMA(VFMA(c, on_y, VMUL(b, near_x)), on_y, VMUL(VMUL(a, near_x), near_x));
-                V q = VFMA(VFMA(c, near_y, VMUL(b, on_x)), near_y, VMUL(VMUL(a, on_x), on_x));
-                touched |= (unsigned)VBITS(VGE(VMAX(p, q), least)) << v * SSDGS__VW;
+                V u = VFMA(ux, near_x, VMUL(uy, on_y)), w = VMUL(wy, on_y);
+                V far_off = VFMA(u, u, VMUL(w, w));
+                u = VFMA(ux, on_x, VMUL(uy, near_y));
+                w = VMUL(wy, near_y);
+                far_off = VMIN(far_off, VFMA(u, u, VMUL(w, w)));
+                touched |= (unsigned)VBITS(VGE(most, far_off)) << v * SSDGS__VW;
             }
             view->instance[at].place = (uint32_t)(ty * view->tiles_x + tx);
             view->instance[at].mask = touched;
@@ -13506,14 +13510,12 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
 }
 
 /* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
-SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V *dx, V *dy, V *raw,
+SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V *u, V *w, V *raw,
                      VM *drawn) {
-    *dx = VSUB(px, VSET(record->x));
-    *dy = VSUB(py, VSET(record->y));
-    V p = VFMA(VFMA(VSET(record->yy), *dy, VMUL(VSET(record->xy), *dx)), *dy,
-               VFMA(VMUL(VSET(record->xx), *dx), *dx, VSET(record->log2_opacity)));
-    /* of a needle with its centre far away p is a small difference of large terms */
-    p = VMIN(VSET(record->log2_opacity), p);
+    const V dx = VSUB(px, VSET(record->x)), dy = VSUB(py, VSET(record->y));
+    *u = VFMA(VSET(record->ux), dx, VMUL(VSET(record->uy), dy));
+    *w = VMUL(VSET(record->wy), dy);
+    const V p = VFNMA(*u, *u, VFNMA(*w, *w, VSET(record->log2_opacity)));
     *drawn = VGE(p, log2_threshold);
     *raw = F(exp2)(p);
     return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
@@ -13573,18 +13575,18 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                 const uint32_t place = batch.place[index];
                 int any = 0, must = 0;
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw;
+                    V u, w, raw;
                     VM drawn;
-                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
                         alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
                     const VM blended = VAND(drawn, VGE(t[v], stop));
                     any |= VBITS(blended);
                     if (thrifty &&
                         !needed[place]) { /* what is needed uses no budget; past it all is needed */
-                        const V w = VMUL(alpha, t[v]);
-                        const VM light = VGE(slight, w);
-                        over[v] = VADD(over[v], VSEL(VAND(light, blended), w, VSET(0)));
+                        const V blend = VMUL(alpha, t[v]);
+                        const VM light = VGE(slight, blend);
+                        over[v] = VADD(over[v], VSEL(VAND(light, blended), blend, VSET(0)));
                         must |= VBITS(blended) & ~VBITS(VAND(light, VGE(budget, over[v])));
                     }
                     t[v] = VFNMA(alpha, t[v], t[v]);
@@ -13690,10 +13692,10 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                 const V distance = VSET(applied.distance[index]);
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V before = t[v];
-                    V dx, dy, raw;
+                    V u, w, raw;
                     VM drawn;
                     const V alpha =
-                        F(alpha)(applied.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                        F(alpha)(applied.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     t[v] = VFNMA(alpha, before, before);
                     VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
                     if (flux) energy[index][v] = VFMA(omega[v], VMUL(alpha, before), energy[index][v]);
@@ -13716,9 +13718,9 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                 V(*sum)[SSDGS__NV] = lanes[index];
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V past = VLOAD(history[0][then] + v * SSDGS__VW);
-                    V dx, dy, raw;
+                    V u, w, raw;
                     VM drawn;
-                    (void)F(alpha)(sampled.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    (void)F(alpha)(sampled.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho; in the ratio the opacity cancels */
                     sum[0][v] = VFMA(raw, past, sum[0][v]);
                     sum[1][v] = VADD(sum[1][v], raw);
@@ -13788,9 +13790,9 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
             for (; left; left &= left - 1) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw;
+                    V u, w, raw;
                     VM drawn, live = VGE(t[v], stop);
-                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
                         alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
                     VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
@@ -13839,8 +13841,8 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const 
 
 /* gradient: [layer][micro-tile][3 colours, in the first layer the gradients' product with the pixel][16
    lanes]; scratch: room for as many, used with all layers. Per entry adds to sums (n, stride), g = dL/d(ln
-   alpha): g, g dx, g dy, g dx^2, g dx dy, g dy^2, the blend weight w (slot 0 only), 0; from 8 + 4 slot on, w
-   dC of each layer: three values, one unused. layers: all, or 1. Walks front to back again: what lies behind
+   alpha): g, g u, g w, g u^2, g u w, g w^2, the blend weight b (slot 0 only), 0; from 8 + 4 slot on, b dC
+   of each layer: three values, one unused. layers: all, or 1. Walks front to back again: what lies behind
    an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color,
                                             const R *gradient, R *scratch, R *sums, size_t stride, int slot) {
@@ -13889,12 +13891,12 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 R *out = sums + (size_t)batch.place[index] * stride;
                 V sum[12][SSDGS__NV];
                 VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                    V dx, dy, raw, before_it = t[v];
+                    V u, w, raw, before_it = t[v];
                     VM drawn;
-                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &dx, &dy, &raw, &drawn);
+                    V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     t[v] = VFNMA(alpha, t[v], t[v]);
                     alpha = VSEL(VGE(before_it, stop), alpha, zero);
-                    const V w = VMUL(alpha, before_it);
+                    const V blend = VMUL(alpha, before_it);
                     V part[4];
                     part[0] = part[1] = part[2] = part[3] =
                         zero; /* one chain of sums would be what all waits for */
@@ -13902,24 +13904,24 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                         part[layer & 3] =
                             VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
                     const V shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
-                    before[v] = VFMA(w, shade, before[v]);
+                    before[v] = VFMA(blend, shade, before[v]);
                     const V behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
                     V g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
                     g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
-                    const V gx = VMUL(g, dx);
-                    const V gy = VMUL(g, dy);
+                    const V gu = VMUL(g, u);
+                    const V gw = VMUL(g, w);
                     sum[0][v] = g;
-                    sum[1][v] = gx;
-                    sum[2][v] = gy;
-                    sum[3][v] = VMUL(gx, dx);
-                    sum[4][v] = VMUL(gx, dy);
-                    sum[5][v] = VMUL(gy, dy);
-                    sum[6][v] = slot ? zero : w;
+                    sum[1][v] = gu;
+                    sum[2][v] = gw;
+                    sum[3][v] = VMUL(gu, u);
+                    sum[4][v] = VMUL(gu, w);
+                    sum[5][v] = VMUL(gw, w);
+                    sum[6][v] = slot ? zero : blend;
                     sum[7][v] = zero;
                     if (wide) {
-                        VSTORE(weight[used] + v * SSDGS__VW, w);
+                        VSTORE(weight[used] + v * SSDGS__VW, blend);
                     } else {
-                        VUNROLL for (int i = 0; i < 3; i++) sum[8 + i][v] = VMUL(w, dc[0][i][v]);
+                        VUNROLL for (int i = 0; i < 3; i++) sum[8 + i][v] = VMUL(blend, dc[0][i][v]);
                         sum[11][v] = zero;
                     }
                 }

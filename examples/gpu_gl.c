@@ -1078,7 +1078,7 @@ void main() {
 /* What views, records and lists are. */
 static const char gpu_types[] = GPU_GLSL(
 struct fact { uint visible, instances; float nearest; };
-struct splat { float x, y, xx, xy, yy, log2_opacity, extent_x, extent_y; };
+struct splat { float x, y, ux, uy, wy, log2_opacity, extent_x, extent_y; };
 struct pair { uint first, second; }; /* instance: place, mask; of a Gaussian: first, count; entry: Gaussian, mask */
 const float log2e = 1.44269504088896341;
 const uint none = 0xFFFFFFFFu;
@@ -1185,9 +1185,8 @@ void main() {
     drawn = drawn && centre.x + extent.x >= 0.5 && float(width) - 0.5 >= centre.x - extent.x;
     drawn = drawn && centre.y + extent.y >= 0.5 && float(height) - 0.5 >= centre.y - extent.y;
     depth[i] = drawn ? (by_distance != 0u ? length(t) : t.z) : -1;
-    if (drawn)
-        record[i] = splat(centre.x, centre.y, -0.5 * log2e * (c + h) / det, log2e * b / det,
-                          -0.5 * log2e * (a + h) / det, log2_opacity, extent.x, extent.y);
+    float ux = sqrt(0.5 * log2e * ((c + h) / det)), uy = -ux * (b / (c + h)), wy = sqrt(0.5 * log2e / (c + h));
+    if (drawn) record[i] = splat(centre.x, centre.y, ux, uy, wy, log2_opacity, extent.x, extent.y);
 }
 );
 
@@ -1272,8 +1271,8 @@ layout(std140, binding = 0) uniform parameters {
 layout(std430, binding = 0) buffer facts_ { fact facts[]; };
 );
 
-/* As the CPU's bin kernel: over the rectangle of a micro-tile's pixel centres the exponent is largest on the
-   sides that face the centre. */
+/* As the CPU's bin kernel: over the rectangle of a micro-tile's pixel centres u^2 + w^2 is least on the sides
+   that face the centre. */
 static const char gpu_bin_mask[] = GPU_GLSL(
 layout(std430, binding = 1) readonly buffer records { splat record[]; };
 layout(std430, binding = 2) readonly buffer orders { uint order[]; };
@@ -1288,17 +1287,18 @@ uvec4 box(splat s) {
 }
 uint touched(splat s, uint tx, uint ty) {
     /* precise: two programs ask, and must get the same answer */
-    precise float a = s.xx * 0.999996, b = s.xy, c = s.yy * 0.999996; /* more than their rounding */
-    precise float best_x = -s.xy / (2 * s.xx), best_y = -s.xy / (2 * s.yy);
-    float least = log2_threshold - s.log2_opacity - 1e-3;
+    precise float best_x = -s.uy / s.ux, best_y = -s.ux * s.uy / (s.uy * s.uy + s.wy * s.wy);
+    /* with more than the rounding of u^2 */
+    precise float most = s.log2_opacity - log2_threshold + 1e-3 + 4e-6 * (s.ux * s.extent_x + abs(s.uy) * s.extent_y);
     uint mask = 0u;
     for (uint micro = 0u; micro < 16u; micro++) {
         precise vec2 low = vec2(16u * tx + 4u * (micro & 3u), 16u * ty + 4u * (micro >> 2u)) + 0.5 - vec2(s.x, s.y),
              high = low + 3, near = clamp(vec2(0), low, high);
         precise float on_x = clamp(best_x * near.y, low.x, high.x), on_y = clamp(best_y * near.x, low.y, high.y);
-        precise float p = (c * on_y + b * near.x) * on_y + a * near.x * near.x;
-        precise float q = (c * near.y + b * on_x) * near.y + a * on_x * on_x;
-        if (max(p, q) >= least) mask |= 1u << micro;
+        precise vec2 p = vec2(s.ux * near.x + s.uy * on_y, s.wy * on_y);
+        precise vec2 q = vec2(s.ux * on_x + s.uy * near.y, s.wy * near.y);
+        precise float far_off = min(p.x * p.x + p.y * p.y, q.x * q.x + q.y * q.y);
+        if (far_off <= most) mask |= 1u << micro;
     }
     return mask;
 }
@@ -1393,8 +1393,7 @@ layout(std430, binding = 1) readonly buffer lists { pair tile_list[]; };
 layout(std430, binding = 2) readonly buffer starts { uint tile_start[]; };
 );
 
-/* Every program finds alpha by the same operations, so all of them take the same decisions. Of a needle with
-   its centre far away the exponent is a small difference of large terms: it is at most the centre's. */
+/* Every program finds alpha by the same operations, so all of them take the same decisions. */
 static const char gpu_alpha[] = GPU_GLSL(
 uint micro() { return lane() >> 4u; }
 uvec2 pixel() {
@@ -1404,10 +1403,10 @@ uvec2 pixel() {
 }
 bool inside() { return pixel().x < width && pixel().y < height; }
 vec2 centre() { return vec2(pixel()) + 0.5; }
-float weight_of(vec4 splat, vec2 spread, vec2 at) { /* x, y, xx, xy; yy, log2 opacity; 0: not drawn */
+float weight_of(vec4 splat, vec2 spread, vec2 at) { /* x, y, ux, uy; wy, log2 opacity; 0: not drawn */
     precise float dx = at.x - splat.x, dy = at.y - splat.y;
-    precise float p = fma(fma(spread.x, dy, splat.w * dx), dy, fma(splat.z * dx, dx, spread.y));
-    p = min(spread.y, p);
+    precise float u = fma(splat.z, dx, splat.w * dy), w = spread.x * dy;
+    precise float p = fma(-u, u, fma(-w, w, spread.y));
     return p >= log2_threshold ? exp2(p) : 0;
 }
 float alpha_of(float weight) { return min(weight, 0.999); }

@@ -105,6 +105,25 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *ca
     if (!CHECK(!ssdgs__frame_of_model(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
 }
 
+/* Between the golden alphas next to 1/255. One lies 5e-6 of itself below, which float cannot tell from above.
+ */
+static double threshold_in_gap(const ssdgs_camera *camera) {
+    const double *mean = gold(&file, "mean2d", NULL), *conic = gold(&file, "conic", NULL),
+                 *logit = gold(&file, "opacity_logit", NULL);
+    double below = 0, above = 1;
+    for (size_t i = 0; i < gold_find(&file, "mean2d")->dims[0]; i++)
+        for (int y = 0; y < camera->height; y++)
+            for (int x = 0; x < camera->width; x++) {
+                const double dx = x + 0.5 - mean[2 * i], dy = y + 0.5 - mean[2 * i + 1], *k = conic + 4 * i;
+                const double far_off = k[0] * dx * dx + 2 * k[1] * dx * dy + k[3] * dy * dy;
+                const double alpha = exp(-0.5 * far_off) / (1 + exp(-logit[i]));
+                if (alpha < 1.0 / 255) below = fmax(below, alpha);
+                else above = fmin(above, alpha);
+            }
+    CHECK(above - below > 3e-5 / 255 && above - below < 0.01 / 255);
+    return (below + above) / 2;
+}
+
 static void test_raster(void) {
     ssdgs_settings settings = ssdgs_settings_published();
     if (!gold_open(&file, "raster")) return;
@@ -114,6 +133,7 @@ static void test_raster(void) {
     const size_t pixels = (size_t)camera.width * (size_t)camera.height;
     ssdgs_frame frame;
     begin(&frame, model, &camera, NULL, 0, gold(&file, "background", NULL));
+    frame.options.alpha_threshold = (ssdgs_real)threshold_in_gap(&camera);
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_SHADE));
     ssdgs_real *color = gold_reals("color");
     for (size_t i = 0; i < n; i++)
@@ -124,9 +144,10 @@ static void test_raster(void) {
         const ssdgs_record *r = frame.views[0].record + i;
         out[2 * i] = (double)r->x;
         out[2 * i + 1] = (double)r->y;
-        out[2 * n + 4 * i] = (double)r->xx * -2 * log(2);
-        out[2 * n + 4 * i + 1] = out[2 * n + 4 * i + 2] = (double)r->xy * -log(2);
-        out[2 * n + 4 * i + 3] = (double)r->yy * -2 * log(2);
+        const double ux = (double)r->ux, uy = (double)r->uy, wy = (double)r->wy;
+        out[2 * n + 4 * i] = 2 * log(2) * ux * ux;
+        out[2 * n + 4 * i + 1] = out[2 * n + 4 * i + 2] = 2 * log(2) * ux * uy;
+        out[2 * n + 4 * i + 3] = 2 * log(2) * (uy * uy + wy * wy);
         out[6 * n + i] = (double)frame.views[0].depth[i];
     }
     CHECK_NEAR(out, gold(&file, "mean2d", NULL), 2 * n, value_bound(), 1e-6, "raster: mean2d");
@@ -519,9 +540,9 @@ static void test_loss(void) {
     gold_close(&file);
 }
 
-/* Sum of weight . conic (px^-2) + weight[3] ln opacity of a Gaussian under an orthographic view of 1 px a
-   unit, from its quaternion (4) and log scales (3). */
-static double weighted_conic(const double raw[7], const double weight[4], double variance, int compensated) {
+/* The conic (px^-2) of a Gaussian under an orthographic view of 1 px a unit, from its quaternion (4) and log
+   scales (3), and what compensation adds to ln opacity. */
+static void conic_of(const double raw[7], double variance, double conic[4]) {
     double cov[3] = {0, 0, 0}, length = 0;
     for (int i = 0; i < 4; i++) length += raw[i] * raw[i];
     double q[4];
@@ -545,9 +566,21 @@ static double weighted_conic(const double raw[7], const double weight[4], double
                        pow(m[0][1] * m[1][2] - m[0][2] * m[1][1], 2) +
                        pow(m[0][2] * m[1][0] - m[0][0] * m[1][2], 2);
     const double blurred = det + variance * (cov[0] + cov[2] + variance);
-    return (weight[0] * (cov[2] + variance) - weight[1] * cov[1] + weight[2] * (cov[0] + variance)) /
-               blurred +
-           (compensated ? 0.5 * weight[3] * (log(det) - log(blurred)) : 0);
+    conic[0] = (cov[2] + variance) / blurred;
+    conic[1] = -cov[1] / blurred;
+    conic[2] = (cov[0] + variance) / blurred;
+    conic[3] = 0.5 * (log(det) - log(blurred));
+}
+
+/* Gradients by the conic and ln opacity, from the sums of u^2, u w, w^2 and dL/d(ln opacity) of a splat. */
+static void conic_gradient(const double conic[4], const ssdgs_real *splat, double gradient[4]) {
+    const double ux = sqrt(conic[0]), uy = conic[1] / ux, wy = sqrt(conic[2] - uy * uy);
+    const double ratio = uy / wy, by_ln = 2 * log(2);
+    const double uu = by_ln * (double)splat[2], uw = by_ln * (double)splat[3], ww = by_ln * (double)splat[4];
+    gradient[0] = -0.5 * (uu - 2 * ratio * uw + ratio * ratio * ww) / (ux * ux); /* -dx^2 / 2 */
+    gradient[1] = -(uw - ratio * ww) / (ux * wy);
+    gradient[2] = -0.5 * ww / (wy * wy);
+    gradient[3] = (double)splat[5];
 }
 
 /* Rotations' and log scales' gradients of thin Gaussians, 3 to 300 px long and 0.1 to 1 px thin, against
@@ -585,24 +618,27 @@ static void test_needles(void) {
             double raw[7], error[2] = {0, 0}, norm[2] = {0, 0};
             for (int j = 0; j < 7; j++)
                 raw[j] = (double)gaussians[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
-            double weight[4];
-            for (int j = 0; j < 4; j++) weight[j] = (double)splat[i * SSDGS__SPLAT + 2 + j];
+            double conic[4], weight[4];
+            conic_of(raw, 0.1, conic);
+            conic_gradient(conic, splat + i * SSDGS__SPLAT, weight);
             for (int j = 0; j < 7; j++) {
-                const double start = raw[j], step = 1e-5,
+                const double start = raw[j], step = j < 4 ? 3e-6 : 1e-4,
                              got = (double)
                                  gradient[((j < 4 ? SSDGS_ROTATION : SSDGS_LOG_SCALE - 4) + j) * MANY + i];
-                double want = 0;
-                raw[j] = start + step;
-                want += weighted_conic(raw, weight, 0.1, compensated);
+                double want = 0, before[4];
                 raw[j] = start - step;
-                want = (want - weighted_conic(raw, weight, 0.1, compensated)) / (2 * step);
+                conic_of(raw, 0.1, before);
+                raw[j] = start + step;
+                conic_of(raw, 0.1, conic);
+                for (int c = 0; c < 3 + compensated; c++)
+                    want += weight[c] * (conic[c] - before[c]) / (2 * step);
                 raw[j] = start;
                 error[j > 3] += (got - want) * (got - want);
                 norm[j > 3] += want * want;
             }
             for (int j = 0; j < 2; j++) worst[j] = test_most(worst[j], sqrt(error[j] / norm[j]));
         }
-        if (!CHECK(worst[0] < (real64 ? 1e-6 : 1e-2) && worst[1] < (real64 ? 1e-6 : 1e-3)))
+        if (!CHECK(worst[0] < (real64 ? 1e-6 : 1e-5) && worst[1] < (real64 ? 1e-6 : 1e-5)))
             printf("    needles%s: rotations off by %.3g, scales by %.3g\n",
                    compensated ? ", compensated" : "", worst[0], worst[1]);
     }

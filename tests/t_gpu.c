@@ -536,13 +536,13 @@ static void project(int which, int count) {
             const ssdgs_record *a = record + i, *b = v->record + i;
             /* what is near has lost digits by subtracting the eye */
             const double near = v->depth[i] < 1 && !v->orthographic ? 1 / (double)v->depth[i] : 1;
-            const double conic = sqrt((double)b->xx * (double)b->yy), px = 2e-6 * near * v->width;
+            const double px = 2e-6 * near * v->width;
             worst(most, (double)depth[i], (double)v->depth[i], 0, 1e-6 * near);
             worst(most + 1, (double)a->x, (double)b->x, px, 1e-6 * near);
             worst(most + 1, (double)a->y, (double)b->y, px, 1e-6 * near);
-            worst(most + 2, (double)a->xx, (double)b->xx, 0, 1e-5 * near);
-            worst(most + 2, (double)a->xy, (double)b->xy, 1e-5 * near * conic, 0);
-            worst(most + 2, (double)a->yy, (double)b->yy, 0, 1e-5 * near);
+            worst(most + 2, (double)a->ux, (double)b->ux, 0, 1e-5 * near);
+            worst(most + 2, (double)a->uy, (double)b->uy, 1e-5 * near * (double)b->ux, 1e-5 * near);
+            worst(most + 2, (double)a->wy, (double)b->wy, 0, 1e-5 * near);
             worst(most + 3, (double)a->log2_opacity, (double)b->log2_opacity, 3e-5 * near, 1e-6);
             worst(most + 3, (double)a->extent_x, (double)b->extent_x, 1e-3 * near, 1e-5 * near);
             worst(most + 3, (double)a->extent_y, (double)b->extent_y, 1e-3 * near, 1e-5 * near);
@@ -713,8 +713,8 @@ static double passed_over(const ssdgs_frame *frame, const uint32_t *needed) {
             for (uint32_t i = v->tile_start[tile]; i < v->tile_start[tile + 1]; i++) {
                 const ssdgs_record *r = v->record + v->tile_list[i].gaussian;
                 const double dx = x + 0.5 - (double)r->x, dy = y + 0.5 - (double)r->y;
-                const double p = (double)r->xx * dx * dx + (double)r->xy * dx * dy + (double)r->yy * dy * dy;
-                double alpha = pow(2, fmin(p, 0) + (double)r->log2_opacity);
+                const double u = (double)r->ux * dx + (double)r->uy * dy, w = (double)r->wy * dy;
+                double alpha = pow(2, (double)r->log2_opacity - u * u - w * w);
                 if (alpha < threshold || t < (double)frame->options.stop) continue;
                 alpha = fmin(alpha, 0.999);
                 sum += needed[i] ? 0 : alpha * t;

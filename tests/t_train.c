@@ -1636,7 +1636,7 @@ static void test_blur(void) {
         CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &photos[0].light, 1, NULL, 0, 0) &&
               frame.view_count > 1);
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_PROJECT));
-        CHECK(fabs(-0.5 * 1.4426950408889634 / (double)frame.views[0].record->xx -
+        CHECK(fabs(0.5 * 1.4426950408889634 / pow((double)frame.views[0].record->ux, 2) -
                    (double)settings.pixel_variance) < 1e-3);
         CHECK(fabs((double)frame.views[1].variance - (i ? 0.3 : 0.2)) < 1e-6);
         ssdgs_model_destroy(model);
