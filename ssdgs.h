@@ -13403,9 +13403,9 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
         const V ux = VSET(record->ux), uy = VSET(record->uy), wy = VSET(record->wy);
         const V best_x = VSET(-record->uy / record->ux);
         const V best_y = VSET(-record->ux * record->uy / (record->uy * record->uy + record->wy * record->wy));
-        const V terms = VFMA(ux, VSET(record->extent_x), VMUL(VABS(uy), VSET(record->extent_y)));
-        /* with more than the rounding of u^2, so no pixel that blends is missed */
-        const V most = VFMA(VSET(4e-6), terms, VSET(record->log2_opacity - log2_threshold + (R)1e-3));
+        /* more than rounding; but of needles of 100 : 1 and more a pixel right at the threshold may be missed
+         */
+        const V most = VSET(record->log2_opacity - log2_threshold + (R)1e-3);
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
@@ -13416,12 +13416,9 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
                 V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
                 V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
                   on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
-                V u = VFMA(ux, near_x, VMUL(uy, on_y)), w = VMUL(wy, on_y);
-                V far_off = VFMA(u, u, VMUL(w, w));
-                u = VFMA(ux, on_x, VMUL(uy, near_y));
-                w = VMUL(wy, near_y);
-                far_off = VMIN(far_off, VFMA(u, u, VMUL(w, w)));
-                touched |= (unsigned)VBITS(VGE(most, far_off)) << v * SSDGS__VW;
+                V u = VMIN(VABS(VFMA(ux, near_x, VMUL(uy, on_y))), VABS(VFMA(ux, on_x, VMUL(uy, near_y))));
+                V w = VMUL(wy, on_y); /* on_y is near_y where the second is the least */
+                touched |= (unsigned)VBITS(VGE(most, VFMA(u, u, VMUL(w, w)))) << v * SSDGS__VW;
             }
             view->instance[at].place = (uint32_t)(ty * view->tiles_x + tx);
             view->instance[at].mask = touched;

@@ -1288,16 +1288,14 @@ uvec4 box(splat s) {
 uint touched(splat s, uint tx, uint ty) {
     /* precise: two programs ask, and must get the same answer */
     precise float best_x = -s.uy / s.ux, best_y = -s.ux * s.uy / (s.uy * s.uy + s.wy * s.wy);
-    /* with more than the rounding of u^2 */
-    precise float most = s.log2_opacity - log2_threshold + 1e-3 + 4e-6 * (s.ux * s.extent_x + abs(s.uy) * s.extent_y);
+    float most = s.log2_opacity - log2_threshold + 1e-3;
     uint mask = 0u;
     for (uint micro = 0u; micro < 16u; micro++) {
         precise vec2 low = vec2(16u * tx + 4u * (micro & 3u), 16u * ty + 4u * (micro >> 2u)) + 0.5 - vec2(s.x, s.y),
              high = low + 3, near = clamp(vec2(0), low, high);
         precise float on_x = clamp(best_x * near.y, low.x, high.x), on_y = clamp(best_y * near.x, low.y, high.y);
-        precise vec2 p = vec2(s.ux * near.x + s.uy * on_y, s.wy * on_y);
-        precise vec2 q = vec2(s.ux * on_x + s.uy * near.y, s.wy * near.y);
-        precise float far_off = min(p.x * p.x + p.y * p.y, q.x * q.x + q.y * q.y);
+        precise float u = min(abs(s.ux * near.x + s.uy * on_y), abs(s.ux * on_x + s.uy * near.y)), w = s.wy * on_y;
+        precise float far_off = u * u + w * w;
         if (far_off <= most) mask |= 1u << micro;
     }
     return mask;

@@ -1429,7 +1429,7 @@ static void test_masks(int step) {
     view.of_gaussian = of_gaussian;
     int missed = 0, more = 0, wanted = 0;
     for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++)
-        for (int size = 1; size <= 4 && ssdgs__table(isa); size++)
+        for (int size = 1; size <= 5 && ssdgs__table(isa); size++)
             for (int aspect = 0; aspect <= size; aspect++) {
                 ssdgs__projection p;
                 memset(&p, 0, sizeof p);
@@ -1437,7 +1437,14 @@ static void test_masks(int step) {
                 p.fx = p.fy = FOCAL, p.cx = (ssdgs_real)100.3, p.cy = (ssdgs_real)140.8;
                 p.near_plane = (ssdgs_real)0.01, p.log2_threshold = -8, p.width = p.height = WIDE;
                 p.variance = (ssdgs_real)0.1, p.depth_scale = 1;
+                p.orthographic = 1;
                 const int n = fill_turned(pow(10, size), pow(10, aspect), step);
+                for (int i = 0; i < n && aspect > 1; i++) { /* their thin parts, far from the centre */
+                    turned[SSDGS_POSITION][i] =
+                        (ssdgs_real)(2 * pow(10, size) / FOCAL * cos(i * step * PI / 180));
+                    turned[SSDGS_POSITION + 1][i] =
+                        (ssdgs_real)(2 * pow(10, size) / FOCAL * sin(i * step * PI / 180));
+                }
                 ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
                                            depth);
                 for (int i = 0; i < n; i++) {
