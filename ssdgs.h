@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.3 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.4 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -176,6 +176,8 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
+  0.2.4  Needles are exact: a splat's record holds ux, uy, wy, no longer xx, xy, yy, and sums of gradients
+         are in their terms (for stages on a GPU). Tiles beside a needle no longer list it.
   0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
          lights cost nothing; scene_depth of 0 or NaN hides nothing. Files of 2^28 Gaussians; broken rows are
          named. ssdgs_model_count(). A forked child is kept from half-made state.
@@ -207,7 +209,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 203 /* 0.2.3; written into files */
+#define SSDGS_VERSION 204 /* 0.2.4; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
@@ -893,8 +895,8 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    order of tiles.
 
    WALK, COMPOSITE  u = ux dx + uy dy, w = wy dy, p = log2_opacity - u^2 - w^2; alpha = 2^p, at most 0.999,
-   and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry
-   to entry. Below options.stop nothing more is blended; with scene_depth only what is nearer.
+   and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry to entry.
+   Below options.stop nothing more is blended; with scene_depth only what is nearer.
 
    WALK of the camera  A pixel passes over weights alpha T up to max_error / 32 while all that it passes over
    sum to no more than max_error. What a pixel blends otherwise is SSDGS_SEEN, the rest SSDGS_SKIPPED.
@@ -976,9 +978,9 @@ typedef struct ssdgs_instances {
 
 enum { SSDGS_SEEN = 1, SSDGS_SKIPPED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
-/* A Gaussian projected: alpha at pixel (x + dx, y + dy) is 2^(log2_opacity - u^2 - w^2), u = ux dx + uy dy, w
-   = wy dy. That is the conic K of eq. 1 by its Cholesky factor, K = 2 ln(2) (ux, uy; 0, wy)' (ux, uy; 0, wy):
-   K itself would lose the alpha of needles to rounding. */
+/* A Gaussian projected: at pixel (x + dx, y + dy) alpha is 2^(log2_opacity - u^2 - w^2), with u = ux dx + uy
+   dy and w = wy dy. (ux, uy; 0, wy) is the Cholesky factor of the conic of eq. 1 x log2(e) / 2: far along a
+   needle rounding would spoil the conic's own sum, but not a sum of squares. */
 typedef struct ssdgs_record {
     ssdgs_real x, y;       /* px: the centre */
     ssdgs_real ux, uy, wy; /* 1 / px */
