@@ -168,6 +168,7 @@ $(BUILD)/view $(BUILD)/bench: examples/gpu_gl.c
 $(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += -ldl
 $(BUILD)/t_check: examples/check.c
 $(BUILD)/t_relight: examples/relight.c
+$(BUILD)/t_options: examples/train.c
 $(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)

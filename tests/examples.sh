@@ -42,6 +42,10 @@ relight() { "$build/relight" "$model" "$set" --threads 1 "$@"; }
 check "train" says 0 "^test: PSNR" train --checkpoint-every 30
 check "train --view" says 0 "^to watch: http://127.0.0.1:" train --view -o "$out/viewed.ply"
 check "changes no byte" cmp "$model" "$out/viewed.ply"
+check "--seed" says 0 "^test: PSNR" train --seed 2 -o "$out/seed.ply"
+check "is another model" differs "$model" "$out/seed.ply"
+check "--terms" says 0 "^test: PSNR" train --terms diffuse -o "$out/terms.ply"
+check "is another model, too" differs "$model" "$out/terms.ply"
 
 # no output may be an input
 ln -s tiny/test "$out/link"
@@ -141,6 +145,7 @@ check "as long a run" says 0 "^test: PSNR" train --iterations 30
 ln -s "$out/target.ply" "$out/dangling.ply"
 check "a link to nothing" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/dangling.ply" --iterations 1 --points 100
 check "its target is not made" test ! -e "$out/target.ply"
+check "--resume with another seed" says 1 "it belongs to other options" train --checkpoint-every 30 --seed 2 --resume
 check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
 echo "somebody's notes" >"$out/notes.ply.ckpt"
 check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1
