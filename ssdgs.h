@@ -13405,9 +13405,9 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
         const V ux = VSET(record->ux), uy = VSET(record->uy), wy = VSET(record->wy);
         const V best_x = VSET(-record->uy / record->ux);
         const V best_y = VSET(-record->ux * record->uy / (record->uy * record->uy + record->wy * record->wy));
-        /* more than rounding; but of needles of 100 : 1 and more a pixel right at the threshold may be missed
-         */
-        const V most = VSET(record->log2_opacity - log2_threshold + (R)1e-3);
+        const V terms = VFMA(ux, VSET(record->extent_x), VMUL(VABS(uy), VSET(record->extent_y)));
+        /* with more than the rounding of u^2 + w^2, so no pixel that blends is missed */
+        const V most = VFMA(VSET(4e-6), terms, VSET(record->log2_opacity - log2_threshold + (R)1e-3));
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
             VUNROLL for (int v = 0; v < SSDGS__NV; v++) {

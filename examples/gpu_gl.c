@@ -1288,7 +1288,8 @@ uvec4 box(splat s) {
 uint touched(splat s, uint tx, uint ty) {
     /* precise: two programs ask, and must get the same answer */
     precise float best_x = -s.uy / s.ux, best_y = -s.ux * s.uy / (s.uy * s.uy + s.wy * s.wy);
-    float most = s.log2_opacity - log2_threshold + 1e-3;
+    /* with more than the rounding of u^2 + w^2 */
+    precise float most = s.log2_opacity - log2_threshold + 1e-3 + 4e-6 * (s.ux * s.extent_x + abs(s.uy) * s.extent_y);
     uint mask = 0u;
     for (uint micro = 0u; micro < 16u; micro++) {
         precise vec2 low = vec2(16u * tx + 4u * (micro & 3u), 16u * ty + 4u * (micro >> 2u)) + 0.5 - vec2(s.x, s.y),

@@ -1620,7 +1620,7 @@ int main(int argc, char **argv) {
     TEST_ROW("3", "images of one pixel, row, column; crops", test_crop());
     TEST_ROW("21,22", "scaled, moved, turned scenes", test_similarity());
     test_projection();
-    TEST_ROW("8,9", "conics of needles and giants", (test_conic(full ? 1 : 10), test_masks(full ? 1 : 7)));
+    TEST_ROW("8,9", "conics of needles and giants", (test_conic(full ? 1 : 10), test_masks(full ? 1 : 3)));
     test_normals();
     TEST_END();
 }
