@@ -185,7 +185,7 @@ static void test_gone(void) {
     }
 }
 
-/* A field and what its comment says that it is in each preset; NONE where it does not. */
+/* A field and what it is to be in each preset; NONE where nothing says. */
 #define NONE -1e9
 typedef struct preset {
     const char *name;
@@ -198,23 +198,48 @@ typedef struct preset {
 #name, offsetof(type, name), real, { __VA_ARGS__ } \
     }
 
-static const preset settings_presets[] = {/* default, published */
+static const preset settings_presets[] = {/* default, published: all of them */
 #define I(...) PRESET(ssdgs_settings, 0, __VA_ARGS__)
 #define R(...) PRESET(ssdgs_settings, 1, __VA_ARGS__)
                                           I(version, SSDGS_VERSION, SSDGS_VERSION),
                                           I(terms, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS),
                                           I(baked, 0, 0),
                                           I(transfer, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE),
+                                          I(dipole, SSDGS_DIPOLE_JENSEN, SSDGS_DIPOLE_JENSEN),
                                           I(asg, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC),
+                                          I(per_channel_optics, 1, 0),
+                                          I(depth_cue, 0, 0),
                                           I(transport, 1, 0),
+                                          I(residual_shadow, 1, 0),
                                           I(shadow_on_scattering, 0, 0),
+                                          I(scattering.layers, 3, 6),
+                                          I(scattering.width, 128, 256),
+                                          I(shadow.layers, 4, 4),
+                                          I(shadow.width, 32, 32),
+                                          I(octaves.view, 0, 4),
+                                          I(octaves.light, 1, 4),
+                                          I(light_map.blur, SSDGS_BLUR_FLOOR, SSDGS_BLUR_ADD),
+                                          I(light_map.size, 0, 0),
+                                          R(light_map.bias, 0.06, 0),
+                                          R(pixel_variance, 0.1, 0.3),
+                                          R(eta, 1.3, 1.3),
+                                          R(centre[0], 0, 0),
+                                          R(centre[1], 0, 0),
+                                          R(centre[2], 0, 0),
+                                          R(length_unit, 0.5, 1),
                                           R(light_scale, 1, 1),
                                           R(ambient[0], 0, 0),
                                           R(ambient[1], 0, 0),
                                           R(ambient[2], 0, 0),
                                           R(origin[0], 0, 0),
                                           R(origin[1], 0, 0),
-                                          R(origin[2], 0, 0)
+                                          R(origin[2], 0, 0),
+                                          R(medium.scattering[0], 0, 0),
+                                          R(medium.scattering[1], 0, 0),
+                                          R(medium.scattering[2], 0, 0),
+                                          R(medium.absorption[0], 0, 0),
+                                          R(medium.absorption[1], 0, 0),
+                                          R(medium.absorption[2], 0, 0)
 #undef I
 #undef R
 };
@@ -237,25 +262,25 @@ static const preset render_presets[] = {/* default, exact, fast, preview */
 #undef I
 #undef R
 };
-static const preset train_presets[] = {/* default, published */
+static const preset train_presets[] = {/* default, published: all but the seed */
 #define I(...) PRESET(ssdgs_train_options, 0, __VA_ARGS__)
 #define R(...) PRESET(ssdgs_train_options, 1, __VA_ARGS__)
                                        I(version, SSDGS_VERSION, SSDGS_VERSION),
                                        I(iterations, 20000, 60000),
                                        I(schedule, SSDGS_SCHEDULE_MERGED, SSDGS_SCHEDULE_PROGRESSIVE),
-                                       I(random_background, 1, NONE),
-                                       I(initial_points, 10000, NONE),
-                                       I(max_gaussians, 0, NONE),
-                                       I(densify_every, 100, NONE),
-                                       I(densify_from, 200, NONE),
-                                       I(densify_until, 50000, NONE),
-                                       I(opacity_reset_every, 3000, NONE),
+                                       I(random_background, 1, 1),
+                                       I(initial_points, 10000, 10000),
+                                       I(max_gaussians, 0, 100000),
+                                       I(densify_every, 100, 100),
+                                       I(densify_from, 200, 500),
+                                       I(densify_until, 50000, 50000),
+                                       I(opacity_reset_every, 3000, 3000),
                                        I(batch, 1, 1),
                                        I(refine, 0, 0),
                                        R(background[0], 0, 0),
                                        R(background[1], 0, 0),
                                        R(background[2], 0, 0),
-                                       R(dssim, 0.2, NONE),
+                                       R(dssim, 0.2, 0.2),
                                        R(normal_weight, 0.05, 0),
                                        R(bounds_min[0], -0.5, -0.5),
                                        R(bounds_min[1], -0.5, -0.5),
@@ -263,10 +288,34 @@ static const preset train_presets[] = {/* default, published */
                                        R(bounds_max[0], 0.5, 0.5),
                                        R(bounds_max[1], 0.5, 0.5),
                                        R(bounds_max[2], 0.5, 0.5),
-                                       R(densify_gradient, 4e-4, NONE),
+                                       R(densify_gradient, 4e-4, 2e-4),
                                        R(prune_outside, 0.02, 0),
                                        R(adam_epsilon, 0.1, 0),
-                                       R(finish, 0.3, 1)
+                                       R(finish, 0.3, 1),
+                                       R(rates.position.start, 6.4e-4, 1.6e-4),
+                                       R(rates.position.end, 6.4e-6, 1.6e-6),
+                                       R(rates.opacity.start, 0.05, 0.05),
+                                       R(rates.opacity.end, 0.05, 0.05),
+                                       R(rates.scale.start, 0.015, 0.005),
+                                       R(rates.scale.end, 0.005, 0.005),
+                                       R(rates.rotation.start, 0.001, 0.001),
+                                       R(rates.rotation.end, 0.001, 0.001),
+                                       R(rates.color.start, 0.03, 0.01),
+                                       R(rates.color.end, 0.01, 0.01),
+                                       R(rates.asg.start, 0.01, 0.01),
+                                       R(rates.asg.end, 1e-4, 1e-4),
+                                       R(rates.frame.start, 0.01, 0.01),
+                                       R(rates.frame.end, 1e-4, 1e-4),
+                                       R(rates.material.start, 0.001, 0.001),
+                                       R(rates.material.end, 1e-5, 1e-5),
+                                       R(rates.shadow.start, 0.001, 0.001),
+                                       R(rates.shadow.end, 1e-5, 1e-5),
+                                       R(rates.scattering.start, 0.001, 0.001),
+                                       R(rates.scattering.end, 1e-5, 1e-5),
+                                       R(rates.camera.start, 1e-3, 1e-3),
+                                       R(rates.camera.end, 1e-5, 1e-5),
+                                       R(rates.light.start, 1e-3, 1e-3),
+                                       R(rates.light.end, 5e-5, 5e-5)
 #undef I
 #undef R
 };
@@ -292,6 +341,8 @@ static void test_presets(void) {
 #define EACH(table, of) \
     for (int i = 0; i < (int)(sizeof of / sizeof *of); i++) \
     check_presets(table, sizeof table / sizeof *table, i, of + i)
+    CHECK(sizeof settings_presets / sizeof *settings_presets * 4 ==
+          sizeof(ssdgs_settings)); /* none is forgotten */
     EACH(settings_presets, settings_of);
     EACH(render_presets, render_of);
     EACH(train_presets, train_of);

@@ -1406,15 +1406,55 @@ static void test_schedule(void) {
           ssdgs__phase(&o, SSDGS_ASG_GEOMETRIC, 5000, learns) == SSDGS_ALL_TERMS);
 }
 
-/* The published preset has the paper's learning rates, whatever the default has. */
-static void test_published_rates(void) {
-    static const double paper[10][2] = {{1.6e-4, 1.6e-6}, {0.05, 0.05}, {0.005, 0.005}, {0.001, 0.001},
-                                        {0.01, 0.01},     {0.01, 1e-4}, {0.01, 1e-4},   {0.001, 1e-5},
-                                        {0.001, 1e-5},    {0.001, 1e-5}}; /* in the order of ssdgs_rates */
-    const ssdgs_train_options o = ssdgs_train_options_published();
-    const ssdgs_rate *rates = &o.rates.position;
-    for (int i = 0; i < 10; i++)
-        CHECK(rates[i].start == (ssdgs_real)paper[i][0] && rates[i].end == (ssdgs_real)paper[i][1]);
+/* What a step tells is of the photograph as the model drew it before: PSNR, and of the loss SSIM's part and
+   that of the differences; which terms, how many Gaussians. */
+static void test_told(void) {
+    static ssdgs_real image[SIDE * SIDE * 3];
+    ssdgs_train_options options = short_run(60);
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_context *context = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_trainer *trainer = NULL;
+    options.refine = options.random_background = 0;
+    options.normal_weight = 0;
+    options.dssim = (ssdgs_real)0.3;
+    options.max_gaussians = 5000;
+    options.densify_until = 30000; /* of 60,000: with a round every 10 iterations, the third is the last */
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 0, &model));
+    if (!CHECK(!ssdgs_trainer_create(model, photos, 1, &options, &trainer))) exit(1);
+    double off[2] = {0, 0};
+    int rounds = 0;
+    for (int i = 0; i < 60; i++) {
+        ssdgs_metrics was;
+        ssdgs_render_stats drawn;
+        ssdgs_train_stats told;
+        ssdgs_image planes;
+        memset(&planes, 0, sizeof planes);
+        planes.color = image;
+        ssdgs_render_options as_trained = ssdgs_render_options_default();
+        as_trained.max_error = 0;
+        CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &as_trained, &planes, &drawn));
+        CHECK(!ssdgs_evaluate(model, &photos[0], options.background, image, &was));
+        const int count = model->count;
+        CHECK(!ssdgs_trainer_step(trainer, &told));
+        double apart = 0;
+        for (int k = 0; k < 3 * SIDE * SIDE; k++)
+            apart += fabs((double)image[k] - pixels[0][k / 3 * 4 + k % 3] / 255.0) / (3 * SIDE * SIDE);
+        CHECK(told.iteration == i + 1 && told.gaussians == model->count && !told.skipped_steps);
+        CHECK(told.terms == (i < 5 ? SSDGS_DIFFUSE_TERM : settings.terms)); /* 5,000 of 60,000 */
+        rounds += model->count != count;
+        if (i < 5) continue; /* all terms are in what is rendered */
+        off[0] = test_most(off[0], fabs(told.psnr - was.psnr));
+        off[1] = test_most(off[1], fabs(told.loss / (0.7 * apart + 0.3 * (1 - was.ssim)) - 1));
+        CHECK(told.shaded == drawn.shaded);
+    }
+    if (!CHECK(off[0] < 0.05 && off[1] < 0.01 && rounds == 3))
+        printf("    PSNR %g dB off, loss %g of itself, %d rounds of density control\n", off[0], off[1],
+               rounds);
+    ssdgs_trainer_destroy(trainer);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
 }
 
 /* What is not drawn, or was in another frame, does not reach what is. */
@@ -2761,7 +2801,7 @@ int main(void) {
     test_one_light();
     test_anchor();
     test_schedule();
-    test_published_rates();
+    test_told();
     test_far_origin();
     TEST_END();
 }
