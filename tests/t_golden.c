@@ -647,6 +647,37 @@ static void test_needles(void) {
     free(splat);
 }
 
+/* d ln(opacity) / d logit is 1 - opacity, also where that is far below what rounding leaves of 1; and none
+   beyond the clamp of logits. */
+static void test_opaque(void) {
+    enum { MANY = 16, VALUES = SSDGS_CHANNELS * MANY };
+    ssdgs_real *gaussians = reals(VALUES), *gradient = reals(VALUES), *splat = reals(MANY * SSDGS__SPLAT),
+               slot[12];
+    ssdgs__projection view;
+    memset(&view, 0, sizeof view);
+    view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
+    view.orthographic = 1;
+    view.depth_scale = 1;
+    view.variance = (ssdgs_real)0.1;
+    memset(gaussians, 0, VALUES * sizeof *gaussians);
+    memset(gradient, 0, VALUES * sizeof *gradient);
+    memset(splat, 0, MANY * SSDGS__SPLAT * sizeof *splat);
+    for (int i = 0; i < MANY; i++) {
+        gaussians[SSDGS_ROTATION * MANY + i] = 1;
+        gaussians[SSDGS_OPACITY * MANY + i] = (ssdgs_real)(3 * i - 20); /* -20 .. 25 */
+        splat[i * SSDGS__SPLAT + 5] = 2;
+    }
+    const ssdgs__project_gradient d = {splat, gradient, MANY, slot};
+    context->k->project_backward(&view, gaussians, MANY, 0, MANY, &d);
+    for (int i = 0; i < MANY; i++) {
+        const double logit = 3 * i - 20, want = fabs(logit) < 20 ? 2 / (1 + exp(logit)) : 0;
+        CHECK(test_error((double)gradient[SSDGS_OPACITY * MANY + i], want, 0, real64 ? 1e-14 : 2e-6) <= 1);
+    }
+    free(gaussians);
+    free(gradient);
+    free(splat);
+}
+
 static void test_adam(void) {
     if (!gold_open(&file, "adam")) return;
     ssdgs_real *p = gold_reals("start");
@@ -823,6 +854,7 @@ int main(void) {
         test_network("shadow_mlp", 1, 1, 1);
         test_loss();
         test_needles();
+        test_opaque();
         test_adam();
         test_full("full", 0);
         test_full("full_default", 1);

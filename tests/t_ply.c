@@ -1220,6 +1220,46 @@ static void test_order(void) {
     free(file.data);
 }
 
+static double value_named(const document *d, const char *name) {
+    for (int c = 0; c < d->table[0].columns; c++)
+        if (!strcmp(d->table[0].column[c].name, name))
+            return (double)from_bits(word_at(d->table[0].data + 4 * c));
+    return 1e30;
+}
+
+/* What other programs show of a file: the normal, and as f_dc what light of 1 from all sides makes of the
+   terms that the model has, encoded where its pictures are. */
+static void test_look(void) {
+    static const char *const dc[3] = {"f_dc_0", "f_dc_1", "f_dc_2"}, *const normal[3] = {"nx", "ny", "nz"};
+    static const int terms[3] = {SSDGS_ALL_TERMS, SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM,
+                                 SSDGS_SCATTERING_TERM};
+    for (int i = 0; i < 6; i++) {
+        ssdgs_settings settings = ssdgs_settings_default();
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        ssdgs_model *model = NULL;
+        settings.terms = terms[i / 2];
+        settings.transfer = i % 2 ? SSDGS_TRANSFER_NONE : SSDGS_TRANSFER_SRGB;
+        for (int c = 0; c < 3; c++) {
+            g.diffuse[c] = (ssdgs_real)(0.3 + 0.2 * c);
+            g.scattering[c] = (ssdgs_real)(9 - 4 * c);
+        }
+        g.normal[0] = (ssdgs_real)0.6;
+        g.normal[2] = (ssdgs_real)-0.8;
+        CHECK(!ssdgs_model_create(context, &settings, 1, &model) && !ssdgs_model_set(model, 0, &g));
+        bytes file = saved(model);
+        document d = parse(&file);
+        for (int c = 0; c < 3; c++) {
+            const double diffuse = i / 2 < 2 ? (0.3 + 0.2 * c) / (2 * 3.14159265) : 0,
+                         scattered = i / 2 != 1 ? 0.02 * (9 - 4 * c) : 0, color = diffuse + scattered,
+                         shown = i % 2 ? color : 1.055 * pow(color, 1 / 2.4) - 0.055;
+            CHECK(fabs(value_named(&d, dc[c]) - (shown - 0.5) / 0.28209479) < 1e-5);
+            CHECK(fabs(value_named(&d, normal[c]) - (double)g.normal[c]) < 1e-5);
+        }
+        ssdgs_model_destroy(model);
+        free(file.data);
+    }
+}
+
 int main(void) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
@@ -1232,6 +1272,7 @@ int main(void) {
     test_round_trip();
     TEST_ROW("81", "every variant of PLY", (test_variants(), test_rows()));
     TEST_ROW("82", "other tools' files", (test_foreign(), test_words(), test_mending()));
+    test_look();
     test_edited();
     test_versions();
     test_origin();
