@@ -176,8 +176,8 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
-  0.2.4  Needles are exact: a splat's record holds ux, uy, wy, no longer xx, xy, yy, and sums of gradients
-         are in their terms (for stages on a GPU). Tiles beside a needle no longer list it.
+  0.2.4  Needles, thousands of pixels long, are drawn and trained as exactly as other Gaussians. For GPU
+         stages: a record holds ux, uy, wy, no longer xx, xy, yy; gradients are summed in their terms.
   0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
          lights cost nothing; scene_depth of 0 or NaN hides nothing. Files of 2^28 Gaussians; broken rows are
          named. ssdgs_model_count(). A forked child is kept from half-made state.
@@ -7254,7 +7254,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
     const ssdgs__uncomposite_job *job = (const ssdgs__uncomposite_job *)data;
     const ssdgs_frame *frame = job->frame;
     const ssdgs_splat_view *v = frame->views;
-    const ssdgs_real by_log2 = (ssdgs_real)(2 * 0.69314718055994531);
+    const ssdgs_real two_ln2 = (ssdgs_real)(2 * 0.69314718055994531);
     int begin, end;
     ssdgs__bin_range(frame->count, index, &begin, &end);
     for (size_t g = (size_t)begin; g < (size_t)end; g++) {
@@ -7276,8 +7276,8 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
             }
         }
         /* ln alpha = ln o - ln(2) (u^2 + w^2), of pixel - centre */
-        d[0] = by_log2 * r->ux * sum[1];
-        d[1] = by_log2 * (r->uy * sum[1] + r->wy * sum[2]);
+        d[0] = two_ln2 * r->ux * sum[1];
+        d[1] = two_ln2 * (r->uy * sum[1] + r->wy * sum[2]);
         for (int i = 2; i < 5; i++) d[i] = sum[i + 1];
         d[5] = sum[0];
         d[6] = sum[6];
@@ -13165,8 +13165,7 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
 typedef struct F(projection) {
     V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det,
         inverse_det, ux, uy, wy, opacity, clear;
-    /* cross = m0 x m1; the inverse of (a + h, b; b, c + h) is L' L, L = (ux, uy; 0, wy); clear: 1 - opacity
-     */
+    /* cross = m0 x m1; conic = 1 / (a + h, b; b, c + h) = L' L, L = (ux, uy; 0, wy); clear = 1 - opacity */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
