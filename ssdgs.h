@@ -884,9 +884,9 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    What the CPU's stages agree on, as stages beside them must:
 
    PROJECT  Raw scales and opacities are clamped to +-20. A Gaussian is drawn where its opacity reaches
-   options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant is above 0 and
-   its box reaches a pixel's centre; in perspective not where |x| or |y| > 1.5 z and its deviation along z is
-   a fifth of z. What is not finite is not drawn.
+   options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant between 0 and
+   1e37, and its box reaches a pixel's centre; in perspective not where |x| or |y| > 1.5 z and its deviation
+   along z is a fifth of z. What is not finite is not drawn.
 
    SORT  By the depth's bits as whole numbers, ties by index.
 
@@ -979,8 +979,8 @@ typedef struct ssdgs_instances {
 enum { SSDGS_SEEN = 1, SSDGS_SKIPPED = 2 }; /* to be shaded; blended, but within max_error in every pixel */
 
 /* A Gaussian projected: at pixel (x + dx, y + dy) alpha is 2^(log2_opacity - u^2 - w^2), with u = ux dx + uy
-   dy and w = wy dy. (ux, uy; 0, wy) is the Cholesky factor of the conic of eq. 1 x log2(e) / 2: far along a
-   needle rounding would spoil the conic's own sum, but not a sum of squares. */
+   dy and w = wy dy. (ux, uy; 0, wy) is the Cholesky factor of log2(e) / 2 times the conic (eq. 1): far along
+   a needle rounding would spoil the conic's own sum, but not a sum of squares. */
 typedef struct ssdgs_record {
     ssdgs_real x, y;       /* px: the centre */
     ssdgs_real ux, uy, wy; /* 1 / px */
@@ -13165,7 +13165,8 @@ SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
 typedef struct F(projection) {
     V x[3], t[3], inverse_z, row[2][3], q[4], inverse_q, r[9], s[3], m[2][3], cross[3], a, b, c, det0, h, det,
         inverse_det, ux, uy, wy, opacity, clear;
-    /* cross = m0 x m1; conic = 1 / (a + h, b; b, c + h) = L' L, L = (ux, uy; 0, wy); clear = 1 - opacity */
+    /* cross = m0 x m1; conic = 1 / (a + h, b; b, c + h) = U' U, U = (ux, uy; 0, wy), which a record has times
+       sqrt(log2(e) / 2); clear = 1 - opacity */
 } F(projection);
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
@@ -13243,7 +13244,8 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         /* NaN fails every comparison, so nothing that is not finite is drawn */
         VM drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)),
                         VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
-        drawn = VAND(drawn, VAND(VLT(VADD(ex, ey), VSET(1e9)), VLT(VSET(0), p.det)));
+        drawn = VAND(drawn, VLT(VADD(ex, ey), VSET(1e9)));
+        drawn = VAND(drawn, VAND(VLT(VSET(0), p.det), VLT(p.det, VSET(1e37))));
         if (!k->orthographic) {
             V back = VSET(0); /* variance along z / depth^2 */
             for (int f = 0; f < 3; f++) {
@@ -13310,8 +13312,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         V du[2][3];
         for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
-        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C = L' L. With M = sum of dL/d(ln alpha) v
-           v', v = L (pixel - centre), and n = L m: dL/dm = L' M n, dL/d(ln s_j) = n_j.M n_j. Products K m of
+        /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C = U' U. With M = sum of dL/d(ln alpha) v
+           v', v = U (pixel - centre), and n = U m: dL/dm = U' M n, dL/d(ln s_j) = n_j.M n_j. Products K m of
            a thin Gaussian cancel; (h m + (m1 x X, X x m0)) / det with X = m0 x m1 does not. */
         V dr[9];
         for (int j = 0; j < 3; j++) {
@@ -13418,7 +13420,7 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
                 V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
                   on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
                 V u = VMIN(VABS(VFMA(ux, near_x, VMUL(uy, on_y))), VABS(VFMA(ux, on_x, VMUL(uy, near_y))));
-                V w = VMUL(wy, on_y); /* on_y is near_y where the second is the least */
+                V w = VMUL(wy, on_y); /* where the second side has the least value, on_y is near_y */
                 touched |= (unsigned)VBITS(VGE(most, VFMA(u, u, VMUL(w, w)))) << v * SSDGS__VW;
             }
             view->instance[at].place = (uint32_t)(ty * view->tiles_x + tx);

@@ -1177,7 +1177,7 @@ void main() {
     float reach = max(0.0, 2 * 0.69314718055994531 * (log2_opacity - log2_threshold));
     vec2 extent = vec2(sqrt(reach * (a + h)), sqrt(reach * (c + h)));
     drawn = drawn && log2_opacity >= log2_threshold && near_plane < t.z && t.z < 1e30;
-    drawn = drawn && extent.x + extent.y < 1e9 && 0 < det;
+    drawn = drawn && extent.x + extent.y < 1e9 && 0 < det && det < 1e37;
     if (orthographic == 0u && 1.5 < max(abs(t.x), abs(t.y)) * inverse_z) {
         vec3 axis = scale * inverse_z * (view[2].xyz * r);
         drawn = drawn && dot(axis, axis) < 0.04;

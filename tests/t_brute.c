@@ -1362,8 +1362,9 @@ static void true_factor(int n, double variance, long double factor[3]) {
     factor[2] = sqrtl(k / yy);
 }
 
-/* Records of giants and needles against long double, and the exponent where they are seen, between pixel
-   centres and a centre off them: of what is not thin, and of needles of 100 : 1 and more. */
+/* Records of giants and needles against long double, and what the exponents at pixel centres are off by where
+   the Gaussian is seen: first of those up to 10 : 1, then of needles. One too large for a determinant is not
+   drawn. */
 static void test_conic(int step) {
     static ssdgs_record record[TURNS];
     static ssdgs_real depth[TURNS];
@@ -1404,9 +1405,22 @@ static void test_conic(int step) {
                         }
                 }
             }
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs__projection p;
+        memset(&p, 0, sizeof p);
+        p.view[0] = p.view[5] = p.view[10] = 1;
+        p.fx = p.fy = FOCAL, p.log2_threshold = (ssdgs_real)-7.994353437, p.width = p.height = SCREEN;
+        p.variance = (ssdgs_real)0.1, p.depth_scale = 1, p.orthographic = 1;
+        if (!ssdgs__table(isa)) continue;
+        fill_turned(1e10, 1, 90);
+        for (int i = 0; i < 16; i++) /* hardly above the threshold: a box of no size */
+            turned[SSDGS_OPACITY][i] = (ssdgs_real)(1e-5 - log(254.0));
+        ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, 16, record, depth);
+        CHECK(depth[0] < 0);
+    }
     printf("conic: %.3g, exponent %.3g, of needles %.3g\n", worst, off[0], off[1]);
     CHECK(worst < (DOUBLE ? 4e-15 : 1.5e-6));
-    CHECK(off[0] < (DOUBLE ? 1e-13 : 1e-4) && off[1] < (DOUBLE ? 1e-11 : 1e-2));
+    CHECK(off[0] < (DOUBLE ? 1e-13 : 4e-5) && off[1] < (DOUBLE ? 1e-11 : 4e-3));
     if (!DOUBLE)
         printf("figure conic_max_rel %.3g\nfigure exponent_error %.3g\nfigure needle_exponent_error %.3g\n",
                worst, off[0], off[1]);
@@ -1451,6 +1465,7 @@ static void test_masks(int step) {
                     const ssdgs_record *r = record + i;
                     uint16_t boxes[4 * TURNS];
                     ssdgs__tile_box(&view, r, boxes + 4 * i);
+                    CHECK(depth[i] > 0);
                     const uint32_t count =
                         ssdgs__table(isa)->bin(&view, boxes, p.log2_threshold, i, i + 1, 0);
                     CHECK(count == of_gaussian[i].count && of_gaussian[i].first == 0);
@@ -1475,7 +1490,7 @@ static void test_masks(int step) {
                 }
             }
     printf("masks: %d missed, %d more of %d\n", missed, more, wanted);
-    CHECK(!missed && wanted > 10000 && more < wanted / 50);
+    CHECK(!missed && wanted > 10000 && more < wanted / 1000);
 }
 
 static void make_contexts(void) {

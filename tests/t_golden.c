@@ -105,8 +105,8 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_camera *ca
     if (!CHECK(!ssdgs__frame_of_model(frame, model, camera, lights, light_count, &options, 1, 1))) exit(1);
 }
 
-/* Between the golden alphas next to 1/255. One lies 5e-6 of itself below, which float cannot tell from above.
- */
+/* A threshold between the golden alphas next to 1/255. The one below is 5e-6 of 1/255 away, which float
+   cannot tell from above. */
 static double threshold_in_gap(const ssdgs_camera *camera) {
     const double *mean = gold(&file, "mean2d", NULL), *conic = gold(&file, "conic", NULL),
                  *logit = gold(&file, "opacity_logit", NULL);

@@ -27,14 +27,15 @@ static int alike(const void *got, const void *want, size_t count, const void *bu
     return !other;
 }
 
-/* Whether settings and options are the preset's but for so many bytes. No padding lies between the members
-   before `sum`. */
+/* Whether settings and options are the preset's but for so many bytes. No padding lies between their members
+   up to the rates. */
 static int elsewhere_alike(int published, const void *but, size_t size) {
     const ssdgs_settings settings = published ? ssdgs_settings_published() : ssdgs_settings_default();
     const ssdgs_train_options options =
         published ? ssdgs_train_options_published() : ssdgs_train_options_default();
     return alike(&parsed.settings, &settings, sizeof settings, but, size) &&
-           alike(&parsed.options, &options, offsetof(ssdgs_train_options, sum), but, size);
+           alike(&parsed.options, &options, offsetof(ssdgs_train_options, rates) + sizeof options.rates, but,
+                 size);
 }
 
 static int sets_int(const char *words, const int *at, int value) {

@@ -341,8 +341,10 @@ static void test_presets(void) {
 #define EACH(table, of) \
     for (int i = 0; i < (int)(sizeof of / sizeof *of); i++) \
     check_presets(table, sizeof table / sizeof *table, i, of + i)
-    CHECK(sizeof settings_presets / sizeof *settings_presets * 4 ==
-          sizeof(ssdgs_settings)); /* none is forgotten */
+    const size_t last[2] = {sizeof settings_presets / sizeof *settings_presets,
+                            sizeof train_presets / sizeof *train_presets};
+    CHECK(last[0] * sizeof(float) == sizeof(ssdgs_settings)); /* none is forgotten */
+    CHECK((last[1] + 2) * sizeof(float) == offsetof(ssdgs_train_options, rates) + sizeof(ssdgs_rates));
     EACH(settings_presets, settings_of);
     EACH(render_presets, render_of);
     EACH(train_presets, train_of);

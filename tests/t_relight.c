@@ -207,7 +207,7 @@ static void test_pictures(void) {
         fprintf(json, "[0, 0, 0, 1]]}");
     }
     fprintf(json, "\n]}\n");
-    fclose(json);
+    CHECK(!fclose(json));
     static char said[12][40] = {
         "relight", FOLDER "/model.ply", FOLDER "/set", "--out", FOLDER "/out", "--background",
         "white",   "--components",      "--ambient",   "2",     "--sheet",     FOLDER "/out/sheet.png"};
@@ -263,7 +263,7 @@ static void test_pictures(void) {
             snprintf(name, sizeof name, "out/%d%s.png", v, suffixes[output]);
             check_picture(name, want[output]);
         }
-        ssdgs_real *stored = planes + 20 * N;
+        ssdgs_real *stored = planes + 21 * N;
         for (int i = 0; i < 3 * N; i++) stored[i] = (ssdgs_real)(photo[v][i] / 255.0);
         ssdgs_metrics is;
         CHECK(!ssdgs_compare(context, composed, stored, W, H, &is));
