@@ -960,8 +960,8 @@ typedef struct ssdgs_gpu_hook { /* set to 0 first */
     void (*released)(void *user, const void *gone);
 } ssdgs_gpu_hook;
 
-/* dL/d(x, y); the sums of u^2, u w, w^2 x dL/d(ln alpha); dL/d(ln opacity); the sum of blend weights;
-   dL/d(camera depth) */
+/* dL/d(x, y); 2 ln(2) times the sums of u^2, u w, w^2 x dL/d(ln alpha); dL/d(ln opacity); the sum of blend
+   weights; dL/d(camera depth) */
 #define SSDGS_SPLAT_GRADIENTS 8
 
 typedef struct ssdgs_tile_entry {
@@ -7278,7 +7278,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         /* ln alpha = ln o - ln(2) (u^2 + w^2), of pixel - centre */
         d[0] = two_ln2 * r->ux * sum[1];
         d[1] = two_ln2 * (r->uy * sum[1] + r->wy * sum[2]);
-        for (int i = 2; i < 5; i++) d[i] = sum[i + 1];
+        for (int i = 2; i < 5; i++) d[i] = two_ln2 * sum[i + 1];
         d[5] = sum[0];
         d[6] = sum[6];
         d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER - 1)[4 * g] : 0;
@@ -13308,29 +13308,30 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         if (VBITS(off) == (1 << SSDGS__VW) - 1) continue;
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, off);
-        for (int j = 2; j < 5; j++) g[j] = VMUL(VSET(2 * 0.69314718055994531), g[j]);
+        const V ux_by_high = VMUL(p.ux, VMUL(p.wy, p.wy));
         const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         V du[2][3];
         for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
         /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C = U' U. With M = sum of dL/d(ln alpha) v
-           v', v = U (pixel - centre), and n = U m: dL/dm = U' M n, dL/d(ln s_j) = n_j.M n_j. Products K m of
-           a thin Gaussian cancel; (h m + (m1 x X, X x m0)) / det with X = m0 x m1 does not. */
+           v', v = U (pixel - centre), and n = U m: dL/dm = U' M n, dL/d(ln s_j) = n_j.M n_j. Multiplied
+           out, U m and K m of a thin Gaussian cancel; det K m = h m + (m1 x X, X x m0), X = m0 x m1, does
+           not. */
         V dr[9];
         for (int j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
             const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
-                    across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1]));
-            const V km0 = VMUL(VFMA(p.h, p.m[0][j], across0), p.inverse_det),
-                    km1 = VMUL(VFMA(p.h, p.m[1][j], across1), p.inverse_det);
-            const V n0 = VDIV(km0, p.ux), n1 = VMUL(p.wy, p.m[1][j]);
+                    along0 = VFMA(p.h, p.m[0][j], across0);
+            const V n0 = VMUL(ux_by_high, along0), n1 = VMUL(p.wy, p.m[1][j]);
             const V mn0 = VFMA(g[2], n0, VMUL(g[3], n1)), mn1 = VFMA(g[3], n0, VMUL(g[4], n1));
             V dm0 = VMUL(p.ux, mn0), dm1 = VFMA(p.uy, mn0, VMUL(p.wy, mn1));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
             V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
               ds = VFMA(n0, mn0, VMUL(n1, mn1));
             if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
-                const V push0 = VMUL(g[5], VSUB(VMUL(across0, inverse_det0), km0)),
-                        push1 = VMUL(g[5], VSUB(VMUL(across1, inverse_det0), km1));
+                const V across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1])),
+                        along1 = VFMA(p.h, p.m[1][j], across1);
+                const V push0 = VMUL(g[5], VFNMA(along0, p.inverse_det, VMUL(across0, inverse_det0))),
+                        push1 = VMUL(g[5], VFNMA(along1, p.inverse_det, VMUL(across1, inverse_det0)));
                 dm0 = VADD(dm0, push0);
                 dm1 = VADD(dm1, push1);
                 ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));

@@ -572,11 +572,10 @@ static void conic_of(const double raw[7], double variance, double conic[4]) {
     conic[3] = 0.5 * (log(det) - log(blurred));
 }
 
-/* Gradients by the conic and ln opacity, from the sums of u^2, u w, w^2 and dL/d(ln opacity) of a splat. */
+/* Gradients by the conic and ln opacity, from those of a splat (SSDGS_SPLAT_GRADIENTS). */
 static void conic_gradient(const double conic[4], const ssdgs_real *splat, double gradient[4]) {
     const double ux = sqrt(conic[0]), uy = conic[1] / ux, wy = sqrt(conic[2] - uy * uy);
-    const double ratio = uy / wy, by_ln = 2 * log(2);
-    const double uu = by_ln * (double)splat[2], uw = by_ln * (double)splat[3], ww = by_ln * (double)splat[4];
+    const double ratio = uy / wy, uu = (double)splat[2], uw = (double)splat[3], ww = (double)splat[4];
     gradient[0] = -0.5 * (uu - 2 * ratio * uw + ratio * ratio * ww) / (ux * ux); /* -dx^2 / 2 */
     gradient[1] = -(uw - ratio * ww) / (ux * wy);
     gradient[2] = -0.5 * ww / (wy * wy);

@@ -341,10 +341,11 @@ static void test_presets(void) {
 #define EACH(table, of) \
     for (int i = 0; i < (int)(sizeof of / sizeof *of); i++) \
     check_presets(table, sizeof table / sizeof *table, i, of + i)
-    const size_t last[2] = {sizeof settings_presets / sizeof *settings_presets,
+    const size_t rows[2] = {sizeof settings_presets / sizeof *settings_presets,
                             sizeof train_presets / sizeof *train_presets};
-    CHECK(last[0] * sizeof(float) == sizeof(ssdgs_settings)); /* none is forgotten */
-    CHECK((last[1] + 2) * sizeof(float) == offsetof(ssdgs_train_options, rates) + sizeof(ssdgs_rates));
+    CHECK(rows[0] * sizeof(float) == sizeof(ssdgs_settings)); /* none is forgotten */
+    /* the seed, of 8 bytes, is not in the table */
+    CHECK((rows[1] + 2) * sizeof(float) == offsetof(ssdgs_train_options, rates) + sizeof(ssdgs_rates));
     EACH(settings_presets, settings_of);
     EACH(render_presets, render_of);
     EACH(train_presets, train_of);
