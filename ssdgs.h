@@ -458,7 +458,8 @@ typedef struct ssdgs_camera {  /* a pinhole */
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major, world to camera: x right, y down, z forward */
-    ssdgs_real near_plane;     /* nearer is not drawn; 0 = 0.02 length units (published: 0.01) */
+    ssdgs_real near_plane;     /* nearer is not drawn, and what lies within twice of it is faint; 0 = 0.02
+                                  length units (published: 0.01) */
 } ssdgs_camera;
 
 /* clang-format off */
@@ -885,8 +886,10 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
 
    PROJECT  Raw scales and opacities are clamped to +-20. A Gaussian is drawn where its opacity reaches
    options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant between 0 and
-   1e37, and its box reaches a pixel's centre; in perspective not where |x| or |y| > 1.5 z and its deviation
-   along z is a fifth of z. What is not finite is not drawn.
+   1e37, and its box reaches a pixel's centre. What is not finite is not drawn. In perspective its opacity is
+   first multiplied by min(1, z / near_plane - 1) (1 - d (1 - b^2)), with d = (variance along z / z^2 - 0.02)
+   / 0.04, within 0 .. 1, and b the product, for x and y, of (1 + e^2) / (1 + s^2): s = x / z, and e is s
+   within the picture's borders and -1 .. 1.
 
    SORT  By the depth's bits as whole numbers, ties by index.
 
@@ -1375,11 +1378,13 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__LOBE 11         /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS \
     (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
-/* A Gaussian beside the camera that reaches back to the plane z = 0 would by its affine projection cover the
-   whole picture: beyond this slope x / z, y / z none is drawn whose standard deviation along z is so much of
-   its depth. The picture's borders have no say in it, so its parts agree. */
-#define SSDGS__STEEP 1.5
-#define SSDGS__BACK 0.2
+/* A Gaussian beside the picture that reaches far back along z would by its affine projection cover the
+   picture. So its opacity fades with its slopes x / z and y / z, from the picture's border on, or from this
+   slope where that is further: parts of pictures of 90 degrees agree. Whole where the variance along z is
+   below the second number times depth^2, all of it from the third on. */
+#define SSDGS__STEEP 1
+#define SSDGS__BACK 0.02
+#define SSDGS__FAR_BACK 0.06
 
 /* Rows of a block's geometry */
 enum {
@@ -13167,7 +13172,57 @@ typedef struct F(projection) {
         inverse_det, ux, uy, wy, opacity, clear;
     /* cross = m0 x m1; conic = 1 / (a + h, b; b, c + h) = U' U, U = (ux, uy; 0, wy), which a record has times
        sqrt(log2(e) / 2); clear = 1 - opacity */
+    V slope[2], edge[2], axis[3], back, beside, deep, rise, fade;
+    /* edge: the slope, or the border's where it is beyond; axis: deviations along z / depth, back = axis^2;
+       fade = rise (1 - deep (1 - beside)) */
 } F(projection);
+
+/* Where opacity fades: slopes of the borders, 1 / near_plane. */
+typedef struct F(rim) {
+    V low[2], high[2], inverse_near;
+} F(rim);
+
+SSDGS__FI void F(rim_of)(const ssdgs__projection *k, F(rim) * rim) {
+    for (int i = 0; i < 2; i++) {
+        const R focal = i ? k->fy : k->fx, centre = i ? k->cy : k->cx,
+                most = (R)1e15; /* squares are finite */
+        const R low = -centre / focal, high = ((R)(i ? k->height : k->width) - centre) / focal;
+        rim->low[i] = VSET(low > -SSDGS__STEEP ? -SSDGS__STEEP : low > -most ? low : -most);
+        rim->high[i] = VSET(high < SSDGS__STEEP ? SSDGS__STEEP : high < most ? high : most);
+    }
+    rim->inverse_near = VSET(k->near_plane > (R)1e-30 ? 1 / k->near_plane : (R)1e30);
+}
+
+/* What opacity is multiplied by: less and less from twice near_plane down to it, and beside the picture where
+   the Gaussian is deep, by the squares of (1 + edge^2) / (1 + slope^2), which are cos^4 of angles: none pops
+   when the camera turns. */
+SSDGS__FI void F(fade)(const ssdgs__projection *k, const F(rim) * rim, F(projection) * p) {
+    const V one = VSET(1);
+    p->fade = one;
+    if (k->orthographic) return;
+    V away = VMAX(VSET(0), VSUB(VSET(2 * k->near_plane), p->t[2]));
+    for (int i = 0; i < 2; i++) {
+        p->slope[i] = VMUL(p->t[i], p->inverse_z);
+        p->edge[i] = VMAX(rim->low[i], VMIN(rim->high[i], p->slope[i]));
+        away = VADD(away, VABS(VSUB(p->slope[i], p->edge[i])));
+    }
+    if (!VBITS(VLT(VSET(0), away))) return;
+    p->back = VSET(0);
+    for (int j = 0; j < 3; j++) {
+        p->axis[j] =
+            VMUL(VMUL(p->s[j], p->inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]),
+                                                    p->r[j], p->r[3 + j], p->r[6 + j]));
+        p->back = VFMA(p->axis[j], p->axis[j], p->back);
+    }
+    p->beside = VDIV(VMUL(VFMA(p->edge[0], p->edge[0], one), VFMA(p->edge[1], p->edge[1], one)),
+                     VMUL(VFMA(p->slope[0], p->slope[0], one), VFMA(p->slope[1], p->slope[1], one)));
+    p->beside = VMUL(p->beside, p->beside);
+    p->deep =
+        VMAX(VSET(0),
+             VMIN(one, VMUL(VSUB(p->back, VSET(SSDGS__BACK)), VSET(1 / (SSDGS__FAR_BACK - SSDGS__BACK)))));
+    p->rise = VMAX(VSET(0), VMIN(one, VMUL(VSUB(p->t[2], VSET(k->near_plane)), rim->inverse_near)));
+    p->fade = VMUL(p->rise, VFNMA(p->deep, VSUB(one, p->beside), one));
+}
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
 SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, const R *g, size_t stride,
@@ -13229,10 +13284,14 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
                           size_t end, ssdgs_record *record, R *depth) {
     const V log2e = VSET(1.44269504088896341), unit = VSET(0.84932180028801904); /* sqrt(log2(e) / 2) */
+    F(rim) rim;
+    F(rim_of)(k, &rim);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
-        const V opacity = k->compensate ? VMUL(p.opacity, VSQRT(VMUL(p.det0, p.inverse_det))) : p.opacity;
+        F(fade)(k, &rim, &p);
+        V opacity = VMUL(p.opacity, p.fade);
+        if (k->compensate) opacity = VMUL(opacity, VSQRT(VMUL(p.det0, p.inverse_det)));
         const V log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
         const V x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
         const V y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
@@ -13246,18 +13305,6 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
                         VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
         drawn = VAND(drawn, VLT(VADD(ex, ey), VSET(1e9)));
         drawn = VAND(drawn, VAND(VLT(VSET(0), p.det), VLT(p.det, VSET(1e37))));
-        if (!k->orthographic) {
-            V back = VSET(0); /* variance along z / depth^2 */
-            for (int f = 0; f < 3; f++) {
-                V axis =
-                    VMUL(VMUL(p.s[f], p.inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]),
-                                                          VSET(k->view[10]), p.r[f], p.r[3 + f], p.r[6 + f]));
-                back = VFMA(axis, axis, back);
-            }
-            back = VSEL(VLT(VSET(SSDGS__STEEP), VMUL(VMAX(VABS(p.t[0]), VABS(p.t[1])), p.inverse_z)), back,
-                        VSET(0));
-            drawn = VAND(drawn, VLT(back, VSET(SSDGS__BACK * SSDGS__BACK)));
-        }
         drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
         drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
         VSTORE(depth + i, VSEL(drawn, VMUL(d, VSET(k->depth_scale)), VSET(-1)));
@@ -13282,6 +13329,38 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
     }
 }
 
+/* The gradient of ln fade, times g: adds to the planes of the scales, to dr and to view_sum, all of Gaussians
+   i and on; push: dL/d(slope of x, of y, z). */
+SSDGS__FI void F(fade_backward)(const ssdgs__projection *k, const F(rim) * rim, const F(projection) * p, V g,
+                                const R *raw, size_t stride, R *gradient, size_t gradient_stride, V dr[9],
+                                V push[3], V view_sum[12][SSDGS__NV], size_t v) {
+    const V zero = VSET(0), one = VSET(1);
+    const V dq = VDIV(g, VMAX(VFNMA(p->deep, VSUB(one, p->beside), one), VSET(1e-20)));
+    for (int i = 0; i < 2; i++) { /* beside = ((1 + edge^2) / (1 + slope^2))^2 .. */
+        const V down = VDIV(VMUL(VSET(-4), p->slope[i]), VFMA(p->slope[i], p->slope[i], one));
+        push[i] = VSEL(VLT(zero, VABS(VSUB(p->slope[i], p->edge[i]))),
+                       VMUL(VMUL(dq, p->deep), VMUL(p->beside, down)), zero);
+    }
+    /* axis_j = s_j / z (view row 2 . r_j) */
+    const V steep =
+        VSEL(VAND(VLT(zero, p->deep), VLT(p->deep, one)),
+             VMUL(VMUL(dq, VSUB(one, p->beside)), VSET(-2 / (SSDGS__FAR_BACK - SSDGS__BACK))), zero);
+    push[2] = VMUL(VNEG(VMUL(steep, p->back)), p->inverse_z);
+    push[2] = VADD(push[2], VSEL(VAND(VLT(zero, p->rise), VLT(p->rise, one)),
+                                 VDIV(VMUL(g, rim->inverse_near), VMAX(p->rise, VSET(1e-20))), zero));
+    for (int j = 0; j < 3; j++) {
+        const V by_axis = VMUL(steep, p->axis[j]), along = VMUL(by_axis, VMUL(p->s[j], p->inverse_z));
+        R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride;
+        const V held = VABS(VLOAD(raw + (size_t)(SSDGS_LOG_SCALE + j) * stride));
+        VSTORE(d_scale,
+               VADD(VLOAD(d_scale), VSEL(VLT(held, VSET(SSDGS__MOST_RAW)), VMUL(by_axis, p->axis[j]), zero)));
+        for (int l = 0; l < 3; l++) {
+            dr[3 * l + j] = VFMA(along, VSET(k->view[8 + l]), dr[3 * l + j]);
+            view_sum[8 + l][v] = VFMA(along, p->r[3 * l + j], view_sum[8 + l][v]);
+        }
+    }
+}
+
 /* splat (n, SSDGS__SPLAT): see SSDGS_SPLAT_GRADIENTS. Adds to the gradient planes; view_slot (12) is
    overwritten. */
 SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussians, size_t stride,
@@ -13292,6 +13371,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
     V view_sum[12][SSDGS__NV];
     for (int j = 0; j < 12; j++)
         for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
+    F(rim) rim;
+    F(rim_of)(k, &rim);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         const size_t v = i / SSDGS__VW % SSDGS__NV;
         R lane[8][SSDGS__VW];
@@ -13308,6 +13389,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         if (VBITS(off) == (1 << SSDGS__VW) - 1) continue;
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, off);
+        F(fade)(k, &rim, &p);
         const V ux_by_high = VMUL(p.ux, VMUL(p.wy, p.wy));
         const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
         V du[2][3];
@@ -13345,6 +13427,10 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                 du[1][l] = VFMA(dm1, p.r[3 * l + j], du[1][l]);
             }
         }
+        V push[3];
+        for (int j = 0; j < 3; j++) push[j] = VSET(0);
+        if (VBITS(VLT(p.fade, VSET(1)))) F(fade_backward)
+        (k, &rim, &p, g[5], gaussians + i, stride, gradient + i, gradient_stride, dr, push, view_sum, v);
         V dq[4];
         F(rotation_backward)(dq, p.q, p.inverse_q, dr);
         for (int j = 0; j < 4; j++) {
@@ -13358,7 +13444,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             VSTORE(d, VADD(VLOAD(d), logit));
         }
         V dt[3];
-        dt[2] = g[7];
+        dt[2] = VADD(g[7], push[2]);
         for (int l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
             V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z),
               slope = VMUL(p.t[l], p.inverse_z);
@@ -13366,8 +13452,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             V dj = VDOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
             V dj2 =
                 VDOT3(du[l][0], du[l][1], du[l][2], VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]));
-            V dslope =
-                VFNMA(scaled, dj2, VMUL(focal, g[l])); /* slope = t / z stands in J and in the centre */
+            V dslope = VADD(push[l], VFNMA(scaled, dj2, VMUL(focal, g[l]))); /* slope = t / z stands in J and
+                                                                               in the centre, and fades */
             dt[l] = VMUL(dslope, p.inverse_z);
             dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
             dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);

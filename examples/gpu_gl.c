@@ -1139,8 +1139,8 @@ float difference(float a, float b, float c, float d) {
 }
 );
 
-/* C = m m' + h is the splat's covariance, m = J W R S. Beside the camera what reaches far back along z is not
-   drawn: its affine projection would cover the picture. */
+/* C = m m' + h is the splat's covariance, m = J W R S. Opacity fades near the eye and, beside the picture, of
+   what reaches far back along z: its affine projection would cover the picture. */
 static const char gpu_project[] = GPU_GLSL(
 void main() {
     uint i = item();
@@ -1171,6 +1171,16 @@ void main() {
         h = max(0.0, variance - det0 / max(largest, 1e-30));
     }
     float det = det0 + h * (a + c + h);
+    if (orthographic == 0u) {
+        vec3 axis = scale * inverse_z * (view[2].xyz * r);
+        vec2 low = -vec2(cx, cy) / vec2(fx, fy), high = (vec2(width, height) - vec2(cx, cy)) / vec2(fx, fy);
+        vec2 edge = clamp(slope, max(min(low, -1.0), -1e15), min(max(high, 1.0), 1e15));
+        vec2 ratio = (1 + edge * edge) / (1 + slope * slope);
+        float beside = ratio.x * ratio.y * ratio.x * ratio.y;
+        float deep = clamp((dot(axis, axis) - 0.02) / 0.04, 0.0, 1.0);
+        float inverse_near = near_plane > 1e-30 ? 1 / near_plane : 1e30;
+        opacity *= clamp((t.z - near_plane) * inverse_near, 0.0, 1.0) * (1 - deep * (1 - beside));
+    }
     if (compensate != 0u) opacity *= sqrt(det0 / det);
     float log2_opacity = log2(max(opacity, 1e-30));
     vec2 centre = vec2(fx * t.x, fy * t.y) * inverse_z + vec2(cx, cy);
@@ -1178,10 +1188,6 @@ void main() {
     vec2 extent = vec2(sqrt(reach * (a + h)), sqrt(reach * (c + h)));
     drawn = drawn && log2_opacity >= log2_threshold && near_plane < t.z && t.z < 1e30;
     drawn = drawn && extent.x + extent.y < 1e9 && 0 < det && det < 1e37;
-    if (orthographic == 0u && 1.5 < max(abs(t.x), abs(t.y)) * inverse_z) {
-        vec3 axis = scale * inverse_z * (view[2].xyz * r);
-        drawn = drawn && dot(axis, axis) < 0.04;
-    }
     drawn = drawn && centre.x + extent.x >= 0.5 && float(width) - 0.5 >= centre.x - extent.x;
     drawn = drawn && centre.y + extent.y >= 0.5 && float(height) - 0.5 >= centre.y - extent.y;
     depth[i] = drawn ? (by_distance != 0u ? length(t) : t.z) : -1;

@@ -213,6 +213,20 @@ static void to_view(const lens *l, const double x[3], double t[3]) {
     for (int i = 0; i < 3; i++) t[i] = dot(l->view + 4 * i, x) + l->view[4 * i + 3];
 }
 
+/* What is left of opacity near the eye, and of what reaches far back along z beside the picture, but not
+   within 45 degrees of the axis: cos^4 of the angles in x and y, relative to the border's. */
+static double fade(const lens *l, const double t[3], double back) {
+    double kept = 1;
+    for (int i = 0; i < 2; i++) {
+        const double focal = i ? l->fy : l->fx, centre = i ? l->cy : l->cx, side = i ? l->height : l->width;
+        const double low = fmin(-1, -centre / focal), high = fmax(1, (side - centre) / focal);
+        const double angle = atan2(t[i], t[2]), edge = fmax(atan(low), fmin(atan(high), angle));
+        kept *= pow(cos(angle) / cos(edge), 4);
+    }
+    const double deep = fmax(0, fmin(1, (back - 0.02) / 0.04));
+    return fmin(1, t[2] / l->near_plane - 1) * (1 - deep + deep * kept);
+}
+
 /* Eq. 1's projection by full matrices: J W Sigma W^T J^T. 0: not drawn. */
 static int project(const lens *l, const gaussian *g, splat *out) {
     double t[3];
@@ -244,6 +258,10 @@ static int project(const lens *l, const gaussian *g, splat *out) {
     const double det = (cov[0] + h) * (cov[2] + h) - cov[1] * cov[1];
     out->a = (cov[2] + h) / det, out->b = -cov[1] / det, out->c = (cov[0] + h) / det;
     out->opacity = g->opacity * (l->compensate ? sqrt(det0 / det) : 1);
+    double back = 0; /* variance along z / depth^2 */
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++) back += l->view[8 + i] * sigma[3 * i + k] * l->view[8 + k] / (t[2] * t[2]);
+    if (!l->orthographic) out->opacity *= fade(l, t, back);
     out->x = l->fx * t[0] / (l->orthographic ? 1 : t[2]) + l->cx;
     out->y = l->fy * t[1] / (l->orthographic ? 1 : t[2]) + l->cy;
     out->depth = l->by_distance ? sqrt(dot(t, t)) : t[2];
@@ -255,23 +273,10 @@ static int nearer(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Beside the camera and reaching back to the plane z = 0: not drawn, as the affine projection is off by
-   nearly half there (the table of projection_error()). */
-static int beside(const lens *l, const gaussian *g) {
-    double t[3], variance = 0;
-    to_view(l, g->x, t);
-    for (int k = 0; k < 3; k++) {
-        const double axis[3] = {g->axes[k], g->axes[3 + k], g->axes[6 + k]};
-        variance += pow(g->scale[k] * dot(axis, l->view + 8), 2);
-    }
-    return !l->orthographic && (fabs(t[0]) > 1.5 * t[2] || fabs(t[1]) > 1.5 * t[2]) &&
-           5 * sqrt(variance) >= t[2];
-}
-
 static int project_all(const lens *l, splat *out) {
     int n = 0;
     for (int i = 0; i < s.count; i++)
-        if (project(l, all + i, out + n) && !beside(l, all + i)) out[n++].index = i;
+        if (project(l, all + i, out + n)) out[n++].index = i;
     qsort(out, (size_t)n, sizeof *out, nearer);
     return n;
 }
@@ -634,8 +639,8 @@ static void check_light_camera(void) {
     for (int g = 0; g < s.count; g++)
         for (int f = 0; f < face_count; f++) {
             splat p;
-            if (project(faces + f, all + g, &p) && !beside(faces + f, all + g) && p.x >= 0 && p.y >= 0 &&
-                p.x <= faces[f].width && p.y <= faces[f].height) {
+            if (project(faces + f, all + g, &p) && p.x >= 0 && p.y >= 0 && p.x <= faces[f].width &&
+                p.y <= faces[f].height) {
                 on++;
                 break;
             }
@@ -805,13 +810,13 @@ static void test_dark(void) {
             }
             double flux = 0, all_flux = 0;
             for (int i = 0; i < s.count; i++) {
+                all_flux += truth.flux[i];
                 if (truth.doubt[i]) continue;
                 const double v = (double)frame.visibility[i] - truth.v[i];
                 off += !(fabs(v) < stops[k] + 1e-5);
                 faint += truth.flux[i] > 0 && truth.v[i] < 1e-6;
                 dark[k] += truth.flux[i] > 0 && !(frame.flux[i] > 0);
                 flux += truth.flux[i] - (double)frame.flux[i];
-                all_flux += truth.flux[i];
             }
             lost[k] = flux / all_flux > lost[k] ? flux / all_flux : lost[k];
             ssdgs_model_destroy(model);
@@ -1303,6 +1308,7 @@ static double projection_error(double sigma, double degrees) {
     l.fx = l.fy = 1;
     splat p;
     CHECK(project(&l, &g, &p));
+    p.opacity = g.opacity; /* nothing fades here */
     for (int i = 0; i < GRID * GRID; i++) {
         const double x = p.x + 8 / sqrt(p.a) * ((2 * (i % GRID) + 1.0) / GRID - 1);
         const double y = p.y + 8 / sqrt(p.c) * ((2 * (i / GRID) + 1.0) / GRID - 1);

@@ -661,6 +661,69 @@ static void test_held(void) {
     }
 }
 
+/* Opacity's fade beside a wide picture and near the eye, the whole of it and each of its parts, in every
+   parameter and in the camera's: of ln opacity alone, so that nothing else has a part in it. */
+static double log_opacity(const ssdgs__projection *k, const ssdgs_real *gaussian) {
+    ssdgs_record record;
+    ssdgs_real depth;
+    context->k->project(k, gaussian, 1, 0, 1, &record, &depth);
+    CHECK(depth > 0);
+    return record.log2_opacity * log(2);
+}
+
+static void test_fade(void) {
+    enum { EACH = 200 };
+    int faded[4] = {0, 0, 0, 0};
+    double worst = 0;
+    for (int i = 0; i < 4 * EACH; i++) { /* near; beside; deep; all of it */
+        const int part = i / EACH;
+        uint64_t at = 1000 + 40 * (uint64_t)i;
+        ssdgs_real gaussian[SSDGS_CHANNELS], planes[SSDGS_CHANNELS], view[12], splat[SSDGS__SPLAT];
+        ssdgs__projection k;
+        memset(&k, 0, sizeof k), memset(gaussian, 0, sizeof gaussian), memset(planes, 0, sizeof planes);
+        memset(splat, 0, sizeof splat);
+        k.width = 4000, k.height = 3000, k.fx = 900, k.fy = 1000, k.cx = 2100,
+        k.cy = 1450; /* borders: 2.1, 1.5 */
+        k.log2_threshold = -60, k.variance = 0.1, k.depth_scale = 1;
+        k.view[0] = k.view[5] = k.view[10] = 1;
+        for (int j = 0; j < 12; j++) k.view[j] += 0.1 * (draw(at++) - 0.5);
+        const double z = 0.5 + draw(at), x = part == 0 ? 0 : 1.5 + 3 * draw(at + 1),
+                     y = part == 0 ? 0.5 : 1.2 + 2 * draw(at + 2);
+        gaussian[0] = (i & 1 ? -1 : 1) * x * z, gaussian[1] = (i & 2 ? -1 : 1) * y * z, gaussian[2] = z;
+        k.near_plane = k.view[8] * gaussian[0] + k.view[9] * gaussian[1] + k.view[10] * z + k.view[11];
+        k.near_plane /= part == 0 || part == 3 ? 1.05 + 0.9 * draw(at + 11) : 3;
+        for (int j = 0; j < 3; j++)
+            gaussian[SSDGS_LOG_SCALE + j] = log(z * (part == 1   ? 0.5 + draw(at + 3)
+                                                     : part == 0 ? 0.02
+                                                                 : 0.13 + 0.2 * draw(at + 3 + (uint64_t)j)));
+        for (int j = 0; j < 4; j++) gaussian[SSDGS_ROTATION + j] = draw(at + 6 + (uint64_t)j) - 0.5;
+        gaussian[SSDGS_OPACITY] = 4 * draw(at + 10) - 2;
+        const double value = log_opacity(&k, gaussian), whole = log(1 / (1 + exp(-gaussian[SSDGS_OPACITY])));
+        faded[part] += value < whole - 0.01;
+        splat[5] = 1;
+        const ssdgs__project_gradient d = {splat, planes, 1, view};
+        context->k->project_backward(&k, gaussian, 1, 0, 1, &d);
+        for (int j = 0; j < SSDGS_OPACITY + 1 + 12; j++) {
+            ssdgs_real *p = j <= SSDGS_OPACITY ? gaussian + j : k.view + j - SSDGS_OPACITY - 1;
+            const ssdgs_real kept = *p;
+            double side[4];
+            for (int n = 0; n < 4; n++) {
+                *p = kept + steps[n] * 0.1;
+                side[n] = log_opacity(&k, gaussian);
+            }
+            *p = kept;
+            const double coarse = (side[0] - side[1]) / 4e-7, fine = (side[2] - side[3]) / 2e-7;
+            const double got = j <= SSDGS_OPACITY ? planes[j] : view[j - SSDGS_OPACITY - 1];
+            if (fabs(coarse - fine) > 1e-5 * (1 + fabs(fine))) continue; /* where a part begins or ends */
+            const double error = fabs(got - fine) / (1 + fabs(fine));
+            if (!CHECK(error < 1e-6)) printf("    case %d, parameter %d: %g, not %g\n", i, j, got, fine);
+            worst = error > worst ? error : worst;
+        }
+    }
+    for (int part = 0; part < 4; part++) CHECK(faded[part] > EACH / 4);
+    printf("fade: %.2g\n", worst);
+}
+
 /* A stray, which the light's map does not cover, in front of a cloud: its pixels' visibility is its own. */
 enum { STRAYS = 300, STRAY_SIDE = 24 };
 static double stray_loss(ssdgs_model *model, ssdgs_frame *frame, int *without) {
@@ -870,6 +933,7 @@ int main(void) {
         run(&s);
     }
     test_held();
+    test_fade();
     test_stray();
     ssdgs_context_destroy(context);
     test_row(0, "53", "gradients of every group under every option");

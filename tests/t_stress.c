@@ -1,4 +1,4 @@
-/* The stress catalogue, rows 1 to 52: geometry, rasteriser, light and shading at their extremes, through the
+/* The stress catalogue, rows 1 to 53: geometry, rasteriser, light and shading at their extremes, through the
    public interface. Every row runs on each instruction set this machine has, with 1 and with 8 threads: the
    pictures of both must have the same bits. All planes of every picture must be finite. Rows that other
    programs cover are not here. */
@@ -671,6 +671,61 @@ static void row_18(void) { /* more pairs of tile and splat than the allocator gr
 }
 
 static double bytes_behind;
+
+/* The largest alpha of one Gaussian in the picture. */
+static double most_alpha(ssdgs_model *model, const ssdgs_camera *camera) {
+    static ssdgs_real alpha[PIXELS];
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.alpha = alpha;
+    CHECK(!ssdgs_render_ex(model, camera, NULL, 0, &options, &image, NULL));
+    double most = 0;
+    for (int i = 0; i < PIXELS; i++) most = (double)alpha[i] > most ? (double)alpha[i] : most;
+    return most;
+}
+
+static void row_53(void) { /* a Gaussian turned through the picture neither vanishes nor pops */
+    static const double lenses[3] = {60, 120, 150}, distances[4] = {0.021, 0.06, 0.5, 2},
+                        sizes[3] = {0.07, 0.25, 1.5};
+    const ssdgs_settings settings = plain();
+    ssdgs_model *model = NULL;
+    CHECK(!ssdgs_model_create(context, &settings, 1, &model));
+    double worst = 0, beside = 0, least = 1;
+    for (int i = 0; i < 3 * 4 * 3 * 2; i++) {
+        const double lens = lenses[i % 3], distance = distances[i / 3 % 4], size = sizes[i / 12 % 3];
+        const int diagonal = i / 36; /* towards a corner, else a side */
+        const double focal = W / 2 / tan(lens * 0.0087266462599716),
+                     along[2] = {diagonal ? 0.8 : 1, diagonal ? 0.6 : 0},
+                     edge = atan((diagonal ? 40 : 32) / focal) * 57.29577951308232;
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)(size * distance);
+        g.opacity = (ssdgs_real)0.98;
+        CHECK(!ssdgs_model_set(model, 0, &g));
+        ssdgs_camera camera;
+        memset(&camera, 0, sizeof camera);
+        camera.width = W, camera.height = H, camera.cx = W / 2, camera.cy = H / 2;
+        camera.fx = camera.fy = (ssdgs_real)focal;
+        camera.near_plane = (ssdgs_real)0.02;
+        camera.view[0] = camera.view[5] = camera.view[10] = 1;
+        double before = 0;
+        for (int step = 0; step <= 260; step++) { /* 0.1 degrees each, the last 6 beyond the border */
+            const double angle = (edge - 20 + 0.1 * step) * 0.017453292519943295, z = distance * cos(angle);
+            for (int c = 0; c < 2; c++)
+                camera.view[4 * c + 3] = (ssdgs_real)(distance * sin(angle) * along[c]);
+            camera.view[11] = (ssdgs_real)z;
+            const double most = most_alpha(model, &camera), change = step ? fabs(most - before) : 0;
+            if (step <= 200) worst = change > worst ? change : worst;
+            else beside = change > beside ? change : beside;
+            if (step <= 200 && z > 0.04) least = most < least ? most : least;
+            before = most;
+        }
+    }
+    if (!CHECK(worst < 0.03 && beside < 0.07 && least > 0.7))
+        printf("    a step changes alpha by %.3g, beside the picture %.3g; %.3g is left\n", worst, beside,
+               least);
+    ssdgs_model_destroy(model);
+}
 
 static void row_19(void) { /* what lies behind the camera costs a record, whatever the image's size */
     enum { BEHIND = 300000 };
@@ -1432,7 +1487,8 @@ static row rows[] = {
     ROW(49, 0, "terms of weight 0"),
     ROW(50, 0, "lights at rest"),
     ROW(51, 0, "all shaded"),
-    ROW(52, 0, "linear in the light")
+    ROW(52, 0, "linear in the light"),
+    ROW(53, 1, "a turning eye")
 #undef ROW
 };
 enum { ROWS = sizeof rows / sizeof *rows };
