@@ -469,9 +469,9 @@ typedef enum ssdgs_light_kind {
 /* clang-format on */
 typedef struct ssdgs_light {
     ssdgs_light_kind kind;
-    ssdgs_real position[3];  /* world; directional: unit vector towards the light */
+    ssdgs_real position[3];  /* world; of a directional light not read */
     ssdgs_real intensity[3]; /* RGB, 0 or more, in the training data's units; directional: irradiance */
-    ssdgs_real direction[3]; /* spot, focus: unit vector along which it shines */
+    ssdgs_real direction[3]; /* directional, spot, focus: unit vector along which it shines */
     ssdgs_real cone[2]; /* spot: angles to it in radians, 0 .. pi, full inside the first, 0 outside the larger
                            second; between them as in glTF. No light scatters across its rim */
     ssdgs_real range;   /* point, spot: where it fades to 0, as in glTF; 0: nowhere */
@@ -1128,7 +1128,7 @@ typedef struct ssdgs_frame {
     ssdgs_real *gradient;       /* (SSDGS_CHANNELS, stride) */
     ssdgs_real
         *global_gradient; /* as the model's globals: ASG quaternions, sharpness, sigma, scattering, shadow */
-    ssdgs_real light_gradient[3];   /* position of light 0; of a direction along the sphere */
+    ssdgs_real light_gradient[3];   /* position of light 0; of a directional one, the vector towards it */
     ssdgs_real ambient_gradient[3]; /* options.ambient[0] */
     double intensity[2]; /* how far ln of its intensity is from fitting the photograph; how sure that is */
     ssdgs_real view_gradient[12]; /* camera.view */
@@ -3805,6 +3805,12 @@ static int ssdgs__aimed(const ssdgs_light *light) {
     return light->kind == SSDGS_LIGHT_SPOT || (light->kind == SSDGS_LIGHT_POINT && light->focus > 0);
 }
 
+/* Where it is; of a directional one, the unit vector towards it. */
+static void ssdgs__light_place(const ssdgs_light *light, ssdgs_real place[3]) {
+    for (int i = 0; i < 3; i++)
+        place[i] = light->kind == SSDGS_LIGHT_DIRECTIONAL ? -light->direction[i] : light->position[i];
+}
+
 /* Whether it does not reach everything as 1 / distance^2. */
 static int ssdgs__limited(const ssdgs_light *light) {
     return ssdgs__aimed(light) || (light->kind == SSDGS_LIGHT_POINT && light->range > 0);
@@ -3875,10 +3881,12 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     const double detail = (double)frame->options.light_detail;
     if (!ssdgs__casts(light)) return 0;
     double centre[3], position[3], to_scene[3], radius2 = 0, distance2 = 0;
+    ssdgs_real place[3];
+    ssdgs__light_place(light, place);
     for (int i = 0; i < 3; i++) {
         const double half = b->count ? 0.5 * (b->high[i] - b->low[i]) : 1;
         centre[i] = b->count ? 0.5 * (b->high[i] + b->low[i]) : 0;
-        position[i] = (double)light->position[i];
+        position[i] = (double)place[i];
         to_scene[i] = light->kind == SSDGS_LIGHT_DIRECTIONAL ? -position[i] : centre[i] - position[i];
         radius2 += half * half;
         distance2 += to_scene[i] * to_scene[i];
@@ -3945,24 +3953,29 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
                            light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
     for (int i = 0; i < light_count; i++) {
         const ssdgs_real *cone = lights[i].cone, *along = lights[i].direction;
-        double norm2 = 0;
+        const int directional = lights[i].kind == SSDGS_LIGHT_DIRECTIONAL;
+        double norm2 = 0, old_norm2 = 0; /* position towards the light was its direction before 0.2.5 */
         if ((int)lights[i].kind < 0 || lights[i].kind > SSDGS_LIGHT_SPOT)
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
         for (int j = 0; j < 3; j++) {
-            if (!ssdgs__finite(lights[i].position[j]))
+            if (!directional && !ssdgs__finite(lights[i].position[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
             if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
                 return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                                    "light %d: intensity[%d] = %g is negative or not finite", i, j,
                                    (double)lights[i].intensity[j]);
-            norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
+            norm2 += (double)along[j] * (double)along[j];
+            old_norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
-        const int aimed = ssdgs__aimed(lights + i);
-        if (aimed) norm2 = (double)(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
-        if ((aimed || lights[i].kind == SSDGS_LIGHT_DIRECTIONAL) && !(fabs(norm2 - 1) <= 1e-3))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                               aimed ? "light %d: its direction is not a unit vector"
-                                     : "light %d: position, of a directional light, is not a unit vector",
+        if (directional && !(norm2 > 0) && fabs(old_norm2 - 1) <= 1e-3)
+            return ssdgs__fail(
+                context, SSDGS_ERR_ARGUMENT,
+                "light %d: a directional light shines along `direction`, and its position is not "
+                "read: set direction to (%g, %g, %g), which is -position",
+                i, 0 - (double)lights[i].position[0], 0 - (double)lights[i].position[1],
+                0 - (double)lights[i].position[2]);
+        if ((directional || ssdgs__aimed(lights + i)) && !(fabs(norm2 - 1) <= 1e-3))
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
                                i);
         if (lights[i].kind == SSDGS_LIGHT_SPOT &&
             !(cone[0] >= 0 && cone[1] > cone[0] && cone[1] <= (ssdgs_real)3.1416))
@@ -4104,10 +4117,13 @@ static void ssdgs__compare_cache(ssdgs_frame *frame, int same, int lights_ready,
               (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for light maps */
     for (int i = 0; i < frame->light_count; i++) {
         const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
+        ssdgs_real place[3], last_place[3];
+        ssdgs__light_place(light, place);
+        ssdgs__light_place(last, last_place);
         lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
                          ssdgs__casts(light) == ssdgs__casts(last) &&
                          ssdgs__limited(light) == ssdgs__limited(last) && /* else other bounds */
-                         !memcmp(light->position, last->position, sizeof light->position) &&
+                         !memcmp(place, last_place, sizeof place) &&
                          !memcmp(&light->range, &last->range, sizeof light->range);
         if (light->kind == SSDGS_LIGHT_SPOT) /* whose map follows its cone; a focus is of shading alone */
             lights[i].kept = lights[i].kept &&
@@ -4207,7 +4223,7 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
                                           const ssdgs__lighting *lobes) {
     static const ssdgs_light even = {
-        SSDGS_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 1, 1}, {0, 0, 0}, {0, 0}, 0, 0, 1};
+        SSDGS_LIGHT_DIRECTIONAL, {0, 0, 0}, {1, 1, 1}, {0, 0, -1}, {0, 0}, 0, 0, 1};
     const ssdgs_settings *s = &o->settings;
     const ssdgs_light *from = light < frame->light_count ? frame->lights + light : &even;
     ssdgs__lighting k;
@@ -4215,8 +4231,10 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     k.directional = from->kind == SSDGS_LIGHT_DIRECTIONAL;
     const ssdgs_real area = k.directional ? 1 : o->scale * o->scale;
     ssdgs__to_object(o, frame->eye, k.eye);
-    if (k.directional) ssdgs__turn(o, 1, from->position, k.light);
-    else ssdgs__to_object(o, from->position, k.light);
+    ssdgs_real place[3];
+    ssdgs__light_place(from, place);
+    if (k.directional) ssdgs__turn(o, 1, place, k.light);
+    else ssdgs__to_object(o, place, k.light);
     for (int i = 0; i < 3; i++) k.intensity[i] = from->intensity[i] * s->light_scale / area;
     k.least_distance2 = (ssdgs_real)1e-6 * s->length_unit * s->length_unit;
     k.virtual_depth = (ssdgs_real)(1 + ssdgs__boundary((double)s->eta));
@@ -7790,7 +7808,7 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
     memset(&light, 0, sizeof light);
     light.kind = SSDGS_LIGHT_DIRECTIONAL;
     for (int c = 0; c < 3; c++) {
-        light.position[c] = direction[c];
+        light.direction[c] = -direction[c];
         light.intensity[c] = 1;
     }
     ssdgs__request request = ssdgs__request_of(&object, 1, &camera, &light, 1, &options);
@@ -7959,7 +7977,7 @@ static ssdgs_light ssdgs__sky_light(const ssdgs__environment *e, const ssdgs__sk
         for (int i = 0; i < 3; i++)
             to += (length2 > 0 ? sky->along[i] / sqrt(length2) : (double)(i == 2)) *
                   (double)(to_world ? to_world[3 * c + i] : (ssdgs_real)(c == i));
-        light.position[c] = (ssdgs_real)to;
+        light.direction[c] = (ssdgs_real)-to;
         light.intensity[c] = (ssdgs_real)sum[c];
     }
     return light;
@@ -9933,9 +9951,11 @@ static void ssdgs__rotate_by(const double w[3], double e[9], double jacobian[9])
 
 /* What a moved light is divided by: directions stay unit vectors. */
 static double ssdgs__moved_length(const ssdgs_light *light, const double value[10]) {
+    ssdgs_real place[3];
     double square = 0;
+    ssdgs__light_place(light, place);
     for (int i = 0; i < 3; i++)
-        square += ((double)light->position[i] + value[6 + i]) * ((double)light->position[i] + value[6 + i]);
+        square += ((double)place[i] + value[6 + i]) * ((double)place[i] + value[6 + i]);
     return light->kind != SSDGS_LIGHT_DIRECTIONAL || !(square > 0) ? 1 : sqrt(square);
 }
 
@@ -9944,6 +9964,9 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssd
     *camera = photo->camera;
     *light = photo->light;
     const double length = ssdgs__moved_length(&photo->light, value);
+    const int directional = light->kind == SSDGS_LIGHT_DIRECTIONAL;
+    ssdgs_real place[3];
+    ssdgs__light_place(&photo->light, place);
     double e[9], jacobian[9];
     ssdgs__rotate_by(value + 3, e, jacobian);
     for (int i = 0; i < 3; i++) {
@@ -9952,7 +9975,9 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssd
             for (int l = 0; l < 3; l++) sum += e[3 * i + l] * (double)photo->camera.view[4 * l + j];
             camera->view[4 * i + j] = (ssdgs_real)sum;
         }
-        light->position[i] = (ssdgs_real)(((double)photo->light.position[i] + value[6 + i]) / length);
+        const double moved = ((double)place[i] + value[6 + i]) / length;
+        *(directional ? light->direction + i : light->position + i) =
+            (ssdgs_real)(directional ? -moved : moved);
         if (value[9] < 0 || value[9] > 0)
             light->intensity[i] = (ssdgs_real)((double)photo->light.intensity[i] * exp(value[9]));
     }
@@ -10960,9 +10985,9 @@ static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssd
         const double z = 1 - (2 * view + 1.0) / SSDGS__REDUCE_VIEWS, r = sqrt(1 - z * z), turn = 2.39996323;
         const ssdgs_light light = {
             SSDGS_LIGHT_DIRECTIONAL,
-            {(ssdgs_real)(r * cos(turn * view)), (ssdgs_real)(r * sin(turn * view)), (ssdgs_real)z},
-            {1, 1, 1},
             {0, 0, 0},
+            {1, 1, 1},
+            {(ssdgs_real)(-r * cos(turn * view)), (ssdgs_real)(-r * sin(turn * view)), (ssdgs_real)-z},
             {0, 0},
             0,
             0,
@@ -11494,10 +11519,12 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const doubl
     }
     s->brightness = light / area / intensity;
     s->directional = photo->light.kind == SSDGS_LIGHT_DIRECTIONAL;
+    ssdgs_real place[3];
+    ssdgs__light_place(&photo->light, place);
     ssdgs__camera_centre(camera, s->eye);
     for (int c = 0; c < 3; c++) {
         s->eye[c] -= centre[c];
-        s->position[c] = (double)photo->light.position[c];
+        s->position[c] = (double)place[c];
         for (int l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
     }
     return 1;
@@ -11665,7 +11692,9 @@ static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
             double eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
             ssdgs__camera_centre(&photo->camera, eye);
             double p[3];
-            for (int j = 0; j < 3; j++) p[j] = (double)photo->light.position[j];
+            ssdgs_real place[3];
+            ssdgs__light_place(&photo->light, place);
+            for (int j = 0; j < 3; j++) p[j] = (double)place[j];
             double seen[3];
             ssdgs__to_camera(&photo->camera, p, point, seen);
             for (int j = 0; j < 3; j++) {

@@ -118,7 +118,9 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
         f->sharp = first > 2 * grain && second > 25 * grain ? (second - 20 * grain) / (first - grain) : 0;
         olat_eye(&photo->camera, eye);
         toward(middle, eye, 0, f->camera);
-        toward(middle, photo->light.position, photo->light.kind == SSDGS_LIGHT_DIRECTIONAL, f->light);
+        ssdgs_real place[3];
+        olat_place(&photo->light, place);
+        toward(middle, place, photo->light.kind == SSDGS_LIGHT_DIRECTIONAL, f->light);
     }
     free(stored), free(light), free(fine), free(shown);
     return failed;

@@ -138,8 +138,10 @@ static void draw_meshes(level *l) {
 static int box_hides(const level *l, int light, const float point[3]) {
     float begin = 1e-3f, end = 1;
     for (int c = 0; c < 3; c++) {
-        const float from = point[c], to = l->lights[light].position[c];
-        const float along = l->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL ? 100 * to : to - from;
+        const ssdgs_light *lamp = l->lights + light;
+        const float from = point[c];
+        const float along =
+            lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? -100 * lamp->direction[c] : lamp->position[c] - from;
         float near_side = (l->box_low[c] - from) / along, far_side = (l->box_high[c] - from) / along;
         if (fabsf(along) < 1e-9f) {
             if (from < l->box_low[c] || from > l->box_high[c]) return 0;
@@ -162,7 +164,7 @@ static float irradiance(const level *l, int light, const float point[3], const f
     const ssdgs_light *from = l->lights + light;
     float to[3], strength = l->light_scale, cosine = 0, along = 0;
     for (int c = 0; c < 3; c++)
-        to[c] = from->kind == SSDGS_LIGHT_DIRECTIONAL ? from->position[c] : from->position[c] - point[c];
+        to[c] = from->kind == SSDGS_LIGHT_DIRECTIONAL ? -from->direction[c] : from->position[c] - point[c];
     if (from->kind == SSDGS_LIGHT_SPOT) strength /= to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
     normalize(to);
     for (int c = 0; c < 3; c++) cosine += to[c] * normal[c], along -= to[c] * from->direction[c];
@@ -261,7 +263,7 @@ static void move(level *l, float t) { /* t: 0 .. 1 */
     for (int c = 0; c < 3; c++) {
         spot->intensity[c] = (c == 2 ? 24.0f : 30.0f) / l->light_scale;
         far_away->intensity[c] = (c ? 0.5f + 0.1f * (float)c : 0.5f) / l->light_scale;
-        far_away->position[c] = sun[c];
+        far_away->direction[c] = -sun[c];
     }
     l->objects[0] = place(l, 0, 1.0f, -0.75f, 0.1f, turn);
     l->objects[1] = place(l, 1, 0.8f, 0.85f, 0.3f, 0.6f);

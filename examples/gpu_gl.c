@@ -2434,7 +2434,7 @@ static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_l
     double length2 = 0, norm2 = 0;
     for (int i = 0; i < 3; i++) length2 += (double)l->direction[i] * (double)l->direction[i];
     for (int i = 0; i < 3; i++) {
-        lamp->place[i] = (float)l->position[i];
+        lamp->place[i] = directional ? -(float)l->direction[i] : (float)l->position[i];
         lamp->intensity[i] = (float)(l->intensity[i] * frame->settings.light_scale);
         lamp->cone[i] = (float)(spot || focused ? (double)l->direction[i] / sqrt(length2) : 0);
         norm2 += (double)lamp->cone[i] * (double)lamp->cone[i];

@@ -1915,8 +1915,8 @@ static void olat__read_light(olat__json *j, const olat__node *node, const double
     light->focus = (ssdgs_real)mu;
     light->kind = is_far ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
     for (int i = 0; i < 3 && !j->failed; i++) {
-        light->position[i] = (ssdgs_real)(is_far ? v[i] / length : v[i] - origin[i]);
-        light->direction[i] = (ssdgs_real)(axis[i] / length);
+        light->position[i] = (ssdgs_real)(is_far ? 0 : v[i] - origin[i]);
+        light->direction[i] = (ssdgs_real)((is_far ? -v[i] : axis[i]) / length);
         light->intensity[i] = (ssdgs_real)rgb[i];
     }
 }
@@ -2656,7 +2656,8 @@ static void olat__write_path(olat__writer *w, const char *key, const char *file,
 static void olat__write_light(olat__writer *w, const ssdgs_light *light, const double origin[3]) {
     const int is_point = light->kind == SSDGS_LIGHT_POINT;
     double v[3];
-    for (int k = 0; k < 3; k++) v[k] = (double)light->position[k] + (is_point ? origin[k] : 0);
+    for (int k = 0; k < 3; k++)
+        v[k] = is_point ? (double)light->position[k] + origin[k] : 0 - (double)light->direction[k];
     olat__write_numbers(w, is_point ? "\"pl_pos\": [" : "\"pl_dir\": [", v, 3, is_point ? 16 : 9, "], ");
     if (light->focus > 0) {
         v[0] = (double)light->focus;
@@ -2945,6 +2946,12 @@ OLAT__API void olat_compose(const ssdgs_photo *photo, int transfer, const ssdgs_
         for (size_t k = 0; k < 3; k++)
             out[3 * i + k] = v[3] * (encodes ? ssdgs_srgb_encode(v[k]) : v[k]) + (1 - v[3]) * background[k];
     }
+}
+
+/* Where a light is; of a directional one, the unit vector towards it. */
+OLAT__API void olat_place(const ssdgs_light *light, ssdgs_real place[3]) {
+    for (int i = 0; i < 3; i++)
+        place[i] = light->kind == SSDGS_LIGHT_DIRECTIONAL ? -light->direction[i] : light->position[i];
 }
 
 /* Where a camera stands. */

@@ -359,9 +359,11 @@ static int make_trajectory(job *j) {
     ssdgs_real eye[3];
     for (int i = 0; i < data->count; i++) {
         const ssdgs_light *l = &data->frames[i].light;
+        ssdgs_real place[3];
+        olat_place(l, place);
         olat_eye(&data->frames[i].camera, eye);
         orbit_add(&camera_orbit, axes, eye, 1.0 / data->count, i == 0);
-        orbit_add(&light_orbit, axes, l->position, 1.0 / data->count, 0);
+        orbit_add(&light_orbit, axes, place, 1.0 / data->count, 0);
         for (int k = 0; k < 3; k++) intensity[k] += (double)l->intensity[k] / data->count;
     }
     light_orbit.azimuth = camera_orbit.azimuth; /* starts at the viewer */
@@ -378,8 +380,13 @@ static int make_trajectory(job *j) {
                                        first.width, first.height);
         camera->fy = first.fy;
         frames[i].light = light;
-        orbit_at(&light_orbit, axes, light_turn, frames[i].light.position);
-        for (int k = 0; k < 3; k++) frames[i].light.intensity[k] = (ssdgs_real)intensity[k];
+        ssdgs_real place[3];
+        orbit_at(&light_orbit, axes, light_turn, place);
+        for (int k = 0; k < 3; k++) {
+            frames[i].light.intensity[k] = (ssdgs_real)intensity[k];
+            if (light.kind == SSDGS_LIGHT_DIRECTIONAL) frames[i].light.direction[k] = -place[k];
+            else frames[i].light.position[k] = place[k];
+        }
     }
     olat_free(data);
     data->frames = frames;

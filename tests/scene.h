@@ -107,7 +107,7 @@ static inline ssdgs_light point_light(double x, double y, double z) {
 /* From so far away in that direction. */
 static inline ssdgs_light parallel_light(double x, double y, double z) {
     ssdgs_light light = point_light(x, y, z);
-    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    TEST_PARALLEL(light);
     for (int c = 0; c < 3; c++) light.intensity[c] = (ssdgs_real)(1 + c % 2);
     return light;
 }

@@ -314,7 +314,8 @@ static void shade(const gaussian *g, int index, const double *visibility, shaded
         const int directional = lamp->kind == SSDGS_LIGHT_DIRECTIONAL;
         const double n[3] = {g->frame[2], g->frame[5], g->frame[8]};
         double wi[3], d = 0;
-        for (int i = 0; i < 3; i++) wi[i] = (double)lamp->position[i] - (directional ? 0 : g->x[i]);
+        for (int i = 0; i < 3; i++)
+            wi[i] = directional ? -(double)lamp->direction[i] : (double)lamp->position[i] - g->x[i];
         double falloff = directional ? 1 : 1 / dot(wi, wi);
         normalise(wi);
         double h[3];
@@ -429,7 +430,8 @@ static int highlight(const double b[VALUES], double depth, double x, double y, d
         }
         double wi[3];
         for (int i = 0; i < 3; i++)
-            wi[i] = (double)lamp->position[i] - (lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? 0 : place[i]);
+            wi[i] = lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? -(double)lamp->direction[i]
+                                                          : (double)lamp->position[i] - place[i];
         normalise(wi);
         double h[3];
         for (int i = 0; i < 3; i++) h[i] = wi[i] + wo[i];
@@ -555,7 +557,7 @@ static void camera_scene(int index) {
     s.light_count = integer(0, 2);
     random_light(s.lights, 1);
     random_light(s.lights + 1, uniform(0.8, 3));
-    s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
+    TEST_PARALLEL(s.lights[0]);
 }
 
 static void test_camera(int scenes) {
@@ -734,7 +736,7 @@ static void test_light(int rounds) {
         for (int i = 0; i < s.count; i++) s.raw[SSDGS_OPACITY][i] += 2;
         read_gaussians();
         random_light(s.lights, c->distance);
-        s.lights[0].kind = (ssdgs_light_kind)c->kind;
+        if (c->kind == SSDGS_LIGHT_DIRECTIONAL) TEST_PARALLEL(s.lights[0]);
         s.settings.light_map.blur = index % 2 ? SSDGS_BLUR_ADD : SSDGS_BLUR_FLOOR;
         s.settings.light_map.bias = (ssdgs_real)c->bias;
         s.settings.light_map.size = c->map;
@@ -1036,8 +1038,8 @@ static void test_layers(void) {
                 s.settings.light_map.blur = blur;
                 s.settings.light_map.bias = (ssdgs_real)(bias ? 0.5 : 0);
                 s.settings.light_map.size = 512;
-                s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
                 s.lights[0].position[0] = s.lights[0].position[1] = 0, s.lights[0].position[2] = 1;
+                TEST_PARALLEL(s.lights[0]);
                 for (int i = 0; i <= layers; i++) {
                     for (int c = 0; c < 4; c++) s.raw[SSDGS_ROTATION + c][i] = c == 0;
                     for (int c = 0; c < 3; c++)
@@ -1091,8 +1093,8 @@ static void test_gap(void) {
         axis_scene(3, dense ? 8 : 0);
         s.settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
         s.settings.light_map.bias = 0, s.settings.light_map.size = 64;
-        s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
         for (int c = 0; c < 3; c++) s.lights[0].position[c] = c == 0;
+        TEST_PARALLEL(s.lights[0]);
         for (int i = 0; i < 3; i++) {
             for (int c = 0; c < 3; c++) s.raw[SSDGS_LOG_SCALE + c][i] = (ssdgs_real)log(dense ? 0.3 : 0.03);
             s.raw[SSDGS_POSITION][i] = (ssdgs_real)(i == 2 ? 0.3 : 0.1 * dense);
@@ -1242,7 +1244,7 @@ static void test_similarity(void) {
         s.settings.light_map.size = 0;
         s.light_count = 2;
         random_light(s.lights + 1, 1);
-        s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
+        TEST_PARALLEL(s.lights[1]);
         s.options.terms = cases[n].turn > 0 ? SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM : SSDGS_ALL_TERMS;
         render(best(), image);
         double r[9];
@@ -1268,7 +1270,7 @@ static void test_similarity(void) {
             }
         }
         MOVED(s.lights[0].position[c], s.lights[0].position[c], k, 1);
-        MOVED(s.lights[1].position[c], s.lights[1].position[c], 1, 0);
+        MOVED(s.lights[1].direction[c], s.lights[1].direction[c], 1, 0);
         MOVED(s.settings.centre[c], s.settings.centre[c], k, 1);
         for (c = 0; c < 3; c++) s.lights[0].intensity[c] *= (ssdgs_real)(k * k);
         s.settings.length_unit = (ssdgs_real)((double)s.settings.length_unit * k);

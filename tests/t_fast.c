@@ -105,7 +105,8 @@ static void test_kept(void) {
     moved = lights[0], lights[0].intensity[1] *= 2;
     check_same(model, &a, lights, 2, &options, 1, 2, "a brighter light");
     lights[0] = moved;
-    lights[1].kind = SSDGS_LIGHT_DIRECTIONAL, lights[1].position[0] = lights[1].position[1] = 0;
+    lights[1].position[0] = lights[1].position[1] = 0;
+    TEST_PARALLEL(lights[1]);
     check_same(model, &a, lights, 2, &options, 1, 1, "another kind of light");
     FIRST();
     FIRST(); /* the shadow network's outputs are kept from here on */

@@ -230,9 +230,9 @@ static void run(const scene *s) {
                 move[6 + c] = steps[i];
                 ssdgs_camera still;
                 ssdgs__correct(&photo, move, &still, lights);
-                CHECK(fabs(lights[0].position[0] * lights[0].position[0] +
-                           lights[0].position[1] * lights[0].position[1] +
-                           lights[0].position[2] * lights[0].position[2] - 1) < 1e-14);
+                CHECK(fabs(lights[0].direction[0] * lights[0].direction[0] +
+                           lights[0].direction[1] * lights[0].direction[1] +
+                           lights[0].direction[2] * lights[0].direction[2] - 1) < 1e-14);
                 ssdgs_frame moved;
                 side[i] = objective(s, model, &camera, lights, &fixed, &moved, 0);
             }
@@ -869,8 +869,8 @@ int main(void) {
     s.light_count = 2, s.lights[1].position[0] = -0.2, s.lights[1].position[1] = 1.5,
     s.lights[1].position[2] = -0.2; /* wo.h < 0.25 */
     run(&s);
-    s = base, s.name = "directional and point light", s.light_count = 2,
-    s.lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
+    s = base, s.name = "directional and point light", s.light_count = 2;
+    TEST_PARALLEL(s.lights[1]);
     run(&s);
     s = base, s.name = "light amid them, six maps", s.light_count = 2;
     for (int i = 0; i < 3; i++) s.lights[0].position[i] = i == 0 ? 0.5 : i == 1 ? -0.4 : 0.2;
@@ -880,12 +880,13 @@ int main(void) {
     for (int i = 0; i < 3; i++) { /* highlights per pixel, per Gaussian, and light that scatters */
         static const char *const names[3] = {"directional light", "directional light, geometric ASG",
                                              "directional light, scattering only"};
-        s = base, s.name = names[i], s.lights[0].kind = SSDGS_LIGHT_DIRECTIONAL;
+        s = base, s.name = names[i];
         s.settings.octaves.light = i; /* the network sees wi alone, or its sines too */
         s.settings.asg = i == 1 ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
         if (i == 2) s.options.terms = SSDGS_SCATTERING_TERM;
         const double direction[3] = {0.48, -0.8, 0.36};
         memcpy(s.lights[0].position, direction, sizeof direction);
+        TEST_PARALLEL(s.lights[0]);
         run(&s);
     }
     for (int i = 0; i < 5; i++) { /* the last three leave some or all Gaussians dark */

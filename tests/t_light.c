@@ -564,9 +564,9 @@ static void test_environment_sums(void) {
             CHECK_NEAR(sum, total, 3, 0, real64 ? 1e-12 : 1e-5, "no light is lost");
             for (int i = 0; i < count; i++)
                 CHECK(lights[i].kind == SSDGS_LIGHT_DIRECTIONAL && !lights[i].unshadowed &&
-                      fabs((double)(lights[i].position[0] * lights[i].position[0] +
-                                    lights[i].position[1] * lights[i].position[1] +
-                                    lights[i].position[2] * lights[i].position[2]) -
+                      fabs((double)(lights[i].direction[0] * lights[i].direction[0] +
+                                    lights[i].direction[1] * lights[i].direction[1] +
+                                    lights[i].direction[2] * lights[i].direction[2]) -
                            1) < 1e-5);
         }
     /* with both, ambient light has what is less than twice the mean, as bright as that of what is more */
@@ -592,7 +592,7 @@ static void test_environment_sums(void) {
         texel(20, 8, to[0]);
         texel(23, 21, to[1]);
         for (int k = 0; k < 2; k++)
-            for (int c = 0; c < 3; c++) off[k] += fabs((double)lights[i].position[c] - to[k][c]);
+            for (int c = 0; c < 3; c++) off[k] += fabs((double)lights[i].direction[c] + to[k][c]);
         CHECK(fmin(off[0], off[1]) < 1e-5 && lights[i].intensity[0] > 0);
     }
     /* of three, the two that are close share one */
@@ -603,7 +603,7 @@ static void test_environment_sums(void) {
     double closest = 9;
     for (int i = 0; i < 2; i++) {
         double off = 0;
-        for (int c = 0; c < 3; c++) off += fabs((double)lights[i].position[c] - direction[c]);
+        for (int c = 0; c < 3; c++) off += fabs((double)lights[i].direction[c] + direction[c]);
         closest = fmin(closest, off);
     }
     CHECK(closest < 1e-5);
@@ -632,7 +632,9 @@ static void test_environment_sums(void) {
         const ssdgs_real turned[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
         const double w[3] = {direction[2], direction[0], direction[1]};
         CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, turn ? turned : NULL, lights, 3, NULL));
-        CHECK_NEAR(lights[0].position, turn ? w : direction, 3, 1e-6, 0, "where it is");
+        const double *to = turn ? w : direction;
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs((double)lights[0].direction[c] + to[c]) < 1e-6); /* where it is */
         CHECK(fabs((double)lights[0].intensity[1] - 7 * size) < 1e-6);
         CHECK(!(lights[0].intensity[0] > 0) && !(lights[1].intensity[1] > 0) &&
               !(lights[2].intensity[1] > 0));

@@ -897,7 +897,7 @@ static void test_lights(void) {
         "{" FILE_A "\"transform_matrix\":[[1,0,0,1000000],[0,1,0,1000000],[0,0,1,4]],"
         "\"pl_pos\":[1000001,1000002,3],\"pl_mu\":2,\"pl_axis\":[1,0,0]}]}";
     static const double at[2][3] = {{1, 2, 3}, {4, 5, 6}}, axis[2][3] = {{0, 0.6, -0.8}, {1, 0, 0}},
-                        sun[3] = {0, 0.6, 0.8}, rgb[3] = {2, 3, 4}, one[3] = {1, 1, 1},
+                        away[3] = {0, -0.6, -0.8}, rgb[3] = {2, 3, 4}, one[3] = {1, 1, 1},
                         middle[3] = {1e6, 1e6, 0};
     for (int saved = 0; saved < 2; saved++) {
         if (saved ? !CHECK(!olat_save(FOLDER "/saved.json", FOLDER, &set, error))
@@ -914,7 +914,7 @@ static void test_lights(void) {
         CHECK(near_all(f[0].light.position, at[0], 3) && f[0].light.kind == SSDGS_LIGHT_POINT &&
               near_all(f[0].light.direction, axis[0], 3) && near_all(f[0].light.intensity, one, 3) &&
               fabs((double)f[0].light.focus - 1.5) < 1e-6);
-        CHECK(near_all(f[0].more[0].position, sun, 3) && near_all(f[0].more[0].intensity, rgb, 3) &&
+        CHECK(near_all(f[0].more[0].direction, away, 3) && near_all(f[0].more[0].intensity, rgb, 3) &&
               f[0].more[0].kind == SSDGS_LIGHT_DIRECTIONAL && f[0].more[0].focus <= 0);
         CHECK(near_all(f[0].more[1].position, at[1], 3) && f[0].more[1].kind == SSDGS_LIGHT_POINT &&
               f[0].more[1].focus <= 0);
@@ -922,7 +922,7 @@ static void test_lights(void) {
               fabs((double)f[1].light.focus - 2) < 1e-6);
         ssdgs_light lights[OLAT_MOST_LIGHTS];
         ssdgs_photo photo = olat_photo(f);
-        CHECK(olat_lights(&photo, lights) == 3 && near_all(lights[1].position, sun, 3) &&
+        CHECK(olat_lights(&photo, lights) == 3 && near_all(lights[1].direction, away, 3) &&
               near_all(lights[2].position, at[1], 3) && near_all(lights[0].position, at[0], 3));
         photo.more_count = 1000; /* no more than there is room for */
         photo.more = lights;
@@ -952,7 +952,7 @@ static void test_lights(void) {
 static void test_datasets(void) {
     static const double view[12] = {1, 0, 0, -0.5, 0, -1, 0, 0, 0, 0, -1, 4}, light[3] = {1, 2, 3},
                         rgb[3] = {2, 3, 4}, one[3] = {7, 7, 7};
-    static const double turned[12] = {0, -1, 0, 2, 0, 0, -1, 3, 1, 0, 0, -1}, dir[3] = {0, 0.6, 0.8};
+    static const double turned[12] = {0, -1, 0, 2, 0, 0, -1, 3, 1, 0, 0, -1}, along[3] = {0, -0.6, -0.8};
     static const char *const bad_paths[][2] = {{"../a", "'..'"},
                                                {"b/../../a", "'..'"},
                                                {"..\\\\a", "'..'"},
@@ -1060,7 +1060,7 @@ static void test_datasets(void) {
               fabs((double)a->camera.fy - 3 / tan(0.5)) < 1e-5 && near_all(&a->camera.cx, light + 2, 1));
         CHECK(near_all(a->camera.view, view, 12) && near_all(a->light.position, light, 3) &&
               near_all(a->light.intensity, rgb, 3) && a->light.kind == SSDGS_LIGHT_POINT);
-        CHECK(near_all(b->camera.view, turned, 12) && near_all(b->light.position, dir, 3) &&
+        CHECK(near_all(b->camera.view, turned, 12) && near_all(b->light.direction, along, 3) &&
               near_all(b->light.intensity, one, 3) && b->light.kind == SSDGS_LIGHT_DIRECTIONAL);
         ssdgs_photo *photos = olat_photos(&set);
         CHECK(photos && photos[1].pixels == b->pixels && photos[1].camera.width == 3 &&
@@ -1280,7 +1280,7 @@ static void test_rounding(void) {
                      OLAT_NO_IMAGES, "not a rotation"));
     CHECK(loads(TOP "{\"pl_dir\":[0,0.6,0.792]," POSE "}]}", OLAT_NO_IMAGES));
     CHECK(set.count == 1 &&
-          fabs((double)set.frames->light.position[2] - 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
+          fabs((double)set.frames->light.direction[2] + 0.792 / sqrt(0.36 + 0.792 * 0.792)) < 1e-6);
     olat_free(&set);
     CHECK(load_fails(TOP "{\"pl_dir\":[0,0,1.011]," POSE "}]}", OLAT_NO_IMAGES, "unit vector") && live == 0);
 }

@@ -314,9 +314,9 @@ static void test_after_frame(void) {
             ssdgs_image image;
             memset(&light, 0, sizeof light);
             memset(&image, 0, sizeof image);
-            light.kind = SSDGS_LIGHT_DIRECTIONAL;
             light.position[0] = (ssdgs_real)sqrt(1 - z * z);
             light.position[2] = (ssdgs_real)z;
+            TEST_PARALLEL(light);
             for (int c = 0; c < 3; c++) light.intensity[c] = 1;
             image.color = color;
             CHECK(!ssdgs_render_ex(models[i], &camera, &light, 1, &options, &image, NULL));

@@ -446,7 +446,12 @@ static void test_messages(void) {
     SAYS(ssdgs_render(model, &photo.camera, NULL, 2, &image), "2 lights, but the array is NULL");
     light.kind = SSDGS_LIGHT_DIRECTIONAL;
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image),
-         "light 0: position, of a directional light, is not a unit vector");
+         "light 0: its direction is not a unit vector");
+    light.position[0] = 0, light.position[1] = (ssdgs_real)-0.6, light.position[2] = (ssdgs_real)0.8;
+    SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image),
+         "light 0: a directional light shines along `direction`, and its position is not read: set direction "
+         "to "
+         "(0, 0.6, -0.8), which is -position");
     light = photo.light;
     memcpy(&light.kind, &numbers[1], sizeof numbers[1]);
     SAYS(ssdgs_render(model, &photo.camera, &light, 1, &image), "light 0: kind = 7");

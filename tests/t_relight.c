@@ -69,6 +69,7 @@ static void test_path(int up, int sign, int directional) {
         f->light.focus = 1;
         for (int k = 0; k < 3; k++) {
             f->light.position[k] = (ssdgs_real)(lit[k] + (k == up ? sign * (2 + i) : 0.5 * i + k));
+            f->light.direction[k] = -f->light.position[k]; /* of a directional one */
             f->light.intensity[k] = (ssdgs_real)(1 + k + 3 * i);
         }
         olat_eye(&f->camera, eye);
@@ -88,18 +89,18 @@ static void test_path(int up, int sign, int directional) {
         const int step = i % 240 + 1;
         const double camera_turn = (i < 240 ? 0 : 180) + (step > 150 ? 2 * (step - 150) : 0),
                      light_turn = step < 150 ? 360.0 / 150 * step : 0;
-        ssdgs_real eye[3];
+        ssdgs_real eye[3], place[3];
         olat_eye(&f->camera, eye);
+        olat_place(&f->light, place);
         off = test_most(off, fabs(sign * ((double)eye[up] - centre[up]) - heights));
         off = test_most(off, fabs(distance_of(centre, eye) - distances));
-        off = test_most(off, fabs(sign * ((double)f->light.position[up] - lit[up]) - light_heights));
-        off = test_most(off, fabs(distance_of(lit, f->light.position) - light_distances));
+        off = test_most(off, fabs(sign * ((double)place[up] - lit[up]) - light_heights));
+        off = test_most(off, fabs(distance_of(lit, place) - light_distances));
         for (int k = 0; k < 3; k++) off = test_most(off, fabs((double)f->light.intensity[k] - 4 - k));
         turns[0] =
             test_most(turns[0], fabs(turned_by(up, sign, centre, start, eye) - fmod(camera_turn, 360)));
         ssdgs_real from_centre[3];
-        for (int k = 0; k < 3; k++)
-            from_centre[k] = (ssdgs_real)((double)f->light.position[k] - lit[k] + centre[k]);
+        for (int k = 0; k < 3; k++) from_centre[k] = (ssdgs_real)((double)place[k] - lit[k] + centre[k]);
         turns[1] = test_most(turns[1], fabs(turned_by(up, sign, centre, start, from_centre) - light_turn));
         /* it looks at the centre, upright, through the first frame's lens */
         double seen[3];

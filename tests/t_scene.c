@@ -59,9 +59,9 @@ static void test_moved(void) {
                 o.to_world[3] = (ssdgs_real)move[m].x, o.to_world[7] = (ssdgs_real)move[m].y;
             }
             if (part == 2) {
-                light.kind = SSDGS_LIGHT_DIRECTIONAL;
                 light.position[0] = light.position[2] = (ssdgs_real)0.6;
                 light.position[1] = (ssdgs_real)-sqrt(1 - 2 * 0.36);
+                TEST_PARALLEL(light);
             }
             there = light;
             options.alpha_threshold = (ssdgs_real)1e-6; /* or rounding shows and hides faint rims */
@@ -72,6 +72,7 @@ static void test_moved(void) {
                 if (part == 2) there.position[i] /= (ssdgs_real)scale;
                 else there.intensity[i] *= (ssdgs_real)(scale * scale);
             }
+            if (part == 2) TEST_PARALLEL(there);
             for (int i = 0; i < 3; i++) { /* its rows turn along; the first one of a mirrored one backwards */
                 double back = 0;
                 for (int j = 0; j < 3; j++) {
@@ -628,8 +629,8 @@ static void test_query(void) {
             ssdgs_object object = ssdgs_object_default(plate);
             ssdgs_light lights[2] = {point_light(5, 0, 1), point_light(0.2, 0.1, 3)};
             if (kind) {
-                lights[1].kind = SSDGS_LIGHT_DIRECTIONAL;
                 lights[1].position[0] = lights[1].position[1] = 0, lights[1].position[2] = 1;
+                TEST_PARALLEL(lights[1]);
             }
             object.to_world[11] = (ssdgs_real)0.5; /* lifted */
             CHECK(!ssdgs_scene_light(scene, &object, 1, lights, 2, NULL));

@@ -379,7 +379,8 @@ static void row_04(
     ssdgs_model_destroy(model);
 }
 
-static void row_05(void) { /* drawn where z > near and z is finite, else as if it were not there */
+static void row_05(void) { /* drawn where z > near, faintly at first, and z is finite, else as if it were not
+                              there */
     const float near_plane = 0.5f;
     const ssdgs_render_options exact = ssdgs_render_options_exact();
     uint32_t bits;
@@ -387,30 +388,36 @@ static void row_05(void) { /* drawn where z > near and z is finite, else as if i
     memcpy(&bits, &near_plane, 4);
     float close[2];
     for (int i = 0; i < 2; i++) bits += i ? 2 : -1u, memcpy(close + i, &bits, 4);
-    double depths[13];
+    double depths[15];
     depths[0] = (double)close[0], depths[1] = 0.5, depths[2] = (double)close[1], depths[3] = 0,
     depths[4] = -0.0, depths[5] = -1;
     depths[6] = bits_number(1), depths[7] = -INFINITE, depths[8] = INFINITE, depths[9] = NOT_A_NUMBER,
     depths[10] = -1e38;
-    depths[11] = 1e29, depths[12] = 1e38;
+    depths[11] = 1e29, depths[12] = 1e38, depths[13] = 0.505, depths[14] = 0.75;
     camera.near_plane = (ssdgs_real)0.5;
     ssdgs_model *model = cloud(plain(), GOOD);
     show(model, &camera, NULL, 0, &exact, &a);
     ssdgs_model_destroy(model);
     model = cloud(plain(), GOOD + 1);
-    for (int i = 0; i < 13; i++) {
-        const int drawn = depths[i] > 0.5 && depths[i] < 1e30; /* NaN fails both */
+    for (int i = 0; i < 15; i++) {
+        const int drawn = depths[i] > 0.501 && depths[i] < 1e30; /* NaN fails both */
         put(model, GOOD, 0, 0, depths[i], -5, 2);
         show(model, &camera, NULL, 0, &exact, &b);
         CHECK(b.stats.visible == GOOD + drawn && b.stats.rejected == !test_finite((double)(float)depths[i]));
         if (!CHECK(same(&a, &b) == !drawn)) printf("    z = %g\n", depths[i]);
     }
+    put(model, GOOD, 0, 0, 0.75, -5, 2); /* half of its opacity; as large twice as far from the plane, all */
+    for (int i = 0; i < GOOD; i++) set(model, i, SSDGS_OPACITY, 1, -20);
+    show(model, &camera, NULL, 0, &exact, &a);
+    put(model, GOOD, 0, 0, 1, log(1 / 0.75) - 5, 2); /* as large in pixels */
+    show(model, &camera, NULL, 0, &exact, &b);
+    CHECK(fabs((double)(b.alpha[CENTRE] / a.alpha[CENTRE]) - 2) < 1e-4);
     ssdgs_model_destroy(model);
 }
 
 static void row_06(void) { /* the camera, then the light too, inside a large Gaussian; many beside it */
     enum { BESIDE = 500 };
-    static const double depths[4] = {1e-30, 0.011, 0.1, 1};
+    static const double depths[4] = {1e-30, 0.021, 0.1, 1};
     const ssdgs_camera camera = ahead();
     const ssdgs_light light = lamp(0.1, 0, 0, 1);
     ssdgs_model *model = cloud(full(), 50);
@@ -699,7 +706,7 @@ static void row_53(void) { /* a Gaussian turned through the picture neither vani
                      along[2] = {diagonal ? 0.8 : 1, diagonal ? 0.6 : 0},
                      edge = atan((diagonal ? 40 : 32) / focal) * 57.29577951308232;
         ssdgs_gaussian g = ssdgs_gaussian_default();
-        for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)(size * distance);
+        for (int k = 0; k < 3; k++) g.scale[k] = (ssdgs_real)(size * distance);
         g.opacity = (ssdgs_real)0.98;
         CHECK(!ssdgs_model_set(model, 0, &g));
         ssdgs_camera camera;
@@ -711,8 +718,8 @@ static void row_53(void) { /* a Gaussian turned through the picture neither vani
         double before = 0;
         for (int step = 0; step <= 260; step++) { /* 0.1 degrees each, the last 6 beyond the border */
             const double angle = (edge - 20 + 0.1 * step) * 0.017453292519943295, z = distance * cos(angle);
-            for (int c = 0; c < 2; c++)
-                camera.view[4 * c + 3] = (ssdgs_real)(distance * sin(angle) * along[c]);
+            for (int k = 0; k < 2; k++)
+                camera.view[4 * k + 3] = (ssdgs_real)(distance * sin(angle) * along[k]);
             camera.view[11] = (ssdgs_real)z;
             const double most = most_alpha(model, &camera), change = step ? fabs(most - before) : 0;
             if (step <= 200) worst = change > worst ? change : worst;
@@ -1044,7 +1051,7 @@ static void row_33(void) { /* a light a million extents away is a directional on
     ssdgs_light light = lamp(0.6e6, -0.48e6, 2 + 0.64e6, 1e12);
     show(model, &camera, &light, 1, NULL, &a);
     light = lamp(0.6, -0.48, 0.64, 1);
-    light.kind = SSDGS_LIGHT_DIRECTIONAL;
+    TEST_PARALLEL(light);
     show(model, &camera, &light, 1, NULL, &b);
     CHECK(distance(a.color, b.color, 3 * PIXELS) < 1e-5 * peak(&b) && peak(&b) > 0.01);
     ssdgs_model_destroy(model);
@@ -1283,8 +1290,8 @@ static void row_46(void) { /* the shadow's error falls with the map's resolution
         ssdgs_light lit = step / 4 == 0 ? lamp(20, -20, 0, 400) : light;
         double off = 0;
         if (step / 4 == 2) {
-            lit.kind = SSDGS_LIGHT_DIRECTIONAL;
             lit.position[0] = (ssdgs_real)0.6, lit.position[1] = (ssdgs_real)-0.8, lit.position[2] = 0;
+            TEST_PARALLEL(lit);
         }
         put(model, 399, away[step % 4], 0, 2, step % 3 ? -3 : log(away[step % 4]) - 1, -20);
         show(model, &camera, &lit, 1, NULL, &a);

@@ -467,7 +467,7 @@ static void test_lights(void) {
     }
     light.kind = SSDGS_LIGHT_DIRECTIONAL;
     for (int c = 0; c < 3; c++) {
-        light.position[c] = c == 2;
+        light.direction[c] = (ssdgs_real) - (c == 2);
         light.intensity[c] = 1;
     }
     CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
@@ -935,10 +935,11 @@ static void test_refinement(void) {
         light->kind = SSDGS_LIGHT_DIRECTIONAL;
         for (int way = 0; way < 2; way++) { /* as it is, as it is told */
             double length = 0;
-            if (way) light->position[p % 3] += (ssdgs_real)(p & 1 ? 0.1 : -0.1);
-            for (int c = 0; c < 3; c++) length += (double)(light->position[c] * light->position[c]);
+            for (int c = 0; c < 3 && !way; c++) light->direction[c] = -light->position[c];
+            if (way) light->direction[p % 3] -= (ssdgs_real)(p & 1 ? 0.1 : -0.1);
+            for (int c = 0; c < 3; c++) length += (double)(light->direction[c] * light->direction[c]);
             for (int c = 0; c < 3; c++) {
-                light->position[c] /= (ssdgs_real)sqrt(length);
+                light->direction[c] /= (ssdgs_real)sqrt(length);
                 light->intensity[c] = 20;
             }
             if (way) continue;
@@ -966,9 +967,9 @@ static void test_refinement(void) {
         CHECK(!ssdgs_trainer_refined(trainer, p, &now.camera, &now.light));
         double length = 0;
         for (int c = 0; c < 3; c++) {
-            told += fabs((double)(disturbed[p].light.position[c] - suns[p].position[c]));
-            left += fabs((double)(now.light.position[c] - suns[p].position[c]));
-            length += (double)(now.light.position[c] * now.light.position[c]);
+            told += fabs((double)(disturbed[p].light.direction[c] - suns[p].direction[c]));
+            left += fabs((double)(now.light.direction[c] - suns[p].direction[c]));
+            length += (double)(now.light.direction[c] * now.light.direction[c]);
         }
         CHECK(fabs(length - 1) < 1e-5 && now.light.kind == SSDGS_LIGHT_DIRECTIONAL);
     }
@@ -978,8 +979,8 @@ static void test_refinement(void) {
     CHECK(!ssdgs_refine_photo(model, disturbed, background, 100));
     double was = 0, is = 0;
     for (int c = 0; c < 3; c++) {
-        was += fabs((double)(before.position[c] - suns[0].position[c]));
-        is += fabs((double)(disturbed[0].light.position[c] - suns[0].position[c]));
+        was += fabs((double)(before.direction[c] - suns[0].direction[c]));
+        is += fabs((double)(disturbed[0].light.direction[c] - suns[0].direction[c]));
     }
     if (!CHECK(is < 0.5 * was)) printf("    a direction off by %g of %g\n", is, was);
     ssdgs_model_destroy(model);
@@ -2265,6 +2266,7 @@ static void test_light_notes(void) {
                         to[c] +=
                             shots[k].camera.view[4 * c + l] * (p[l] - (strstr(name, "axes") ? 0 : eye[l]));
             }
+            if (cases[i].directional) TEST_PARALLEL(*light);
         }
         memset(heard, 0, sizeof heard);
         reading[0] = 0;

@@ -260,8 +260,8 @@ static void test_flux(void) {
         double sum = 0, expected = 4 * half * half;
         ssdgs_light light;
         memset(&light, 0, sizeof light);
-        light.kind = part == 2 ? SSDGS_LIGHT_DIRECTIONAL : SSDGS_LIGHT_POINT;
         light.position[2] = (ssdgs_real)(part == 2 ? 1 : height);
+        if (part == 2) TEST_PARALLEL(light);
         light.intensity[0] = 1;
         ssdgs_frame frame;
         begin(&frame, model, &light, 1);

@@ -106,6 +106,13 @@ static inline void test_row(int before, const char *rows, const char *name) {
         test_row(test_before, rows, name); \
     } while (0)
 
+/* Makes of a light whose position is the unit vector towards it a directional one. */
+#define TEST_PARALLEL(light) \
+    do { \
+        (light).kind = SSDGS_LIGHT_DIRECTIONAL; \
+        for (int axis_ = 0; axis_ < 3; axis_++) (light).direction[axis_] = -(light).position[axis_]; \
+    } while (0)
+
 #define TEST_END() \
     do { \
         printf("%d passed, %d failed\n", test_passed, test_failed); \

@@ -194,6 +194,7 @@ static ssdgs_light draw_light(input *in) {
         light.intensity[i] = draw_real(in, 9, 10);
     }
     if (kind == 1) make_unit(light.position);
+    for (int i = 0; i < 3 && (kind & 1); i++) light.direction[i] = -light.position[i];
     return light;
 }
 
