@@ -793,7 +793,7 @@ SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count);
 
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
-   and settings. */
+   and settings; else ERR_FORMAT names the first that differs. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 /* How far the run of a checkpoint had come. ERR_IO without a file, ERR_FORMAT where it is no checkpoint of
@@ -12449,7 +12449,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* Reads and writes it in native byte order; another version, precision or run is refused. */
 
-#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK5" /* the last letter changes with the layout */
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK6" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
 #define SSDGS__FOLD_START UINT64_C(0xCBF29CE484222325)
 
@@ -12459,15 +12459,75 @@ static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* F
     return hash;
 }
 
-typedef struct ssdgs__checkpoint_head {
+/* Of bytes by the gigabyte: words of 8 in four lanes, each step of which can be undone, so that no changed
+   word is lost; then the lanes and the rest. */
+static uint64_t ssdgs__fold_many(uint64_t hash, const void *data, size_t size) {
+    const unsigned char *bytes = (const unsigned char *)data;
+    uint64_t lane[4] = {1, 2, 3, 4};
+    for (; size >= sizeof lane; size -= sizeof lane, bytes += sizeof lane) {
+        uint64_t word[4];
+        memcpy(word, bytes, sizeof word);
+        for (int i = 0; i < 4; i++) {
+            const uint64_t mixed = lane[i] ^ word[i];
+            lane[i] = (mixed << 31 | mixed >> 33) * UINT64_C(0x9E3779B97F4A7C15);
+        }
+    }
+    return ssdgs__fold(ssdgs__fold(hash, lane, sizeof lane), bytes, size);
+}
+
+/* What must be the same where a run goes on: numbers of options and settings, by their names. Not what the
+   trainer makes of the photographs: centre, length_unit, light_scale. */
+typedef struct ssdgs__member {
+    const char *name;
+    int in_options, type; /* 'i' int, 'r' real, 'u' uint64_t */
+    size_t at;
+} ssdgs__member;
+
+#define SSDGS__O(type, name) \
+    { #name, 1, type, offsetof(ssdgs_train_options, name) }
+#define SSDGS__S(type, name) \
+    { #name, 0, type, offsetof(ssdgs_settings, name) }
+#define SSDGS__3(one, name) one('r', name[0]), one('r', name[1]), one('r', name[2])
+#define SSDGS__R(name) SSDGS__O('r', rates.name.start), SSDGS__O('r', rates.name.end)
+/* clang-format off */
+static const ssdgs__member ssdgs__members[] = {
+    SSDGS__O('i', iterations), SSDGS__O('u', seed), SSDGS__O('i', schedule), SSDGS__O('i', random_background),
+    SSDGS__O('i', initial_points), SSDGS__O('i', max_gaussians), SSDGS__O('i', densify_every),
+    SSDGS__O('i', densify_from), SSDGS__O('i', densify_until), SSDGS__O('i', opacity_reset_every),
+    SSDGS__O('i', batch), SSDGS__O('i', refine), SSDGS__3(SSDGS__O, background), SSDGS__O('r', dssim),
+    SSDGS__O('r', normal_weight), SSDGS__3(SSDGS__O, bounds_min), SSDGS__3(SSDGS__O, bounds_max),
+    SSDGS__O('r', densify_gradient), SSDGS__O('r', prune_outside), SSDGS__O('r', adam_epsilon),
+    SSDGS__O('r', finish), SSDGS__R(position), SSDGS__R(opacity), SSDGS__R(scale), SSDGS__R(rotation),
+    SSDGS__R(color), SSDGS__R(asg), SSDGS__R(frame), SSDGS__R(material), SSDGS__R(shadow),
+    SSDGS__R(scattering), SSDGS__R(camera), SSDGS__R(light),
+    SSDGS__S('i', terms), SSDGS__S('i', baked), SSDGS__S('i', transfer), SSDGS__S('i', dipole),
+    SSDGS__S('i', asg), SSDGS__S('i', per_channel_optics), SSDGS__S('i', depth_cue), SSDGS__S('i', transport),
+    SSDGS__S('i', residual_shadow), SSDGS__S('i', shadow_on_scattering), SSDGS__S('i', scattering.layers),
+    SSDGS__S('i', scattering.width), SSDGS__S('i', shadow.layers), SSDGS__S('i', shadow.width),
+    SSDGS__S('i', octaves.view), SSDGS__S('i', octaves.light), SSDGS__S('i', light_map.blur),
+    SSDGS__S('i', light_map.size), SSDGS__S('r', light_map.bias), SSDGS__S('r', pixel_variance),
+    SSDGS__S('r', eta), SSDGS__3(SSDGS__S, ambient), SSDGS__3(SSDGS__S, origin),
+    SSDGS__3(SSDGS__S, medium.scattering), SSDGS__3(SSDGS__S, medium.absorption)};
+/* clang-format on */
+#undef SSDGS__O
+#undef SSDGS__S
+#undef SSDGS__3
+#undef SSDGS__R
+
+/* And of each photograph, as hashes. */
+typedef struct ssdgs__checkpoint_photo {
+    uint64_t camera, lights, pixels;
+} ssdgs__checkpoint_photo;
+
+typedef struct ssdgs__checkpoint_head { /* then the photographs, the arrays and a hash of all before it */
     char magic[8];
     uint32_t byte_order, version, real_size, fused; /* products and sums rounded once: FMA */
-    uint64_t inputs; /* hash of options, photographs' cameras and lights: what must be the same */
     uint64_t global_count;
     int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
     double start_size, ambient[6];
     int32_t ambient_steps, exposed, outlines;
     ssdgs_settings settings;
+    ssdgs_train_options options; /* without sum */
 } ssdgs__checkpoint_head;
 
 /* Passes every array of the state to visit, in order; the first failure ends it. */
@@ -12493,44 +12553,13 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
     return result;
 }
 
-/* Whether two differ in nothing but centre, length_unit, light_scale, ambient and origin. Compares pieces,
-   without the padding between them. */
-static int ssdgs__settings_alike(const ssdgs_settings *a, const ssdgs_settings *b) {
-    const size_t first =
-                     offsetof(ssdgs_settings, octaves) + sizeof a->octaves - offsetof(ssdgs_settings, terms),
-                 second = offsetof(ssdgs_settings, eta) + sizeof a->eta - offsetof(ssdgs_settings, light_map);
-    return !memcmp(&a->terms, &b->terms, first) && !memcmp(&a->light_map, &b->light_map, second) &&
-           !memcmp(&a->medium, &b->medium, sizeof a->medium);
-}
-
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
-    const ssdgs_train_options *o = &trainer->options;
     memset(head, 0, sizeof *head);
     memcpy(head->magic, SSDGS__CHECKPOINT_MAGIC, 8);
     head->byte_order = SSDGS__BYTE_ORDER;
     head->version = SSDGS_VERSION;
     head->real_size = (uint32_t)sizeof(ssdgs_real);
     head->fused = trainer->context->isa >= SSDGS_ISA_AVX2; /* from there on all have FMA */
-    /* ints, then reals, without the padding between them */
-    head->inputs = ssdgs__fold(SSDGS__FOLD_START, o, offsetof(ssdgs_train_options, refine) + sizeof(int));
-    head->inputs = ssdgs__fold(head->inputs, o->background,
-                               offsetof(ssdgs_train_options, rates) + sizeof o->rates -
-                                   offsetof(ssdgs_train_options, background));
-    for (int i = 0; i < trainer->photo_count; i++) {
-        const ssdgs_photo *photo = trainer->photos + i;
-        const ssdgs_camera *camera = &photo->camera;
-        const ssdgs_real optics[5] = {camera->fx, camera->fy, camera->cx, camera->cy, camera->near_plane};
-        const int kind[3] = {camera->width, camera->height, (int)photo->format};
-        head->inputs = ssdgs__fold(head->inputs, camera->view, sizeof camera->view);
-        head->inputs = ssdgs__fold(head->inputs, optics, sizeof optics);
-        head->inputs = ssdgs__fold(head->inputs, kind, sizeof kind);
-        for (int l = 0; l <= photo->more_count; l++) {
-            const ssdgs_light *light = ssdgs__photo_light(photo, l);
-            head->inputs = ssdgs__fold(head->inputs, &light->kind, sizeof light->kind);
-            head->inputs = ssdgs__fold(head->inputs, light->position,
-                                       offsetof(ssdgs_light, unshadowed) - offsetof(ssdgs_light, position));
-        }
-    }
     head->global_count = trainer->model->global_count;
     head->photo_count = trainer->photo_count;
     head->count = trainer->model->count;
@@ -12543,6 +12572,44 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->exposed = trainer->exposed;
     head->outlines = trainer->outlines;
     head->settings = trainer->model->settings;
+    head->options = trainer->options;
+    memset(&head->options.sum, 0, sizeof head->options.sum);
+}
+
+typedef struct ssdgs__checkpoint_job {
+    const ssdgs_photo *photos;
+    ssdgs__checkpoint_photo *hashes;
+} ssdgs__checkpoint_job;
+
+static void ssdgs__checkpoint_photo_task(void *data, int index) {
+    const ssdgs__checkpoint_job *job = (const ssdgs__checkpoint_job *)data;
+    const ssdgs_photo *photo = job->photos + index;
+    const ssdgs_camera *camera = &photo->camera;
+    const size_t number = photo->format == SSDGS_PIXELS_RGBA8     ? 1
+                          : photo->format == SSDGS_PIXELS_RGBA32F ? 4
+                                                                  : 2;
+    ssdgs__checkpoint_photo hash = {ssdgs__fold(SSDGS__FOLD_START, camera, sizeof *camera), SSDGS__FOLD_START,
+                                    ssdgs__fold(SSDGS__FOLD_START, &photo->format, sizeof photo->format)};
+    for (int i = 0; i <= photo->more_count; i++) {
+        const ssdgs_light *light = ssdgs__photo_light(photo, i);
+        hash.lights = ssdgs__fold(hash.lights, &light->kind, sizeof light->kind);
+        hash.lights = ssdgs__fold(hash.lights, light->position,
+                                  offsetof(ssdgs_light, unshadowed) - offsetof(ssdgs_light, position));
+    }
+    hash.pixels = ssdgs__fold_many(hash.pixels, photo->pixels,
+                                   4 * number * (size_t)camera->width * (size_t)camera->height);
+    job->hashes[index] = hash;
+}
+
+/* Of all photographs, to be released; NULL: out of memory. */
+static ssdgs__checkpoint_photo *ssdgs__checkpoint_photos(const ssdgs_trainer *trainer) {
+    ssdgs__checkpoint_job job;
+    job.photos = trainer->photos;
+    job.hashes = (ssdgs__checkpoint_photo *)ssdgs__allocate(trainer->context, (size_t)trainer->photo_count *
+                                                                                  sizeof *job.hashes);
+    if (job.hashes)
+        ssdgs__parallel(trainer->context, trainer->photo_count, ssdgs__checkpoint_photo_task, &job);
+    return job.hashes;
 }
 
 /* Copies what a checkpoint begins with; what is wrong, or NULL. */
@@ -12591,6 +12658,8 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
     ssdgs_result result = ssdgs__trainer_check(trainer);
     if (!result) result = ssdgs__savable(trainer->model, path);
     if (result) return result;
+    ssdgs__checkpoint_photo *const photos = ssdgs__checkpoint_photos(trainer);
+    if (!photos) return SSDGS_ERR_MEMORY;
     ssdgs__writer writer;
     ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_head head;
@@ -12599,8 +12668,10 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
     io.writer = &writer;
     io.hash = SSDGS__FOLD_START;
     ssdgs__checkpoint_write(&io, &head, sizeof head);
+    ssdgs__checkpoint_write(&io, photos, (size_t)trainer->photo_count * sizeof *photos);
     ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
     ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
+    ssdgs__release(trainer->context, photos);
     return ssdgs__writer_close(&writer);
 }
 
@@ -12635,6 +12706,59 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
     return 1;
 }
 
+static double ssdgs__member_value(int type, const unsigned char *at) {
+    int whole;
+    ssdgs_real real;
+    uint64_t wide;
+    if (type == 'i') return memcpy(&whole, at, sizeof whole), (double)whole;
+    if (type == 'r') return memcpy(&real, at, sizeof real), (double)real;
+    return memcpy(&wide, at, sizeof wide), (double)wide;
+}
+
+/* Whether a checkpoint is of the trainer's run; the message names the first thing that differs. */
+static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const char *path,
+                                           const ssdgs__checkpoint_head *own,
+                                           const ssdgs__checkpoint_head *head, const unsigned char *hashes) {
+#define SSDGS__ANOTHER ": a run goes on with the same options, settings and photographs"
+    ssdgs_context *context = trainer->context;
+    for (size_t i = 0; i < sizeof ssdgs__members / sizeof *ssdgs__members; i++) {
+        const ssdgs__member *m = ssdgs__members + i;
+        const size_t at = m->at + (m->in_options ? offsetof(ssdgs__checkpoint_head, options)
+                                                 : offsetof(ssdgs__checkpoint_head, settings)),
+                     size = m->type == 'i'   ? sizeof(int)
+                            : m->type == 'r' ? sizeof(ssdgs_real)
+                                             : sizeof(uint64_t);
+        const unsigned char *there = (const unsigned char *)head + at,
+                            *here = (const unsigned char *)own + at;
+        if (memcmp(there, here, size))
+            return ssdgs__fail(context, SSDGS_ERR_FORMAT,
+                               "%s: %s was %g in its run and is %g now" SSDGS__ANOTHER, path, m->name,
+                               ssdgs__member_value(m->type, there), ssdgs__member_value(m->type, here));
+    }
+    if (head->photo_count != own->photo_count)
+        return ssdgs__fail(context, SSDGS_ERR_FORMAT,
+                           "%s: its run had %d photographs, this one has %d" SSDGS__ANOTHER, path,
+                           head->photo_count, own->photo_count);
+    if (head->global_count != own->global_count) /* from here on the file is as long as this run's */
+        return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: its counts are out of range", path);
+    ssdgs__checkpoint_photo *const photos = ssdgs__checkpoint_photos(trainer);
+    ssdgs_result result = photos ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    for (int i = 0; i < own->photo_count && !result; i++, hashes += sizeof *photos) {
+        ssdgs__checkpoint_photo there;
+        memcpy(&there, hashes, sizeof there);
+        const char *what = there.camera != photos[i].camera   ? "another camera"
+                           : there.lights != photos[i].lights ? "other lights"
+                           : there.pixels != photos[i].pixels ? "other pixels"
+                                                              : NULL;
+        if (what)
+            result = ssdgs__fail(context, SSDGS_ERR_FORMAT,
+                                 "%s: photograph %d has %s than in its run" SSDGS__ANOTHER, path, i, what);
+    }
+    ssdgs__release(context, photos);
+    return result;
+#undef SSDGS__ANOTHER
+}
+
 static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path) {
     ssdgs_context *context = trainer->context;
     unsigned char *bytes = NULL;
@@ -12647,19 +12771,22 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     ssdgs__checkpoint_describe(trainer, &own);
     ssdgs__checkpoint_head head;
     const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);
-    if (!reason && (head.global_count != own.global_count || head.photo_count != own.photo_count ||
-                    head.inputs != own.inputs || !ssdgs__settings_alike(&head.settings, &own.settings)))
-        reason = "it belongs to other options, settings or photographs";
+    const size_t photos = (size_t)own.photo_count * sizeof(ssdgs__checkpoint_photo);
     if (!reason) {
         const uint64_t expected =
-            sizeof head + 8 + (uint64_t)head.photo_count * sizeof(ssdgs__correction) +
+            sizeof head + 8 +
+            (uint64_t)head.photo_count * (sizeof(ssdgs__checkpoint_photo) + sizeof(ssdgs__correction)) +
             sizeof(ssdgs_real) *
                 ((uint64_t)head.count * (3 * SSDGS_CHANNELS + SSDGS__STATISTICS + 1) + 3 * head.global_count);
         uint64_t hash;
         memcpy(&hash, bytes + size - 8, 8);
         if (size != expected) reason = "it is cut short or too long";
         else if (hash != ssdgs__fold(SSDGS__FOLD_START, bytes, size - 8)) reason = "its checksum is wrong";
-        else if (!ssdgs__checkpoint_sound(&head, bytes + sizeof head)) reason = "its values are out of range";
+        if (own.options.refine & SSDGS_REFINE_AMBIENT) /* learned */
+            memcpy(own.settings.ambient, head.settings.ambient, sizeof own.settings.ambient);
+        if (!reason) result = ssdgs__checkpoint_same(trainer, path, &own, &head, bytes + sizeof head);
+        if (!reason && !result && !ssdgs__checkpoint_sound(&head, bytes + sizeof head + photos))
+            reason = "its values are out of range";
     }
     if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
     if (!result) result = ssdgs__settings_of_file(context, path, &head.settings);
@@ -12678,7 +12805,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
         trainer->ambient_steps = head.ambient_steps;
         for (int i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         ssdgs__checkpoint_io io;
-        io.bytes = bytes + sizeof head;
+        io.bytes = bytes + sizeof head + photos;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
         ssdgs__model_changed(trainer->model);
         ssdgs__rearranged(trainer);

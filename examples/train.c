@@ -439,6 +439,16 @@ static int fail(const char *message) {
     return 1;
 }
 
+/* Says what the library's last failure was, and the file of a training photograph that it names by number. */
+static int fail_of(const job *j) {
+    const char *message = ssdgs_error_message(j->context), *number = strstr(message, "photograph ");
+    char *end = NULL;
+    const long index = number ? strtol(number + 11, &end, 10) : -1;
+    if (!number || end == number + 11 || index < 0 || index >= j->train_set.count) return fail(message);
+    fprintf(stderr, "train: %s (photograph %ld is %s)\n", message, index, j->train_set.frames[index].file);
+    return 1;
+}
+
 /* Prints the means over every step-th of the photographs, each one's pose and light first fitted by so many
    steps. */
 static ssdgs_result evaluate(job *j, const ssdgs_photo *photos, int all, int step, int fit_steps,
@@ -629,11 +639,10 @@ static int train(job *j) {
     if (!j->given[RESUME] && check_checkpoint(j, error)) return fail(error);
     if ((!j->model && ssdgs_model_create(j->context, &j->settings, 0, &j->model)) ||
         ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
-        return fail(ssdgs_error_message(j->context));
+        return fail_of(j);
     fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s\n", j->dataset, j->train_set.count, width,
             height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)));
-    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint))
-        return fail(ssdgs_error_message(j->context));
+    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)) return fail_of(j);
 
     if (j->given[VIEW] && watch(j, error)) return fail(error);
     j->progress.iterations = j->options.iterations;
@@ -658,7 +667,7 @@ static int train(job *j) {
     }
     signal(SIGINT, SIG_DFL);
     view_close(&j->view);
-    if (result) return fail(ssdgs_error_message(j->context));
+    if (result) return fail_of(j);
     if (ssdgs_model_save(j->model, output)) {
         fail(ssdgs_error_message(j->context));
         if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));

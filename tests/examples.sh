@@ -145,7 +145,13 @@ check "as long a run" says 0 "^test: PSNR" train --iterations 30
 ln -s "$out/target.ply" "$out/dangling.ply"
 check "a link to nothing" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/dangling.ply" --iterations 1 --points 100
 check "its target is not made" test ! -e "$out/target.ply"
-check "--resume with another seed" says 1 "it belongs to other options" train --checkpoint-every 30 --seed 2 --resume
+check "--resume with another seed" says 1 "model.ply.ckpt: seed was 1 in its run and is 2 now: " train --checkpoint-every 30 --seed 2 --resume
+check "with a setting changed" says 1 "light_map.bias was 0.06 in its run and is 0.05 now: " train --checkpoint-every 30 --set light_bias=0.05 --resume
+file=$(sed -n 's|.*"file_path": "\./\(.*\)",|\1.png|p' "$set/transforms_train.json" | sed -n 3p)
+cp "$set/$file" "$out/kept.png"
+cp "$set/$(sed -n 's|.*"file_path": "\./\(.*\)",|\1.png|p' "$set/transforms_train.json" | sed -n 4p)" "$set/$file"
+check "with a photograph changed" says 1 "photograph 2 has other pixels than in its run: .*(photograph 2 is $set/\(\./\)\?$file)" train --checkpoint-every 30 --resume
+cp "$out/kept.png" "$set/$file"
 check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
 echo "somebody's notes" >"$out/notes.ply.ckpt"
 check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1

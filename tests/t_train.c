@@ -177,6 +177,66 @@ static void test_same_bits(void) {
     }
 }
 
+/* A checkpoint is refused where any bit of the options or settings is another, and the message names it; but
+   for what the trainer makes of the photographs. */
+static void test_members(ssdgs_trainer *trainer, const char *path) {
+    ssdgs_train_options *const options = &trainer->options;
+    ssdgs_settings *const settings = &trainer->model->settings;
+    const struct {
+        unsigned char *at;
+        size_t begin, end;
+    } parts[2] = {{(unsigned char *)options, offsetof(ssdgs_train_options, iterations),
+                   offsetof(ssdgs_train_options, rates) + sizeof(ssdgs_rates)},
+                  {(unsigned char *)settings, offsetof(ssdgs_settings, terms), sizeof *settings}};
+    const char *const message = ssdgs_error_message(trainer->context);
+    char names[4096] = " ";
+    int made = 0, different = 0;
+    for (int part = 0; part < 2; part++)
+        for (size_t k = parts[part].begin; k < parts[part].end; k++) {
+            unsigned char *const byte = parts[part].at + k;
+            const int free_to =
+                part && k >= offsetof(ssdgs_settings, centre) && k < offsetof(ssdgs_settings, ambient);
+            const char *name, *end;
+            char wanted[64];
+            *byte ^= 1;
+            const ssdgs_result result = ssdgs_trainer_load(trainer, path);
+            if (free_to || (part && k >= offsetof(ssdgs_settings, ambient) &&
+                            k < offsetof(ssdgs_settings, origin) && options->refine & SSDGS_REFINE_AMBIENT)) {
+                CHECK(!result); /* it is the checkpoint's again */
+                made++;
+                continue;
+            }
+            *byte ^= 1;
+            if (!CHECK(result == SSDGS_ERR_FORMAT && strstr(message, " was ") &&
+                       strstr(message, " in its run and is ")))
+                printf("    part %d, byte %d: %s\n", part, (int)k, message);
+            name = strstr(message, ": ") + 2;
+            end = strchr(name, ' ');
+            snprintf(wanted, sizeof wanted, " %.*s ", (int)(end - name), name);
+            if (strstr(names, wanted)) continue;
+            CHECK(strlen(names) + strlen(wanted) < sizeof names);
+            strcat(names, wanted + 1);
+            different++;
+        }
+    CHECK(made == (int)sizeof(ssdgs_real) * 8 && different == 81);
+    if (!CHECK(strstr(names, " seed schedule ") &&
+               strstr(names, " bounds_min[0] bounds_min[1] bounds_min[2] bounds_max[0] ") &&
+               strstr(names, " rates.camera.end rates.light.start rates.light.end terms ") &&
+               strstr(names, " scattering.layers scattering.width shadow.layers ") &&
+               strstr(names, " origin[2] medium.")))
+        printf("    %s\n", names);
+    /* both values, and a seed of more bits than a double has */
+    options->seed += (uint64_t)1 << 60;
+    options->finish = (ssdgs_real)0.25;
+    CHECK(ssdgs_trainer_load(trainer, path) == SSDGS_ERR_FORMAT &&
+          strstr(message, ": seed was 1 in its run"));
+    options->seed -= (uint64_t)1 << 60;
+    CHECK(ssdgs_trainer_load(trainer, path) == SSDGS_ERR_FORMAT &&
+          strstr(message, ": finish was 0.3 in its run and is 0.25 now: "));
+    options->finish = (ssdgs_real)0.3;
+    CHECK(!ssdgs_trainer_load(trainer, path));
+}
+
 /* Interrupted after k steps, saved, loaded into a new trainer: the same bits as without. */
 static void test_resume(void) {
     const ssdgs_train_options options = short_run(60);
@@ -273,6 +333,21 @@ static void test_resume(void) {
             ssdgs_photo shots[PHOTOS];
             static unsigned char wide[SIDE * SIDE * 8];
             memcpy(shots, photos, sizeof shots);
+            if (i <
+                4) { /* one bit of the pixels of one photograph: first, last, a whole word in two places */
+                static unsigned char retouched[sizeof pixels[0]];
+                char name[64];
+                memcpy(retouched, pixels[i], sizeof retouched);
+                if (i < 2) retouched[i ? sizeof retouched - 1 : 0] ^= 128;
+                else retouched[103] ^= 128, retouched[i == 2 ? 135 : sizeof retouched - 25] ^= 128;
+                shots[i].pixels = retouched;
+                CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer));
+                CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
+                snprintf(name, sizeof name, "build/t_train.ckpt: photograph %d has other pixels", i);
+                CHECK(strstr(ssdgs_error_message(context), name) != NULL);
+                ssdgs_trainer_destroy(trainer);
+                shots[i].pixels = pixels[i];
+            }
             if (i == 0) changed.light_map.bias = (ssdgs_real)0.05;
             if (i == 1) changed.pixel_variance = (ssdgs_real)0.2;
             if (i == 2) changed.eta = (ssdgs_real)1.4;
@@ -293,7 +368,10 @@ static void test_resume(void) {
         other.seed = 2;
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &other, &trainer));
         CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT);
-        CHECK(strstr(ssdgs_error_message(context), "options") != NULL);
+        CHECK(strstr(ssdgs_error_message(context), "seed was 1 in its run and is 2 now") != NULL);
+        ssdgs_trainer_destroy(trainer);
+        CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer));
+        test_members(trainer, "build/t_train.ckpt");
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
         ssdgs__release(context, bytes);
