@@ -86,7 +86,7 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(OBJECTS)
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
+$(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.html in headless Chromium, and make web's page where emscripten is; needs node and chromium

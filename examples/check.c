@@ -19,7 +19,7 @@ typedef struct facts {
 } facts;
 
 typedef struct check {
-    const char *dataset, *out;
+    const char *dataset, *train_json, *out;
     ssdgs_context *context;
     olat_dataset sets[2]; /* train, test */
     facts *found[2];
@@ -274,6 +274,7 @@ static void report_places(check *k) {
     const int count = k->sets[0].count;
     const double cameras = coverage(f, count, offsetof(facts, camera)),
                  lights = coverage(f, count, offsetof(facts, light));
+    char note[512];
     printf("Places\n");
     say(k, cameras < 0.3, "cameras see it from %.0f %% of all directions (within 30 degrees)%s",
         100 * cameras, cameras < 0.3 ? ": other views will be guesses" : "");
@@ -284,6 +285,9 @@ static void report_places(check *k) {
             "test photographs: %.0f degrees from the nearest camera in training, %.0f from the nearest light "
             "(medians)",
             nearest(k, offsetof(facts, camera)), nearest(k, offsetof(facts, light)));
+    if (olat_other_unit(k->sets, "the box that holds the object", k->options.bounds_min,
+                        k->options.bounds_max, note))
+        say(k, 1, "%s", note);
 }
 
 /* Keeps what the trainer notes. */
@@ -425,15 +429,16 @@ static int draw_places(const check *k, const char *path) {
 
 static int usage(void) {
     fprintf(stderr,
-            "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z]\n"
+            "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z] [--train-json FILE]\n"
             "Says what is right and wrong with a capture; lines with an arrow ask for something.\n"
             "  --out DIR     draws into a folder: photographs.png (clipped: red, black: blue), places.svg\n"
-            "  --bounds ...  corners of the box that holds the object; -0.5,-0.5,-0.5,0.5,0.5,0.5\n");
+            "  --bounds ...  corners of the box that holds the object; -0.5,-0.5,-0.5,0.5,0.5,0.5\n"
+            "  --train-json FILE  another list of frames in DATASET; transforms_train.json\n");
     return 2;
 }
 
 static int run(check *k) {
-    static const char *const lists[2] = {"transforms_train.json", "transforms_test.json"};
+    const char *const lists[2] = {k->train_json, "transforms_test.json"};
     static const char *const names[2] = {"photographs.png", "places.svg"};
     char error[512] = "", paths[2][OLAT__MAX_PATH], test[OLAT__MAX_PATH];
     ssdgs_context_desc desc;
@@ -447,7 +452,7 @@ static int run(check *k) {
     FILE *file = failed ? NULL : fopen(test, "rb");
     if (file) fclose(file);
     if (!failed && k->out &&
-        (olat_guard_folder(&guard, k->dataset, lists[0], error) ||
+        (olat_make_folder(k->out, error) || olat_guard_folder(&guard, k->dataset, lists[0], error) ||
          (file && olat_guard_folder(&guard, k->dataset, lists[1], error))))
         failed = fail(error);
     for (int i = 0; i < 2 && k->out && !failed; i++) {
@@ -492,8 +497,10 @@ int main(int argc, char **argv) {
     double box[6];
     memset(&k, 0, sizeof k);
     k.options = ssdgs_train_options_default();
+    k.train_json = "transforms_train.json";
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--out") && i + 1 < argc) k.out = argv[++i];
+        else if (!strcmp(argv[i], "--train-json") && i + 1 < argc) k.train_json = argv[++i];
         else if (!strcmp(argv[i], "--bounds") && i + 1 < argc) {
             const char *at = argv[++i];
             for (int c = 0; c < 6; c++) {

@@ -48,6 +48,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #ifdef _WIN32
+#include <direct.h>
 #ifndef WIN32_LEAN_AND_MEAN
 #define WIN32_LEAN_AND_MEAN
 #endif
@@ -60,12 +61,14 @@
 #define OLAT__SEPARATORS "/\\"
 #define OLAT__READ_FLAGS (O_RDONLY | O_BINARY)
 #define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
+#define OLAT__MAKE_FOLDER(path) _mkdir(path)
 #else
 #include <sys/time.h>
 #include <unistd.h>
 #define OLAT__SEPARATORS "/"
 #define OLAT__READ_FLAGS (O_RDONLY | O_NONBLOCK) /* opening a FIFO must not wait for its writer */
 #define OLAT__WRITE_FLAGS (O_WRONLY | O_CREAT | O_EXCL)
+#define OLAT__MAKE_FOLDER(path) mkdir(path, 0777)
 #endif
 
 #if defined(__GNUC__) && !defined(__TINYC__)
@@ -2240,6 +2243,8 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
         olat__note(out, "coordinates are taken relative to %.9g, %.9g, %.9g", out->origin[0], out->origin[1],
                    out->origin[2]);
     }
+    if (olat__find(j, root, "ply_file_path"))
+        olat__note(out, "ply_file_path is not used: training starts from random points");
     const olat__node *node;
     int i;
     for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed;
@@ -2415,6 +2420,22 @@ OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags
 OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out,
                         char error[512]) {
     return olat_load_at(folder, split_json, flags, NULL, NULL, out, error);
+}
+
+/* Makes a folder, and those above it, where they are not there. */
+OLAT__API int olat_make_folder(const char *path, char error[512]) {
+    const size_t length = strlen(path);
+    char *part = (char *)malloc(length + 1);
+    if (!part) return olat__fail(error, "out of memory");
+    int why = 0;
+    for (size_t i = 1; i <= length; i++) {
+        if (path[i] && !strchr(OLAT__SEPARATORS, path[i])) continue;
+        memcpy(part, path, i);
+        part[i] = 0;
+        why = !OLAT__MAKE_FOLDER(part) || errno == EEXIST ? 0 : errno;
+    }
+    free(part);
+    return why ? olat__fail(error, "%s: the folder cannot be made: %s", olat__tail(path), strerror(why)) : 0;
 }
 
 /* ==== guarding files: by what they are, whatever they are called ==== */
@@ -2959,6 +2980,39 @@ OLAT__API void olat_eye(const ssdgs_camera *camera, ssdgs_real eye[3]) {
     int k;
     for (int i = 0; i < 3; i++)
         for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
+}
+
+/* Whether the list is in another unit than the box that holds the object, as where one has millimetres and
+   the other metres: it fills less than a fiftieth of every picture, or all cameras stand in its midst. The
+   note says so; 0: neither. */
+OLAT__API int olat_other_unit(const olat_dataset *set, const char *box, const ssdgs_real low[3],
+                              const ssdgs_real high[3], char note[512]) {
+    double size = 0, nearest = HUGE_VAL, farthest = 0;
+    int small = 0, inside = 0;
+    for (int c = 0; c < 3; c++) size = fmax(size, (double)(high[c] - low[c]));
+    for (int i = 0; i < set->count; i++) {
+        const ssdgs_camera *camera = &set->frames[i].camera;
+        ssdgs_real eye[3];
+        double away[3];
+        olat_eye(camera, eye);
+        for (int c = 0; c < 3; c++) away[c] = (double)eye[c] - ((double)low[c] + (double)high[c]) / 2;
+        const double distance = sqrt(olat__dot(away, away));
+        nearest = fmin(nearest, distance), farthest = fmax(farthest, distance);
+        small += size * (double)camera->fx < 0.02 * distance * camera->width;
+        inside += distance < 0.05 * size;
+    }
+    if (!(size > 0) || (small < set->count && inside < set->count)) return 0;
+    if (inside == set->count)
+        snprintf(note, 512,
+                 "%s is %.3g wide, and all cameras stand within %.3g of its middle: does the list have "
+                 "metres where it has millimetres, or another unit else?",
+                 box, size, farthest);
+    else
+        snprintf(note, 512,
+                 "%s is %.3g wide, and the nearest camera stands %.3g away: does the list have millimetres "
+                 "where it has metres, or another unit else?",
+                 box, size, nearest);
+    return 1;
 }
 
 #endif /* OLAT_H */

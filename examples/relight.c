@@ -4,14 +4,6 @@
 #include "../ssdgs.h"
 #include "olat.h"
 #include <ctype.h>
-#include <errno.h>
-#include <sys/stat.h>
-#ifdef _WIN32
-#include <direct.h>
-#define make_directory(path) _mkdir(path)
-#else
-#define make_directory(path) mkdir(path, 0777)
-#endif
 
 #define PI 3.14159265358979323846
 static char program[] = "relight";
@@ -164,21 +156,6 @@ static int parse(job *j, int argc, char **argv) {
 }
 
 /* ---- files ---- */
-
-/* Makes the folder and those above it; what goes wrong shows when files are written. */
-static void make_folders(const char *path) {
-    char *part = (char *)malloc(strlen(path) + 1);
-    for (size_t i = 0; part; i++) {
-        if (i > 0 && (path[i] == '/' || path[i] == '\\' || !path[i])) {
-            memcpy(part, path, i);
-            part[i] = 0;
-            if (make_directory(part) && errno != EEXIST && !path[i])
-                fprintf(stderr, "relight: cannot make %s\n", part);
-        }
-        if (!path[i]) break;
-    }
-    free(part);
-}
 
 /* A frame's file name without its folder. */
 static const char *base_name(const olat_frame *frame) {
@@ -596,6 +573,7 @@ static int name_frames(olat_dataset *data) {
 static int load_frames(job *j) {
     const ssdgs_real *from = ssdgs_model_settings(j->model)->origin;
     const double origin[3] = {(double)from[0], (double)from[1], (double)from[2]};
+    ssdgs_real low[3], high[3];
     char error[512] = "", *path = (char *)malloc(strlen(j->dataset) + 64);
     const char *split = j->given[SPLIT];
     int valid = !strcmp(split, "valid"), path_wanted = j->given[TRAJECTORY] != NULL;
@@ -614,6 +592,9 @@ static int load_frames(job *j) {
                      error))
         return !fail(error);
     olat_print_notes(&j->data, "relight");
+    if (ssdgs_model_bounds(j->model, low, high)) return !fail(ssdgs_error_message(j->context));
+    if (olat_other_unit(&j->data, "the model", low, high, error))
+        fprintf(stderr, "relight: note: %s\n", error);
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
 }
 
@@ -636,7 +617,8 @@ static int relight(job *j) {
         fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", j->given[NETWORKS]);
     }
     if (!load_frames(j)) return 1;
-    make_folders(j->out); /* so that paths can be told apart by what they are */
+    if (olat_make_folder(j->out, error))
+        return fail(error); /* so that paths can be told apart by what they are */
     if (!check_outputs(j) || !make_planes(j)) return 1;
     if (j->reduce) {
         char *path = output_path(j, NULL, "reduced.ply");

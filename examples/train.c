@@ -334,7 +334,7 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
 
 /* Everything the program holds; main releases it. */
 typedef struct job {
-    const char *given[OPTION_COUNT], *dataset;
+    const char *program, *given[OPTION_COUNT], *dataset;
     ssdgs_settings settings;
     ssdgs_train_options options;
     corners bounds;
@@ -557,7 +557,7 @@ static int save_refined(job *j, char error[512]) {
 
 /* Opens the page that shows the model as it trains. */
 static int watch(job *j, char error[512]) {
-    char page[512];
+    char page[OLAT__MAX_PATH];
     view_show *show = &j->view.show;
     show->context = j->context;
     show->models[0] = j->model;
@@ -571,8 +571,8 @@ static int watch(job *j, char error[512]) {
         show->middle[c] = (j->options.bounds_min[c] + j->options.bounds_max[c]) / 2;
         show->radius = fmaxf(show->radius, (j->options.bounds_max[c] - j->options.bounds_min[c]) / 2);
     }
-    view_page(__FILE__, page, sizeof page);
-    if (view_open(&j->view, page, error)) return 1;
+    if (view_page(__FILE__, j->program, page, sizeof page, error) || view_open(&j->view, page, error))
+        return 1;
     fprintf(stderr, "to watch: http://127.0.0.1:%d\n", j->view.port);
     j->progress.view = &j->view;
     return 0;
@@ -630,6 +630,9 @@ static int train(job *j) {
         j->options.bounds_min[i] = (ssdgs_real)(j->bounds.bounds_min[i] - j->train_set.origin[i]);
         j->options.bounds_max[i] = (ssdgs_real)(j->bounds.bounds_max[i] - j->train_set.origin[i]);
     }
+    if (olat_other_unit(&j->train_set, "bounds_min .. bounds_max", j->options.bounds_min,
+                        j->options.bounds_max, error))
+        fprintf(stderr, "train: note: %s\n", error);
     j->photos = olat_photos(&j->train_set);
     if (!j->photos) return fail("out of memory");
     for (int i = 0; i < j->train_set.count; i++) {
@@ -705,6 +708,7 @@ int main(int argc, char **argv) {
     memset(&j, 0, sizeof j);
     for (int i = 1; i < argc; i++)
         if (!strcmp(argv[i], "--help")) return print_help(), 0;
+    j.program = argv[0];
     int status = parse(&j, argc, argv);
     if (!status) status = train(&j);
     view_close(&j.view);

@@ -27,7 +27,6 @@ int main(int argc, char **argv) {
     static view_server s;
     char error[512] = "", page[OLAT__MAX_PATH] = "";
     int failed = 0, wants_gpu = 0;
-    view_page(__FILE__, page, sizeof page);
     for (int i = 1; i < argc; i++) {
         char *rest = NULL;
         if (!strcmp(argv[i], "--port") && i + 1 < argc) {
@@ -56,7 +55,8 @@ int main(int argc, char **argv) {
     for (int i = 0; i < s.show.count && !result; i++)
         result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, NULL);
     if (!result) result = view_arrange(&s.show);
-    if (!result) failed = view_open(&s, page, error);
+    if (!result && !*page && view_page(__FILE__, argv[0], page, sizeof page, error)) failed = 1;
+    if (!result && !failed) failed = view_open(&s, page, error);
     if (!result && !failed) {
         signal(SIGINT, end);
         signal(SIGTERM, end);

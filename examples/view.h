@@ -20,6 +20,9 @@
 #include <netinet/tcp.h>
 #include <sys/select.h>
 #include <sys/socket.h>
+#if defined(__STRICT_ANSI__) && !defined(__cplusplus)
+ssize_t readlink(const char *path, char *text, size_t room); /* hidden by -std=c99 */
+#endif
 typedef int view__socket;
 #define view__close_socket close
 #define VIEW__NO_SOCKET (-1)
@@ -374,11 +377,30 @@ static void view_close(view_server *s) {
     view__forget(&s->show);
 }
 
-/* view.html beside the source file that says __FILE__. */
-OLAT__API void view_page(const char *source, char *path, size_t room) {
-    size_t folder = strlen(source);
-    while (folder && source[folder - 1] != '/' && source[folder - 1] != '\\') folder--;
-    snprintf(path, room, "%.*sview.html", (int)folder, source);
+/* Finds view.html: beside the source file that says __FILE__, beside the program, or in ../examples from
+   there; 0, or 1 and a message. called: the program's name, as argv[0] has it. */
+OLAT__API int view_page(const char *source, const char *called, char *path, size_t room, char *error) {
+    char program[OLAT__MAX_PATH];
+    size_t at[2];
+    snprintf(program, sizeof program, "%s", called ? called : "");
+#ifdef _WIN32
+    GetModuleFileNameA(NULL, program, sizeof program);
+#else
+    const long length = (long)readlink("/proc/self/exe", program, sizeof program - 1);
+    if (length > 0) program[length] = 0; /* else there is no /proc */
+#endif
+    const char *const files[2] = {source, program};
+    for (int i = 0; i < 2; i++)
+        for (at[i] = strlen(files[i]); at[i] && files[i][at[i] - 1] != '/' && files[i][at[i] - 1] != '\\';)
+            at[i]--;
+    for (int i = 0; i < 3; i++) {
+        snprintf(path, room, "%.*s%sview.html", (int)at[i > 0], files[i > 0], i < 2 ? "" : "../examples/");
+        FILE *file = fopen(path, "rb");
+        if (file) return fclose(file), 0;
+    }
+    return olat__fail(error,
+                      "no view.html in \"%.*s\", \"%.*s\" or \"%.*s../examples/\"; view has --page FILE",
+                      (int)at[0], source, (int)at[1], program, (int)at[1], program);
 }
 
 #endif

@@ -269,9 +269,45 @@ check "its pictures" test -s "$out/checked/photographs.png" -a -s "$out/checked/
 check "a place for each camera" test "$(grep -c '<circle' "$out/checked/places.svg")" -gt 20
 check "a box beside it" says 0 "lie outside of bounds_min" "$build/check" "$set" --bounds 3,3,3,4,4,4
 check "a set that is not there" says 1 "nothing" "$build/check" "$out/nothing"
-check "a folder that is not there" says 1 "never" "$build/check" "$set" --out "$out/never"
+check "into a folder that is not there" says 0 "to look at$" "$build/check" "$set" --out "$out/new/checked/"
+check "which is made" test -s "$out/new/checked/photographs.png" -a -s "$out/new/checked/places.svg"
+check "into what is no folder" says 1 "model.ply/x: the folder cannot be made: " "$build/check" "$set" --out "$model/x"
+first_frames 7 "$set/transforms_train.json" >"$set/seven.json"
+check "--train-json" says 0 "^-> 7 photographs of 128 x 128: " "$build/check" "$set" --train-json seven.json
+rm "$set/seven.json"
+check "--train-json of nothing" says 1 "seven.json" "$build/check" "$set" --train-json seven.json
+# a list in millimetres beside a model and a box in metres
+mkdir "$out/millimetres"
+cp -r "$set/train" "$set/test" "$out/millimetres"
+for split in train test; do
+    awk '/"pl_pos"/ { pos = 1; n = 0 } /"transform_matrix"/ { matrix = 1; n = 0 } /"pl_intensity"/ { pos = matrix = 0 }
+        /^ *-?[0-9.e+-]+,?$/ { n++; v = $1; comma = sub(/,/, "", v)
+            if ((pos && n <= 3) || (matrix && n % 4 == 0 && n <= 12)) $0 = sprintf("%.9f%s", 1000 * v, comma ? "," : "") }
+        /^   \]/ { pos = matrix = 0 } { print }' "$set/transforms_$split.json" >"$out/millimetres/transforms_$split.json"
+done
+unit="and the nearest camera stands .* away: does the list have millimetres where it has metres"
+check "check: another unit" says 0 "^-> the box that holds the object is 1 wide, $unit" "$build/check" "$out/millimetres"
+check "relight: another unit" says 0 "note: the model is [01].* wide, $unit" "$build/relight" "$model" "$out/millimetres" --out "$out/other_unit" --threads 1
+check "train: another unit" says 0 "note: bounds_min .. bounds_max is 1 wide, $unit" "$build/train" "$out/millimetres" -o "$out/other_unit.ply" --iterations 1 --points 50 --threads 1
+check "the right unit" says 0 "4 images" relight --out "$out/same_unit"
+check "no note" lacks "does the list have"
 check "no box" says 2 "^usage: check" "$build/check" "$set" --bounds 1,2,3
 check "no set" says 2 "^usage: check" "$build/check"
+
+# the viewer finds its page from anywhere, or says where it looked
+absolute=$(cd "$build" && pwd)
+view_from() { # view_from FOLDER PROGRAM: what it says within two seconds
+    (cd "$1" && { "$2" "$absolute/examples_files/model.ply" 2>&1 & pid=$!; sleep 2; kill $pid; wait $pid; } 2>/dev/null)
+    true
+}
+check "view" says 0 "^http://127.0.0.1:" view_from . "$build/view"
+if [ -e "$build/../examples/view.html" ]; then check "from elsewhere" says 0 "^http://127.0.0.1:" view_from / "$absolute/view"; fi
+mkdir "$out/moved_view"
+cp "$build/view" "$out/moved_view"
+check "without its page" says 0 'no view.html in "examples/", ".*/moved_view/" or ".*/moved_view/../examples/"; view has --page FILE' \
+    view_from / "$absolute/examples_files/moved_view/view"
+cp examples/view.html "$out/moved_view"
+check "with its page" says 0 "^http://127.0.0.1:" view_from / "$absolute/examples_files/moved_view/view"
 
 # options of ball may stand anywhere
 check "--focal 1e999" says 2 "^usage: ball" "$build/ball" 20 20 10 "$set/test/r_000.png" --focal 1e999

@@ -1196,6 +1196,11 @@ static void test_lenses(void) {
                                          "distortion_coefficients",
                                          "rolling_shutter"};
     const double of_x = 30 / tan(0.5), of_y = 20 / tan(0.4);
+    CHECK(loads("{\"camera_angle_x\":1,\"ply_file_path\":\"sparse.ply\",\"frames\":[" FRAME "]}", 0) &&
+          !strcmp(set.notes, "ply_file_path is not used: training starts from random points"));
+    olat_free(&set);
+    CHECK(loads("{\"camera_angle_x\":1,\"frames\":[" FRAME "]}", 0) && !set.notes[0]);
+    olat_free(&set);
     CHECK(lens_is("\"camera_angle_x\":1,", "", of_x, of_x) &&
           lens_is("\"camera_angle_y\":0.8,", "", of_y, of_y));
     CHECK(lens_is("\"camera_angle_x\":1,\"camera_angle_y\":0.8,", "", of_x, of_y));
@@ -1423,6 +1428,37 @@ static void test_curves(void) {
         loads("{\"camera_angle_x\":1.0,\"frames\":[{\"file_path\":\"g\"," LIGHT POSE "}]}", OLAT_NO_IMAGES) &&
         !set.notes[0]);
     olat_free(&set);
+}
+
+/* A list in millimetres beside a box in metres, the other way round, and what is neither. */
+static void test_units(void) {
+    static const double scales[8] = {1000, 300, 100, 20, 1, 0.1, 0.01, 0.001};
+    const ssdgs_real up[3] = {0, 0, 1}, middle[3] = {1, 2, 3}, low[3] = {(ssdgs_real)0.5, (ssdgs_real)1.5, 2},
+                     high[3] = {(ssdgs_real)1.5, (ssdgs_real)2.5, 4};
+    olat_dataset many;
+    olat_frame frames[2];
+    char note[512];
+    memset(&many, 0, sizeof many);
+    memset(frames, 0, sizeof frames);
+    many.frames = frames;
+    many.count = 2;
+    for (int i = 0; i < 8; i++) {
+        for (int k = 0; k < 2; k++) { /* 6 and 4 away, of 2 */
+            ssdgs_real eye[3] = {1, 2, 3};
+            eye[k] += (ssdgs_real)(scales[i] * (k ? 4 : -6));
+            frames[k].camera = ssdgs_camera_look_at(eye, middle, up, (ssdgs_real)0.7, 90, 60);
+        }
+        CHECK(olat_other_unit(&many, "the box", low, high, note) == (i < 3 || i > 5));
+        if (i == 0)
+            CHECK(strstr(note, "the box is 2 wide, and the nearest camera stands 4e+03 away: does the list "
+                               "have millimetres"));
+        if (i == 6)
+            CHECK(strstr(note, "the box is 2 wide, and all cameras stand within 0.06 of its middle: does the "
+                               "list have metres"));
+        CHECK(!olat_other_unit(&many, "nothing", low, low, note));
+        frames[1].camera = ssdgs_camera_look_at(low, middle, up, (ssdgs_real)0.7, 90, 60); /* one is right */
+        CHECK(!olat_other_unit(&many, "the box", low, high, note));
+    }
 }
 
 static void test_masks(void) {
@@ -2502,6 +2538,7 @@ int main(void) {
     TEST_ROW("76", "JSON good and bad", (test_json(), test_strings(), test_write_string()));
     TEST_ROW("77", "numbers, correctly rounded", test_numbers());
     TEST_ROW("78,79", "datasets and paths, good and bad", (test_datasets(), test_lenses(), test_rounding()));
+    test_units();
     test_curves();
     test_masks();
     test_kinds_of_image();

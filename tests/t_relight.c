@@ -294,7 +294,8 @@ static void test_pictures(void) {
 }
 
 int main(void) {
-    make_folders(FOLDER "/set");
+    char error[512];
+    CHECK(!olat_make_folder(FOLDER "/set", error));
     for (int up = 0; up < 3; up++)
         for (int sign = -1; sign < 2; sign += 2) test_path(up, sign, up == 1);
     test_pictures();
