@@ -1,6 +1,7 @@
 /* cc -O2 examples/export.c -o export -lm -lpthread: a relightable model under one light as splats for
    viewers: PREFIX.glb (KHR_gaussian_splatting), PREFIX.ply and PREFIX.splat. Reads them again, prints how
    near they come to the model, and shows it in PREFIX.png. Highlights move with the eye: they are left out.
+   The model's middle is the files' 0, and up is where viewers look for it: -y in .ply and .splat, y in .glb.
  */
 #define SSDGS_IMPLEMENTATION
 #ifndef SSDGS_STAGES
@@ -25,7 +26,7 @@ typedef struct exporter {
     ssdgs_model *model;
     ssdgs_light light;
     float middle[3], radius;
-    int linear; /* 1: the GLB's colours are linear */
+    int keep; /* 1: the dataset's places and axes */
     int count;
     splat *splats;
     float *normals; /* (count, 3) */
@@ -123,6 +124,38 @@ static ssdgs_result bake(exporter *e) {
 
 /* ---- the files ---- */
 
+/* Whether a file has y down and z into the picture, where the dataset has z up. A GLB says so in its node. */
+static int is_turned(const exporter *e, int file) { return file != GLB && !e->keep; }
+
+/* A splat as a file has it: seen from the model's middle. */
+static splat placed(const exporter *e, const splat *s, int file) {
+    const float *q = s->rotation, half = 0.70710678f;
+    splat p = *s;
+    for (int c = 0; c < 3 && !e->keep; c++) p.position[c] -= e->middle[c];
+    if (is_turned(e, file)) { /* a quarter turn about x */
+        const float y = p.position[1], turned[4] = {half * (q[0] - q[1]), half * (q[1] + q[0]),
+                                                    half * (q[2] - q[3]), half * (q[3] + q[2])};
+        p.position[1] = -p.position[2];
+        p.position[2] = y;
+        memcpy(p.rotation, turned, sizeof turned);
+    }
+    return p;
+}
+
+/* A camera of the model's for what a file has. */
+static ssdgs_camera placed_camera(const exporter *e, const ssdgs_camera *camera, int file) {
+    ssdgs_camera c = *camera;
+    for (float *row = c.view; row < c.view + 12; row += 4) {
+        for (int k = 0; k < 3 && !e->keep; k++) row[3] += row[k] * e->middle[k];
+        if (is_turned(e, file)) {
+            const float y = row[1];
+            row[1] = -row[2];
+            row[2] = y;
+        }
+    }
+    return c;
+}
+
 static void put(exporter *e, const void *data, size_t size) {
     memcpy(e->bytes + e->size, data, size);
     e->size += size;
@@ -162,33 +195,46 @@ static void write_ply(exporter *e) {
         length += snprintf(header + length, sizeof header - (size_t)length, "property float %s\n", names[i]);
     length += snprintf(header + length, sizeof header - (size_t)length, "end_header\n");
     put(e, header, (size_t)length);
-    for (const splat *s = e->splats; s < e->splats + e->count; s++) {
-        const float o = fminf(0.9999999f, fmaxf(1e-7f, s->opacity)), logit = logf(o / (1 - o)),
+    for (int i = 0; i < e->count; i++) {
+        const splat s = placed(e, e->splats + i, PLY);
+        const float o = fminf(0.9999999f, fmaxf(1e-7f, s.opacity)), logit = logf(o / (1 - o)),
                     none[3] = {0, 0, 0};
         float dc[3], log_scale[3];
         for (int c = 0; c < 3; c++) {
-            dc[c] = (s->color[c] - 0.5f) / harmonic;
-            log_scale[c] = logf(s->scale[c]);
+            dc[c] = (s.color[c] - 0.5f) / harmonic;
+            log_scale[c] = logf(s.scale[c]);
         }
-        put_floats(e, s->position, 3);
+        put_floats(e, s.position, 3);
         put_floats(e, none, 3);
         put_floats(e, dc, 3);
         put_floats(e, &logit, 1);
         put_floats(e, log_scale, 3);
-        put_floats(e, s->rotation, 4);
+        put_floats(e, s.rotation, 4);
     }
+}
+
+/* A quaternion as bytes, which some readers take for (b - 128) / 128, others for (b - 127.5) / 127.5: in
+   between. The largest number is negative, as 0 is -1 to all of them and no byte is 1. */
+static void rotation_bytes(const float rotation[4], unsigned char bytes[4]) {
+    float largest = 0, length2 = 0;
+    for (int c = 0; c < 4; c++) {
+        if (fabsf(rotation[c]) > fabsf(largest)) largest = rotation[c];
+        length2 += rotation[c] * rotation[c];
+    }
+    const float unit = (largest > 0 ? -127.75f : 127.75f) / sqrtf(length2);
+    for (int c = 0; c < 4; c++) bytes[c] = (unsigned char)fminf(255, floorf(128.25f + unit * rotation[c]));
 }
 
 /* antimatter15's: 32 bytes a splat. */
 static void write_splat(exporter *e) {
-    for (const splat *s = e->splats; s < e->splats + e->count; s++) {
+    for (int i = 0; i < e->count; i++) {
+        const splat s = placed(e, e->splats + i, SPLAT);
         unsigned char tail[8];
-        put_floats(e, s->position, 3);
-        put_floats(e, s->scale, 3);
-        for (int c = 0; c < 3; c++) tail[c] = byte_of(s->color[c]);
-        tail[3] = byte_of(s->opacity);
-        for (int c = 0; c < 4; c++)
-            tail[4 + c] = (unsigned char)fminf(255, roundf(s->rotation[c] * 128) + 128);
+        put_floats(e, s.position, 3);
+        put_floats(e, s.scale, 3);
+        for (int c = 0; c < 3; c++) tail[c] = byte_of(s.color[c]);
+        tail[3] = byte_of(s.opacity);
+        rotation_bytes(s.rotation, tail + 4);
         put(e, tail, 8);
     }
 }
@@ -208,10 +254,13 @@ static const struct {
 static int glb_json(const exporter *e, char *json, size_t room) {
     float low[3], high[3];
     size_t at = 0, length = 0;
-    for (int c = 0; c < 3; c++) low[c] = high[c] = e->splats->position[c];
-    for (int i = 0; i < 3 * e->count; i++) {
-        low[i % 3] = fminf(low[i % 3], e->splats[i / 3].position[i % 3]);
-        high[i % 3] = fmaxf(high[i % 3], e->splats[i / 3].position[i % 3]);
+    for (int c = 0; c < 3; c++) low[c] = HUGE_VALF, high[c] = -HUGE_VALF;
+    for (int i = 0; i < e->count; i++) {
+        const splat s = placed(e, e->splats + i, GLB);
+        for (int c = 0; c < 3; c++) {
+            low[c] = fminf(low[c], s.position[c]);
+            high[c] = fmaxf(high[c], s.position[c]);
+        }
     }
 #define SAY(...) length += (size_t)snprintf(json + length, room - length, __VA_ARGS__)
     SAY("{\"asset\":{\"version\":\"2.0\",\"generator\":\"ssdgs.h\"},\"extensionsUsed\":[\"KHR_gaussian_"
@@ -220,8 +269,7 @@ static int glb_json(const exporter *e, char *json, size_t room) {
         "\"nodes\":[{\"mesh\":0,\"rotation\":[-0.70710678,0,0,0.70710678]}]," /* z up becomes y up */
         "\"meshes\":[{\"primitives\":[{\"mode\":0,\"extensions\":{\"KHR_gaussian_splatting\":{\"kernel\":"
         "\"ellipse\","
-        "\"colorSpace\":\"%s\"}},\"attributes\":{",
-        e->linear ? "lin_rec709_display" : "srgb_rec709_display");
+        "\"colorSpace\":\"srgb_rec709_display\"}},\"attributes\":{");
     for (int i = 0; i < ATTRIBUTES; i++) SAY("%s\"%s\":%d", i ? "," : "", attribute[i].name, i);
     SAY("}}]}],\"accessors\":[");
     for (int i = 0; i < ATTRIBUTES; i++) {
@@ -258,18 +306,18 @@ static void write_glb(exporter *e) {
     put_word(e, binary);
     put_word(e, 0x004E4942); /* BIN */
     for (int i = 0; i < ATTRIBUTES; i++)
-        for (const splat *s = e->splats; s < e->splats + e->count; s++) {
+        for (int k = 0; k < e->count; k++) {
+            const splat s = placed(e, e->splats + k, GLB);
             float values[4], length2 = 0;
-            for (int c = 0; c < 4; c++) length2 += s->rotation[c] * s->rotation[c];
+            for (int c = 0; c < 4; c++) length2 += s.rotation[c] * s.rotation[c];
             for (int c = 0; c < attribute[i].values; c++)
-                values[c] =
-                    i == 0   ? s->position[c]
-                    : i == 1 ? s->rotation[(c + 1) % 4] / sqrtf(length2)
-                    : i == 2 ? s->scale[c]
-                    : i == 3 ? s->opacity
-                    : i == 4 ? ((e->linear ? ssdgs_srgb_decode(s->color[c]) : s->color[c]) - 0.5f) / harmonic
-                    : c == 3 ? s->opacity
-                             : fminf(1, ssdgs_srgb_decode(s->color[c]));
+                values[c] = i == 0   ? s.position[c]
+                            : i == 1 ? s.rotation[(c + 1) % 4] / sqrtf(length2)
+                            : i == 2 ? s.scale[c]
+                            : i == 3 ? s.opacity
+                            : i == 4 ? (s.color[c] - 0.5f) / harmonic
+                            : c == 3 ? s.opacity
+                                     : fminf(1, ssdgs_srgb_decode(s.color[c]));
             put_floats(e, values, attribute[i].values);
         }
 }
@@ -283,7 +331,7 @@ static int read_splat(const unsigned char *bytes, size_t size, int count, splat 
         floats_at(bytes + 12, out[i].scale, 3);
         for (int c = 0; c < 3; c++) out[i].color[c] = (float)bytes[24 + c] / 255;
         out[i].opacity = (float)bytes[27] / 255;
-        for (int c = 0; c < 4; c++) out[i].rotation[c] = ((float)bytes[28 + c] - 128) / 128;
+        for (int c = 0; c < 4; c++) out[i].rotation[c] = ((float)bytes[28 + c] - 127.75f) / 127.75f;
     }
     return 0;
 }
@@ -313,11 +361,10 @@ static int read_glb(const exporter *e, const unsigned char *bytes, size_t size, 
     return 0;
 }
 
-/* Such splats as a model. linear: their colours are light, which is blended as such. */
-static ssdgs_result model_of(exporter *e, const splat *splats, int linear, ssdgs_model **out) {
+/* Such splats as a model. */
+static ssdgs_result model_of(exporter *e, const splat *splats, ssdgs_model **out) {
     ssdgs_settings settings = ssdgs_settings_published();
     settings.baked = 1;
-    settings.transfer = linear ? SSDGS_TRANSFER_SRGB : SSDGS_TRANSFER_NONE;
     ssdgs_result result = ssdgs_model_create(e->context, &settings, e->count, out);
     for (int i = 0; i < e->count && !result; i++) {
         ssdgs_gaussian g = ssdgs_gaussian_default();
@@ -344,19 +391,21 @@ static ssdgs_result read_again(exporter *e, int file, const char *path, ssdgs_mo
     ssdgs_result result = SSDGS_OK;
     if (!failed)
         result = file == PLY ? ssdgs_model_load_memory(e->context, bytes, size, out, NULL)
-                             : model_of(e, splats, file == GLB && e->linear, out);
+                             : model_of(e, splats, out);
     free(bytes), free(splats);
     return failed ? SSDGS_ERR_FORMAT : result;
 }
 
 /* ---- pictures ---- */
 
-/* Bytes of a view, sRGB, into place `row` of the sheet's column `view`. */
+/* Bytes of a view, sRGB, into place `row` of the sheet's column `view`. Behind the first two rows are files.
+ */
 static ssdgs_result show(exporter *e, ssdgs_model *model, int view, int row, int terms,
                          unsigned char *sheet) {
     static float color[3 * SIDE * SIDE];
     static unsigned char bytes[3 * SIDE * SIDE];
-    const ssdgs_camera camera = camera_at(e, view, VIEWS, SIDE);
+    ssdgs_camera camera = camera_at(e, view, VIEWS, SIDE);
+    if (row > 1) camera = placed_camera(e, &camera, row - 2);
     ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_image image;
     memset(&image, 0, sizeof image);
@@ -401,12 +450,16 @@ static ssdgs_result look(exporter *e, const double *from, char *error) {
     }
     for (int c = 0; c < 3; c++) e->light.intensity[c] = distance2 / settings->light_scale;
     if (!result && !(distance2 > 0)) olat__fail(error, "--light: it is in the middle of the object");
-    for (int c = 0; c < 3 && !result; c++)
-        if (settings->origin[c] < 0 || settings->origin[c] > 0) {
-            printf("positions are relative to %.9g %.9g %.9g\n", (double)settings->origin[0],
-                   (double)settings->origin[1], (double)settings->origin[2]);
-            break;
-        }
+    if (!result) {
+        double place[3]; /* of the files' 0, in the dataset */
+        for (int c = 0; c < 3; c++)
+            place[c] = (double)settings->origin[c] + (e->keep ? 0 : (double)e->middle[c]);
+        printf("x y z in %s are %.9g + x, %.9g + y, %.9g + z in the dataset\n",
+               e->keep ? "all files" : "the GLB, without its node's turn,", place[0], place[1], place[2]);
+        if (!e->keep)
+            printf("x y z in .ply and .splat are %.9g + x, %.9g + z, %.9g - y\n", place[0], place[1],
+                   place[2]);
+    }
     return result;
 }
 
@@ -449,10 +502,16 @@ static void hear(void *user, ssdgs_result code, const char *message) {
 }
 
 static int usage(void) {
-    fprintf(stderr, "usage: export MODEL.ply PREFIX [--linear] [--light X Y Z]\n"
-                    "writes PREFIX.glb, PREFIX.ply, PREFIX.splat and, to compare, PREFIX.png\n"
-                    "  --linear       the GLB's colours are linear light: nearer, where viewers know it\n"
-                    "  --light X Y Z  where the light is, as in the dataset; else above the left side\n");
+    fprintf(
+        stderr,
+        "usage: export MODEL.ply PREFIX [--keep] [--light X Y Z]\n"
+        "writes PREFIX.glb, PREFIX.ply, PREFIX.splat and, to compare, PREFIX.png\n"
+        "The model's middle becomes 0: viewers that keep halves are coarse elsewhere. .ply and .splat get\n"
+        "y down and z into the picture, as COLMAP has them and viewers take them: SuperSplat and Babylon\n"
+        "turn them up by themselves, in Spark and GaussianSplats3D half a turn about x does. The GLB's\n"
+        "node makes y up, as glTF has it. How to undo it is printed.\n"
+        "  --keep         keeps the dataset's places, and its axes in .ply and .splat\n"
+        "  --light X Y Z  where the light is, as in the dataset; else above the left side\n");
     return 2;
 }
 
@@ -467,7 +526,7 @@ int main(int argc, char **argv) {
     int given = 0, lit = 0;
     memset(&e, 0, sizeof e);
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--linear")) e.linear = 1;
+        if (!strcmp(argv[i], "--keep")) e.keep = 1;
         else if (!strcmp(argv[i], "--light") && i + 3 < argc) {
             for (lit = 0; lit < 3; lit++) {
                 if (!olat_argument(argv[++i], from + lit)) return usage();

@@ -102,6 +102,8 @@ const served = async () => {
     check('comes to rest', await rest())
     let last = await pixels()
     check('the first picture is the server\'s', last[0] > 0 && last[1] == 0)
+    check('forms are dark, also those that a browser draws', await ask('getComputedStyle($("preset")).colorScheme') == 'dark')
+    check('an icon is not asked for: the policy forbids it', await ask('document.querySelector("link[rel=icon]").href') == 'data:,')
     await picture('first')
     await like_relight('served')
     await ask('$("reset").click()')

@@ -247,10 +247,41 @@ for file in glb ply splat; do
     check "is there" test -s "$out/exported.$file"
 done
 check "the picture" test -s "$out/exported.png"
-check "in another light" says 0 "moved.splat: " export_of "$model" "$out/moved" --linear --light 1 -2 2
+places=$(sed -n 's/^x y z in .ply and .splat are \([-0-9.e+]*\) + x, \([-0-9.e+]*\) + z, \([-0-9.e+]*\) - y$/\1 \2 \3/p' "$out/log")
+exported="$(near_to exported.glb) $(near_to exported.ply) $(near_to exported.splat)"
+check "--keep" says 0 "^x y z in all files are 0 + x, 0 + y, 0 + z in the dataset$" export_of "$model" "$out/kept" --keep
+for file in glb ply splat; do
+    check "kept.$file is as near as exported.$file" near "$(near_to "kept.$file")" "${exported%% *}" 0.1
+    exported=${exported#* }
+done
+gaussians=$(($(wc -c <"$out/exported.splat") / 32))
+for name in exported kept; do
+    tail -c $((gaussians * 68)) "$out/$name.ply" | od -An -v -tf4 -w68 >"$out/$name.floats"
+    od -An -v -tu1 -w32 "$out/$name.splat" | cut -c 113- >"$out/$name.bytes"
+done
+undone() { # how the files' places become the dataset's: as it was printed; y is down
+    paste -d ' ' "$out/exported.floats" "$out/kept.floats" | awk -v places="$places" 'function off(a, b) { return a > b + 1e-5 || a < b - 1e-5 }
+        { split(places, p, " "); bad += off(p[1] + $1, $18) || off(p[2] + $3, $19) || off(p[3] - $2, $20); low = $2 < low ? $2 : low; high = $20 > high ? $20 : high }
+        END { exit bad || NR < 100 || off(p[3] - low, high) || !(low < -0.1) }'
+}
+check "the places are undone by what is printed: $places" undone
+turned() { # turned FILE: quaternions as bytes: the largest number is negative; near what they mean to readers of both kinds
+    paste -d ' ' "$out/$1.floats" "$out/$1.bytes" | awk 'function angle(half, unit,   c, dot, a, b) {
+            for (c = 0; c < 4; c++) { v = ($(18 + c) - half) / unit; dot += v * $(14 + c); a += v * v; b += $(14 + c) ^ 2 }
+            dot = dot / sqrt(a * b); dot = dot < 0 ? -dot : dot; return dot < 1 ? 2 * atan2(sqrt(1 - dot * dot), dot) * 57.29578 : 0 }
+        { low = high = $18; for (c = 19; c < 22; c++) { low = $c < low ? $c : low; high = $c > high ? $c : high }
+          bad += low + high > 256 || angle(127.5, 127.5) > 1.3 || angle(128, 128) > 1.3; sum += angle(127.5, 127.5); other += angle(128, 128) }
+        END { exit bad || NR < 100 || !(sum / NR < 0.65 && other / NR < 0.65) }'
+}
+check "bytes of quaternions" turned exported
+check "and of those kept" turned kept
+check "in another light" says 0 "moved.splat: " export_of "$model" "$out/moved" --light 1 -2 2
 check "which shows" differs "$out/moved.png" "$out/exported.png"
-check "linear" grep -aq lin_rec709_display "$out/moved.glb"
-check "splats of it" says 0 "plain splats" "$build/relight" "$out/exported.ply" "$set" --out "$out/splats"
+check "splats of it" says 0 "plain splats" "$build/relight" "$out/kept.ply" "$set" --out "$out/splats"
+kept=$(psnr "$out/splats")
+check "splats turned" says 0 "plain splats" "$build/relight" "$out/exported.ply" "$set" --out "$out/splats"
+check "look otherwise: $(psnr "$out/splats"), not $kept dB" awk -v a="$kept" -v b="$(psnr "$out/splats")" 'BEGIN { exit !(a > b + 1) }'
+check "--linear" says 2 "^usage: export" export_of "$model" "$out/linear" --linear
 cp "$model" "$out/own.ply"
 check "over the model" says 1 "would replace an input" export_of "$out/own.ply" "$out/own"
 check "a model that is not there" says 1 "nothing.ply" export_of "$out/nothing.ply" "$out/none"

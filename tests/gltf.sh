@@ -22,7 +22,7 @@ faults() { # faults FILE: how many errors and warnings it has
 }
 model=$work/model.ply
 check "a model" sh -c "\"$build/train\" examples/data/waxcow -o \"$model\" --iterations 30 --points 300 >/dev/null"
-for option in "" --linear; do
+for option in "" --keep; do
     check "export $option" sh -c "\"$build/export\" \"$model\" \"$work/splats\" $option >/dev/null"
     check "a valid GLB $option" test "$(faults "$work/splats.glb")" = 0
 done
