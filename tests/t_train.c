@@ -208,8 +208,10 @@ static void test_members(ssdgs_trainer *trainer, const char *path) {
             }
             *byte ^= 1;
             if (!CHECK(result == SSDGS_ERR_FORMAT && strstr(message, " was ") &&
-                       strstr(message, " in its run and is ")))
+                       strstr(message, " in its run and is "))) {
                 printf("    part %d, byte %d: %s\n", part, (int)k, message);
+                return;
+            }
             name = strstr(message, ": ") + 2;
             end = strchr(name, ' ');
             snprintf(wanted, sizeof wanted, " %.*s ", (int)(end - name), name);
