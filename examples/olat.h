@@ -537,6 +537,85 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
     return z.length + 4;
 }
 
+/* ==== primaries ==== */
+
+static void olat__transform(const double matrix[9], const double v[3], double result[3]) {
+    for (int i = 0; i < 3; i++)
+        result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
+}
+
+/* 0 where there is no inverse. */
+static int olat__invert(const double m[9], double inverse[9]) {
+    for (int i = 0; i < 9; i++) { /* the cofactor of row i % 3, column i / 3 */
+        const int r = 3 * ((i + 1) % 3), s = 3 * ((i + 2) % 3), c = (i / 3 + 1) % 3, d = (i / 3 + 2) % 3;
+        inverse[i] = m[r + c] * m[s + d] - m[r + d] * m[s + c];
+    }
+    const double determinant = m[0] * inverse[0] + m[1] * inverse[3] + m[2] * inverse[6];
+    for (int i = 0; i < 9; i++) inverse[i] /= fabs(determinant) > 1e-9 ? determinant : 1;
+    return fabs(determinant) > 1e-9;
+}
+
+/* CIE XYZ of the light of three primaries, in columns, and of white as 1 1 1 of it, from the xy of the
+   four. */
+static int olat__xyz(const double xy[8], double xyz[9]) {
+    double inverse[9], white[3], amount[3];
+    for (int i = 0; i < 8; i++)
+        if (!(xy[i] >= -1 && xy[i] <= 2)) return 0;
+    for (int i = 0; i < 3; i++) {
+        xyz[i] = xy[2 * i];
+        xyz[3 + i] = xy[2 * i + 1];
+        xyz[6 + i] = 1 - xy[2 * i] - xy[2 * i + 1];
+    }
+    white[0] = xy[6], white[1] = xy[7], white[2] = 1 - xy[6] - xy[7];
+    if (!olat__invert(xyz, inverse) || !(white[1] > 0.01)) return 0;
+    olat__transform(inverse, white, amount);
+    for (int i = 0; i < 9; i++) xyz[i] *= amount[i % 3] / white[1];
+    return amount[0] > 0 && amount[1] > 0 && amount[2] > 0;
+}
+
+/* What Bradford's three cones take in of the primaries, relative to what they do of 1 1 1, their white. */
+static int olat__cones(const double xyz[9], double cones[9]) {
+    static const double bradford[9] = {0.8951, 0.2664, -0.1614, -0.7502, 1.7135,
+                                       0.0367, 0.0389, -0.0685, 1.0296};
+    int good = 1;
+    for (int i = 0; i < 9; i++) {
+        const double *row = bradford + i / 3 * 3;
+        cones[i] = row[0] * xyz[i % 3] + row[1] * xyz[3 + i % 3] + row[2] * xyz[6 + i % 3];
+    }
+    for (int i = 0; i < 9; i += 3) {
+        const double white = cones[i] + cones[i + 1] + cones[i + 2];
+        good &= white > 0.01;
+        for (int k = 0; k < 3; k++) cones[i + k] /= white > 0.01 ? white : 1;
+    }
+    return good;
+}
+
+/* What takes linear light of primaries of this XYZ to linear light of sRGB's, and white to white: returns 0
+   where there is no such matrix, 1 where it is the identity, 2 else. Rows sum to 1. */
+OLAT__API int olat__colorants(const double xyz[9], double matrix[9]) {
+    static const double srgb[8] = {0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329};
+    double to_xyz[9], from[9], to[9], inverse[9];
+    int differs = 0, sensible = olat__cones(xyz, from);
+    olat__xyz(srgb, to_xyz);
+    olat__cones(to_xyz, to);
+    olat__invert(to, inverse);
+    for (int i = 0; i < 9; i++) {
+        const double *row = inverse + i / 3 * 3;
+        matrix[i] = row[0] * from[i % 3] + row[1] * from[3 + i % 3] + row[2] * from[6 + i % 3];
+        sensible &= fabs(matrix[i]) < 16;
+        differs |= fabs(matrix[i] - (i % 4 == 0)) > 1e-3;
+    }
+    for (int i = 0; i < 9 && !differs; i++) matrix[i] = i % 4 == 0;
+    return sensible ? 1 + differs : 0;
+}
+
+/* The same from the CIE xy of red, green, blue and white; all else about the eye's adaptation is Bradford's.
+ */
+OLAT__API int olat__primaries(const double xy[8], double matrix[9]) {
+    double xyz[9];
+    return olat__xyz(xy, xyz) ? olat__colorants(xyz, matrix) : 0;
+}
+
 /* ==== PNG ==== */
 
 enum {
@@ -2747,16 +2826,11 @@ static const double olat__flip_to_rgb[9] = {3.080341988280,  -1.537398969489, -0
                                             -0.921178396165, 1.875929983695,  0.045248412470,
                                             0.052881292876,  -0.204011206124, 1.151129913248};
 
-OLAT__API void olat__flip_transform(const double matrix[9], const double v[3], double result[3]) {
-    for (int i = 0; i < 3; i++)
-        result[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
-}
-
 /* Linear sRGB to CIELAB with Hunt's adjustment: chroma counts less where it is dark. */
 OLAT__API void olat__flip_lab(const double rgb[3], double lab[3]) {
     const double delta = 6.0 / 29;
     double f[3];
-    olat__flip_transform(olat__flip_to_xyz, rgb, f);
+    olat__transform(olat__flip_to_xyz, rgb, f);
     for (int i = 0; i < 3; i++)
         f[i] = f[i] > delta * delta * delta ? pow(f[i], 1.0 / 3) : f[i] / (3 * delta * delta) + 4.0 / 29;
     lab[0] = 116 * f[1] - 16;
@@ -2836,7 +2910,7 @@ OLAT__API void olat__flip_image(const ssdgs_real *image, int width, int height, 
             const ssdgs_real v = image[3 * p + (size_t)k];
             color[k] = (double)ssdgs_srgb_decode(v > 0 ? v < 1 ? v : 1 : 0);
         }
-        olat__flip_transform(olat__flip_to_xyz, color, xyz);
+        olat__transform(olat__flip_to_xyz, color, xyz);
         opponent[p] = (ssdgs_real)xyz[1];
         opponent[pixels + p] = (ssdgs_real)(xyz[0] - xyz[1]);
         opponent[2 * pixels + p] = (ssdgs_real)(xyz[1] - xyz[2]);
@@ -2876,7 +2950,7 @@ OLAT__API void olat__flip_image(const ssdgs_real *image, int width, int height, 
         xyz[1] = (double)planes[p];
         xyz[0] = xyz[1] + (double)planes[pixels + p];
         xyz[2] = xyz[1] - (double)planes[2 * pixels + p];
-        olat__flip_transform(olat__flip_to_rgb, xyz, color);
+        olat__transform(olat__flip_to_rgb, xyz, color);
         for (int k = 0; k < 3; k++) color[k] = color[k] > 0 ? color[k] < 1 ? color[k] : 1 : 0;
         olat__flip_lab(color, xyz);
         for (int k = 0; k < 3; k++) planes[(size_t)k * pixels + p] = (ssdgs_real)xyz[k];

@@ -2526,6 +2526,46 @@ static void test_flip(void) {
     fail_at = 0;
 }
 
+/* ---- primaries ---- */
+
+static void test_primaries(void) {
+    static const double srgb[8] = {0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329};
+    static const struct {
+        double xy[8], matrix[9]; /* as published */
+    } known[5] = {
+        {{0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329}, /* BT.2020: ITU-R BT.2407 */
+         {1.6605, -0.5876, -0.0728, -0.1246, 1.1329, -0.0083, -0.0182, -0.1006, 1.1187}},
+        {{0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.329}, /* Adobe RGB (1998) */
+         {1.39836, -0.39836, 0, 0, 1, 0, 0, -0.04293, 1.04293}},
+        {{0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329}, /* Display P3 */
+         {1.22494, -0.22494, 0, -0.04206, 1.04206, 0, -0.01964, -0.07864, 1.09827}},
+        {{0.7347, 0.2653, 0, 1, 0.0001, -0.077, 0.32168, 0.33767}, /* ACES AP0 */
+         {2.521686, -1.134131, -0.387555, -0.27648, 1.372719, -0.096239, -0.015378, -0.152975, 1.168353}},
+        {{0.7347, 0.2653, 0.1596, 0.8404, 0.0366, 0.0001, 0.3457, 0.3585}, /* ProPhoto */
+         {2.0343, -0.7275, -0.3067, -0.2288, 1.2317, -0.003, -0.0085, -0.1533, 1.1617}}};
+    double m[9], xy[8];
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        CHECK(olat__primaries(known[i].xy, m) == 2);
+        for (int k = 0; k < 9; k++) CHECK(fabs(m[k] - known[i].matrix[k]) < 2e-4);
+        for (int k = 0; k < 9; k += 3) CHECK(fabs(m[k] + m[k + 1] + m[k + 2] - 1) < 1e-14);
+    }
+    CHECK(olat__primaries(srgb, m) == 1);
+    for (int k = 0; k < 9; k++) CHECK(m[k] == (k % 4 == 0));
+    for (int i = 0; i < 8; i++) { /* rounded elsewhere, or no chromaticity at all */
+        memcpy(xy, srgb, sizeof xy);
+        xy[i] += 5e-5;
+        CHECK(olat__primaries(xy, m) == 1);
+        xy[i] = 21474;
+        CHECK(!olat__primaries(xy, m));
+    }
+    memset(xy, 0, sizeof xy);
+    CHECK(!olat__primaries(xy, m));
+    memcpy(xy, srgb, sizeof xy), memcpy(xy, xy + 2, 2 * sizeof *xy); /* red is green */
+    CHECK(!olat__primaries(xy, m));
+    memcpy(xy, srgb, sizeof xy), xy[6] = 0.7, xy[7] = 0.25; /* white is no mixture of the three */
+    CHECK(!olat__primaries(xy, m));
+}
+
 int main(void) {
     mkdir("build", 0777);
     mkdir(FOLDER, 0777);
@@ -2539,6 +2579,7 @@ int main(void) {
     TEST_ROW("77", "numbers, correctly rounded", test_numbers());
     TEST_ROW("78,79", "datasets and paths, good and bad", (test_datasets(), test_lenses(), test_rounding()));
     test_units();
+    test_primaries();
     test_curves();
     test_masks();
     test_kinds_of_image();
