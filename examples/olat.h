@@ -102,7 +102,7 @@ typedef struct olat_dataset {
     int count;
     double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far
                          away */
-    char notes[512];  /* what was done or may be wrong: lines, the last one without its newline; "" if
+    char notes[2048]; /* what was done or may be wrong: lines, the last one without its newline; "" if
                          nothing */
 } olat_dataset;
 
@@ -286,6 +286,7 @@ typedef struct olat__inflater {
     int count;
     unsigned char *out;
     size_t capacity, length;
+    int may_be_less;     /* capacity is only a bound */
     const char *problem; /* the first one; readers then return harmless values and the loops end */
     olat__huffman literals, distances;
 } olat__inflater;
@@ -447,7 +448,8 @@ static void olat__compressed(olat__inflater *z) {
     }
 }
 
-/* Unpacks a zlib stream of exactly z->capacity bytes; returns NULL or what is wrong. */
+/* Unpacks a zlib stream of exactly z->capacity bytes, or of fewer where that is allowed; returns NULL or what
+ * is wrong. */
 static const char *olat__inflate(olat__inflater *z) {
     int last = 0;
     if (z->size < 6) return "the data end early";
@@ -468,7 +470,7 @@ static const char *olat__inflate(olat__inflater *z) {
         }
     }
     if (z->problem) return z->problem;
-    if (z->length < z->capacity) return "less data than the image needs";
+    if (z->length < z->capacity && !z->may_be_less) return "less data than the image needs";
     if (olat__align(z) < 4) return "the data end early";
     return olat__be32(z->in + z->at) == olat__adler32(z->out, z->length) ? NULL
                                                                          : "the Adler checksum is wrong";
@@ -537,6 +539,34 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
     return z.length + 4;
 }
 
+/* ==== what is to be noted of files ==== */
+
+enum { OLAT__NAMED = 1, OLAT__OF_MASK = 2, OLAT__REMARKS = 8 };
+typedef struct olat__remark {
+    int flags; /* OLAT__NAMED: the files' names belong to it; OLAT__OF_MASK: it is about masks */
+    char text[240];
+} olat__remark;
+
+typedef struct olat__found {
+    olat__remark remarks[OLAT__REMARKS];
+    int count;
+    unsigned long broken; /* values that are not finite */
+    double largest;       /* of the mask, of 1 */
+    int waits, inverted;  /* the mask */
+    int failed;
+} olat__found;
+
+/* Adds what follows "1 of the 9 photographs is"; equal ones are counted. */
+OLAT__PRINTF(3, 4) static void olat__tell(olat__found *found, int flags, const char *format, ...) {
+    if (found->count == OLAT__REMARKS) return;
+    olat__remark *remark = found->remarks + found->count++;
+    remark->flags = flags;
+    va_list list;
+    va_start(list, format);
+    vsnprintf(remark->text, sizeof remark->text, format, list);
+    va_end(list);
+}
+
 /* ==== primaries ==== */
 
 static void olat__transform(const double matrix[9], const double v[3], double result[3]) {
@@ -592,7 +622,7 @@ static int olat__cones(const double xyz[9], double cones[9]) {
 
 /* What takes linear light of primaries of this XYZ to linear light of sRGB's, and white to white: returns 0
    where there is no such matrix, 1 where it is the identity, 2 else. Rows sum to 1. */
-OLAT__API int olat__colorants(const double xyz[9], double matrix[9]) {
+static int olat__colorants(const double xyz[9], double matrix[9]) {
     static const double srgb[8] = {0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329};
     double to_xyz[9], from[9], to[9], inverse[9];
     int differs = 0, sensible = olat__cones(xyz, from);
@@ -611,7 +641,7 @@ OLAT__API int olat__colorants(const double xyz[9], double matrix[9]) {
 
 /* The same from the CIE xy of red, green, blue and white; all else about the eye's adaptation is Bradford's.
  */
-OLAT__API int olat__primaries(const double xy[8], double matrix[9]) {
+static int olat__primaries(const double xy[8], double matrix[9]) {
     double xyz[9];
     return olat__xyz(xy, xyz) ? olat__colorants(xyz, matrix) : 0;
 }
@@ -623,12 +653,15 @@ enum {
     OLAT__PLTE = 0x504C5445,
     OLAT__IDAT = 0x49444154,
     OLAT__IEND = 0x49454E44,
-    OLAT__TRNS = 0x74524E53,
-    OLAT__GAMA = 0x67414D41,
-    OLAT__SRGB = 0x73524742,
-    OLAT__ICCP = 0x69434350,
-    OLAT__CICP = 0x63494350
+    OLAT__TRNS = 0x74524E53
 };
+/* Chunks that tell about the picture: kept as they are, the first intact one of each kind. */
+enum { OLAT__GAMA, OLAT__CHRM, OLAT__SRGB, OLAT__ICCP, OLAT__CICP, OLAT__PHYS, OLAT__EXIF, OLAT__TELLING };
+static const struct {
+    char type[5];
+    size_t length; /* 0: any */
+} olat__telling[OLAT__TELLING] = {{"gAMA", 4}, {"cHRM", 32}, {"sRGB", 1}, {"iCCP", 0},
+                                  {"cICP", 4}, {"pHYs", 9},  {"eXIf", 0}};
 static const unsigned char olat__signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
 
 /* The seven passes of an interlaced image, and the only one of others: first pixel and step in x and y. */
@@ -637,8 +670,13 @@ static const unsigned char olat__passes[8][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0,
 
 typedef struct olat__png {
     int width, height, depth, color, channels, first_pass, end_pass, palette_size, has_key;
-    int curve;       /* how much the chunk knows that told the gamma; 0: none did */
-    uint32_t gamma;  /* samples are light to the power of gamma / 100000; 0: like sRGB */
+    int is_mask, labels; /* a mask's palette of colours is one of labels: white but for its first */
+    struct {
+        const unsigned char *data; /* in the file; NULL: there is none */
+        size_t size;
+    } told[OLAT__TELLING];
+    int damaged[OLAT__TELLING];
+    ssdgs_pixels format;
     unsigned key[3]; /* the transparent colour */
     unsigned char palette[256][4];
     unsigned char *packed, *raw, *out;
@@ -680,6 +718,7 @@ static const char *olat__png_header(olat__png *png, const unsigned char *data, s
     png->channels = png->color == 3 ? 1 : 1 + (png->color & 2) + (png->color >> 2);
     png->first_pass = data[12] ? 0 : 7;
     png->end_pass = data[12] ? 7 : 8;
+    png->format = png->depth == 16 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
     return NULL;
 }
 
@@ -690,6 +729,9 @@ static const char *olat__png_palette(olat__png *png, const unsigned char *data, 
     png->palette_size = (int)(length / 3);
     for (size_t i = 0; i < 4 * (length / 3); i++)
         png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
+    for (size_t i = 0; i < length && png->is_mask && !data[0] && !data[1] && !data[2]; i++)
+        png->labels |= abs(data[i] - data[i - i % 3]) > 32; /* colours, not greys that were rounded */
+    for (size_t i = 1; i < length / 3 && png->labels; i++) memset(png->palette[i], 255, 3);
     return NULL;
 }
 
@@ -731,22 +773,6 @@ static const char *olat__png_foreign(const unsigned char *bytes, size_t size) {
     return "this is not a PNG file";
 }
 
-/* What an ancillary chunk says about how samples stand for light. A kind that knows more has the last word,
-   of one kind the first chunk; malformed ones say nothing. */
-static void olat__png_curve(olat__png *png, uint32_t type, const unsigned char *data, size_t length) {
-    const uint32_t value = length == 4 ? olat__be32(data) : 0;
-    int curve = 0;
-    if (type == OLAT__GAMA && value >= 16 && value <= 625000000) curve = 1; /* libpng's limits */
-    if (type == OLAT__SRGB && length == 1) curve = 2;
-    if (type == OLAT__ICCP) curve = 3;
-    if (type == OLAT__CICP && length == 4) curve = 4;
-    if (curve <= png->curve) return;
-    png->curve = curve;
-    png->gamma = curve == 1 && (value < 40000 || value > 50000) ? value
-                 : curve == 4 && data[1] == 8                   ? 100000
-                                                                : 0;
-}
-
 /* Walks over the chunks: fills the header and the palette, and gathers the compressed data in png->packed. */
 static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, size_t size) {
     enum { START, HEADER, DATA, AFTER } stage = START;
@@ -758,13 +784,17 @@ static const char *olat__png_chunks(olat__png *png, const unsigned char *bytes, 
         if (left < 12 || length > left - 12) return "the file ends early";
         const uint32_t type = olat__be32(chunk + 4);
         if (stage == START && type != OLAT__IHDR) return "the first chunk is not IHDR";
-        const int tells_curve =
-            stage == HEADER && !png->palette_size &&
-            (type == OLAT__GAMA || type == OLAT__SRGB || type == OLAT__ICCP || type == OLAT__CICP);
-        const int intact = ((chunk[4] & 32) && type != OLAT__TRNS && !tells_curve) ||
+        int kind = 0;
+        while (kind < OLAT__TELLING && memcmp(chunk + 4, olat__telling[kind].type, 4) != 0) kind++;
+        const int tells =
+            kind < OLAT__TELLING && !png->told[kind].data &&
+            (kind == OLAT__EXIF || (stage == HEADER && (kind == OLAT__PHYS || !png->palette_size)));
+        const int intact = ((chunk[4] & 32) && type != OLAT__TRNS && !tells) ||
                            olat__be32(data + length) == olat__crc32(chunk + 4, length + 4);
-        if (!intact && !tells_curve) return "the chunk's CRC is wrong";
-        if (intact && tells_curve) olat__png_curve(png, type, data, length);
+        if (!intact && !tells) return "the chunk's CRC is wrong";
+        if (tells && intact && (!olat__telling[kind].length || length == olat__telling[kind].length))
+            png->told[kind].data = data, png->told[kind].size = length;
+        else if (tells) png->damaged[kind] = 1;
         if (stage == DATA && type != OLAT__IDAT) stage = AFTER;
         if (type == OLAT__IHDR) {
             problem = stage != START ? "a second IHDR" : olat__png_header(png, data, length);
@@ -918,30 +948,36 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
     return olat__png_unfilter(png);
 }
 
-static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, int *width,
-                            int *height, ssdgs_pixels *format, void **pixels, uint32_t *gamma, char *error) {
+/* Decodes a PNG; png is empty but for is_mask, and is so again after a failure. */
+static int olat__png_decode(const char *name, const unsigned char *bytes, size_t size, olat__png *png,
+                            char *error) {
+    const char *problem = olat__png_read(png, bytes, size);
+    free(png->packed);
+    free(png->raw);
+    if (!problem) return 0;
+    olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png->unit, (unsigned long)png->at, problem);
+    free(png->out);
+    memset(png, 0, sizeof *png);
+    return 1;
+}
+
+static int olat__png_stored(const char *name, const unsigned char *bytes, size_t size, int *width,
+                            int *height, ssdgs_pixels *format, void **pixels, char *error) {
     olat__png png;
     memset(&png, 0, sizeof png);
-    const char *problem = olat__png_read(&png, bytes, size);
-    free(png.packed);
-    free(png.raw);
-    if (problem) free(png.out);
-    *width = problem ? 0 : png.width;
-    *height = problem ? 0 : png.height;
-    *format = png.depth == 16 ? SSDGS_PIXELS_RGBA16 : SSDGS_PIXELS_RGBA8;
-    *pixels = problem ? NULL : png.out;
-    *gamma = png.gamma;
-    return problem ? olat__fail(error, "%s: %s %lu: %s", olat__tail(name), png.unit, (unsigned long)png.at,
-                                problem)
-                   : 0;
+    const int failed = olat__png_decode(name, bytes, size, &png, error);
+    *width = png.width;
+    *height = png.height;
+    *format = png.format;
+    *pixels = png.out;
+    return failed;
 }
 
 /* Decodes a PNG of any kind into (h,w,4) straight RGBA as stored, 16 bits if the file has 16. free() the
    pixels. */
 OLAT__API int olat_decode_png(const unsigned char *bytes, size_t size, int *width, int *height,
                               ssdgs_pixels *format, void **pixels, char error[512]) {
-    uint32_t gamma;
-    return olat__png_decode("PNG", bytes, size, width, height, format, pixels, &gamma, error);
+    return olat__png_stored("PNG", bytes, size, width, height, format, pixels, error);
 }
 
 /* The same from a file. */
@@ -949,10 +985,9 @@ OLAT__API int olat_read_png(const char *path, int *width, int *height, ssdgs_pix
                             char error[512]) {
     unsigned char *bytes = NULL;
     size_t size = 0;
-    uint32_t gamma;
     *pixels = NULL;
     const int failed = olat__read_file(path, &bytes, &size, error) ||
-                       olat__png_decode(path, bytes, size, width, height, format, pixels, &gamma, error);
+                       olat__png_stored(path, bytes, size, width, height, format, pixels, error);
     free(bytes);
     return failed;
 }
@@ -1253,7 +1288,7 @@ static float olat__from_half(unsigned half) {
     return half & 0x8000 ? -value : value;
 }
 
-/* Of a number from 0 to 1, to the nearest. */
+/* Of a number from 0 to 65504, to the nearest. */
 static uint16_t olat__to_half(float value) {
     uint32_t bits;
     value *= 1.925929944387236e-34f;
@@ -1378,17 +1413,416 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
                      : 0;
 }
 
-static int olat__image_file(const char *path, int *width, int *height, ssdgs_pixels *format, void **pixels,
-                            uint32_t *gamma, unsigned long *broken, char *error) {
+/* ==== what the numbers of photographs stand for ==== */
+
+/* Whether numbers are light, not stored values. */
+static int olat__is_light(ssdgs_pixels format) {
+    return format == SSDGS_PIXELS_RGBA16F || format == SSDGS_PIXELS_RGBA32F;
+}
+
+/* A number of a photograph of bytes or words. */
+static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
+    return format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)pixels)[i] : ((const unsigned char *)pixels)[i];
+}
+
+/* Of any, bytes and words from 0 to 1. */
+static ssdgs_real olat__number(const void *pixels, ssdgs_pixels format, size_t i) {
+    const ssdgs_real unit =
+        format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
+    if (format == SSDGS_PIXELS_RGBA32F) return (ssdgs_real)((const float *)pixels)[i];
+    if (format == SSDGS_PIXELS_RGBA16F) return (ssdgs_real)olat__from_half(((const uint16_t *)pixels)[i]);
+    return unit * (ssdgs_real)olat__sample(pixels, format, i);
+}
+
+/* A number of a mask, words for light. */
+static unsigned olat__mask_sample(const void *mask, ssdgs_pixels format, size_t i) {
+    if (!olat__is_light(format)) return olat__sample(mask, format, i);
+    const ssdgs_real v = olat__number(mask, format, i);
+    return (unsigned)(65535 * (v < 1 ? v : 1) + (ssdgs_real)0.5);
+}
+
+/* How a number from 0 to 1 stands for light. */
+enum { OLAT__POWER, OLAT__TABLE, OLAT__PQ, OLAT__HLG };
+typedef struct olat__code {
+    int kind;
+    double g, a, b, c, d, e, f; /* OLAT__POWER: (a v + b)^g + e from d on, c v + f below */
+    const unsigned char *table; /* OLAT__TABLE: so many words, the last one for 1 */
+    uint32_t entries;
+} olat__code;
+
+typedef struct olat__space {
+    olat__code code[3];
+    int differs, high, narrow; /* from sRGB's primaries, by a matrix; light above 1; black is 16 of 255 */
+    double matrix[9];
+    char source[48]; /* who tells it */
+} olat__space;
+
+static void olat__power(olat__code *code, double g, double a, double b, double c, double d) {
+    memset(code, 0, sizeof *code);
+    code->g = g, code->a = a, code->b = b, code->c = c, code->d = d;
+}
+
+/* Light, from 0 to 1, or 1 for white and more for what is brighter. */
+static double olat__light(const olat__code *code, double v) {
+    double light, base;
+    if (code->kind == OLAT__TABLE) {
+        const double at = v * (code->entries - 1), from = floor(at);
+        const unsigned char *p = code->table + 2 * (size_t)from;
+        const double low = p[0] << 8 | p[1], high = from < at ? p[2] << 8 | p[3] : low;
+        return (low + (at - from) * (high - low)) / 65535;
+    }
+    if (code->kind == OLAT__PQ) { /* SMPTE ST 2084; a white of 203 nits, as ITU-R BT.2408 has it */
+        base = pow(v, 1 / 78.84375);
+        light = base > 0.8359375 ? (base - 0.8359375) / (18.8515625 - 18.6875 * base) : 0;
+        return 10000.0 / 203 * pow(light, 1 / 0.1593017578125);
+    }
+    if (code->kind == OLAT__HLG) { /* ITU-R BT.2100, of the scene; white is 75 % of the signal there too */
+        light = v <= 0.5 ? v * v / 3 : (exp((v - 0.55991073) / 0.17883277) + 0.28466892) / 12;
+        return light / 0.26496255978640015;
+    }
+    base = code->a * v + code->b;
+    base = base > 0 ? base < 4 ? base : 4 : 0;
+    light = v >= code->d ? pow(base, code->g) + code->e : code->c * v + code->f;
+    return light > 0 ? light < 1 ? light : 1 : 0;
+}
+
+static double olat__to_srgb(double light) {
+    return light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055;
+}
+
+static void olat__srgb_space(olat__space *space) {
+    memset(space, 0, sizeof *space);
+    for (int c = 0; c < 3; c++)
+        olat__power(space->code + c, 2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045);
+    for (int i = 0; i < 9; i++) space->matrix[i] = i % 4 == 0;
+}
+
+/* How far two spaces are from each other: colours of 0 to 1 on the sRGB curve, entries of matrices. */
+static double olat__space_distance(const olat__space *a, const olat__space *b) {
+    double most = a->high != b->high || a->narrow != b->narrow;
+    for (int i = 0; i < 3 * 256; i++) {
+        const double v = i % 256 / 255.0, apart = olat__to_srgb(olat__light(a->code + i / 256, v)) -
+                                                  olat__to_srgb(olat__light(b->code + i / 256, v));
+        if (fabs(apart) > most) most = fabs(apart);
+    }
+    for (int i = 0; i < 9; i++)
+        if (fabs(a->matrix[i] - b->matrix[i]) > most) most = fabs(a->matrix[i] - b->matrix[i]);
+    return most;
+}
+
+/* Those that follow fill a space that is sRGB from a chunk, and return what is wrong with it, or NULL. */
+
+/* gAMA, cHRM, either or both. Gammas near sRGB's are meant to be that. */
+static const char *olat__gama_space(const olat__png *png, olat__space *space) {
+    const unsigned char *gama = png->told[OLAT__GAMA].data, *chrm = png->told[OLAT__CHRM].data;
+    const uint32_t gamma = gama ? olat__be32(gama) : 45455;
+    double xy[8];
+    if (gamma < 16 || gamma > 625000000) return "damaged"; /* libpng's limits */
+    if (gama) snprintf(space->source, sizeof space->source, "gAMA %g", gamma / 1e5);
+    for (int c = 0; c < 3 && (gamma < 40000 || gamma > 50000); c++)
+        olat__power(space->code + c, 1e5 / gamma, 1, 0, 0, 0);
+    for (int i = 0; chrm && i < 8; i++) xy[(i + 6) % 8] = olat__be32(chrm + 4 * i) / 1e5;
+    const int primaries = chrm ? olat__primaries(xy, space->matrix) : 1;
+    space->differs = primaries == 2;
+    const size_t used = strlen(space->source);
+    if (space->differs)
+        snprintf(space->source + used, sizeof space->source - used, "%scHRM", used ? ", " : "");
+    return primaries ? NULL : "primaries that no light has";
+}
+
+static double olat__icc_number(const unsigned char *p) { return (int32_t)olat__be32(p) / 65536.0; }
+
+/* A curve of an ICC profile; 0 if it is none. */
+static int olat__icc_curve(const unsigned char *p, size_t size, olat__code *code) {
+    static const unsigned char counts[5] = {1, 3, 4, 5, 7};
+    double v[7] = {0, 0, 0, 0, 0, 0, 0};
+    olat__power(code, 1, 1, 0, 0, 0);
+    if (size < 12) return 0;
+    const uint32_t entries = olat__be32(p + 8);
+    const int kind = p[8] << 8 | p[9];
+    if (!memcmp(p, "curv", 4)) {
+        if (entries > (size - 12) / 2) return 0;
+        if (entries == 1) code->g = (p[12] << 8 | p[13]) / 256.0;
+        if (entries > 1) code->kind = OLAT__TABLE, code->table = p + 12, code->entries = entries;
+        return code->g > 0;
+    }
+    if (memcmp(p, "para", 4) != 0 || kind > 4 || (size - 12) / 4 < counts[kind]) return 0;
+    for (int i = 0; i < counts[kind]; i++) v[i] = olat__icc_number(p + 12 + 4 * i);
+    code->g = v[0];
+    if (kind) code->a = v[1], code->b = v[2];
+    if (kind == 1 || kind == 2) {
+        if (!(fabs(v[1]) > 0)) return 0;
+        code->d = -v[2] / v[1];
+        code->e = code->f = v[3];
+    }
+    if (kind > 2) code->c = v[3], code->d = v[4], code->e = v[5], code->f = v[6];
+    return code->g > 0 && code->g < 100;
+}
+
+/* A profile of a matrix and curves, or of one curve for grey. */
+static const char *olat__icc_space(const unsigned char *profile, size_t size, olat__space *space) {
+    static const char names[7][5] = {"rTRC", "gTRC", "bTRC", "rXYZ", "gXYZ", "bXYZ", "kTRC"};
+    const unsigned char *tag[7] = {NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    uint32_t length[7] = {0, 0, 0, 0, 0, 0, 0};
+    double xyz[9];
+    if (size < 132 || memcmp(profile + 36, "acsp", 4) != 0 || olat__be32(profile) > size) return "damaged";
+    size = olat__be32(profile);
+    const int grey = !memcmp(profile + 16, "GRAY", 4);
+    if (!grey && memcmp(profile + 16, "RGB ", 4) != 0) return "of another kind of colours than RGB";
+    if (size < 132 || olat__be32(profile + 128) > (size - 132) / 12) return "damaged";
+    for (uint32_t i = olat__be32(profile + 128); i-- > 0;)
+        for (int k = 0; k < 7; k++) {
+            const unsigned char *p = profile + 132 + 12 * (size_t)i;
+            const uint32_t at = olat__be32(p + 4);
+            if (memcmp(p, names[k], 4) != 0) continue;
+            length[k] = olat__be32(p + 8);
+            if (at > size || length[k] > size - at) return "damaged";
+            tag[k] = profile + at;
+        }
+    if (memcmp(profile + 20, "XYZ ", 4) != 0 || !tag[grey ? 6 : 5] || (!grey && (!tag[3] || !tag[4])))
+        return "of tables, without curves and a matrix";
+    for (int c = 0; c < 3; c++) {
+        const int k = grey ? 6 : c;
+        if (!tag[k] || !olat__icc_curve(tag[k], length[k], space->code + c)) return "damaged";
+        for (int i = 0; i < 3 && !grey; i++) {
+            if (length[3 + c] < 20 || memcmp(tag[3 + c], "XYZ ", 4) != 0) return "damaged";
+            xyz[3 * i + c] = olat__icc_number(tag[3 + c] + 8 + 4 * i);
+        }
+    }
+    const int primaries = grey ? 1 : olat__colorants(xyz, space->matrix);
+    space->differs = primaries == 2;
+    snprintf(space->source, sizeof space->source, "ICC profile");
+    return primaries ? NULL : "damaged";
+}
+
+/* Unpacks the profile and leaves it in png->packed, where curves point to. */
+static const char *olat__iccp_space(olat__png *png, olat__space *space) {
+    const size_t most = 1 << 24;
+    const unsigned char *name = png->told[OLAT__ICCP].data;
+    const size_t size = png->told[OLAT__ICCP].size;
+    const unsigned char *end = (const unsigned char *)memchr(name, 0, size < 80 ? size : 80);
+    const size_t before = end ? (size_t)(end - name) + 2 : 0;
+    if (!end || before > size || end[1]) return "damaged";
+    olat__inflater z;
+    memset(&z, 0, sizeof z);
+    z.in = name + before;
+    z.size = size - before;
+    z.capacity = z.size < most / 1032 ? 1032 * z.size + 1 : most; /* deflate packs no better */
+    z.may_be_less = 1;
+    z.out = png->packed = (unsigned char *)malloc(z.capacity);
+    if (!z.out) return "out of memory";
+    const char *problem = olat__inflate(&z);
+    return problem ? z.length == most ? "of more than 16 MiB" : "damaged"
+                   : olat__icc_space(z.out, z.length, space);
+}
+
+/* By the code points of ITU-T H.273. */
+static const char *olat__cicp_space(const olat__png *png, olat__space *space) {
+    static const struct {
+        int code;
+        double xy[8];
+    } known[10] = {{4, {0.67, 0.33, 0.21, 0.71, 0.14, 0.08, 0.31, 0.316}},
+                   {5, {0.64, 0.33, 0.29, 0.6, 0.15, 0.06, 0.3127, 0.329}},
+                   {6, {0.63, 0.34, 0.31, 0.595, 0.155, 0.07, 0.3127, 0.329}},
+                   {7, {0.63, 0.34, 0.31, 0.595, 0.155, 0.07, 0.3127, 0.329}},
+                   {8, {0.681, 0.319, 0.243, 0.692, 0.145, 0.049, 0.31, 0.316}},
+                   {9, {0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329}},
+                   {10, {1, 0, 0, 1, 0, 0, 1.0 / 3, 1.0 / 3}},
+                   {11, {0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.314, 0.351}},
+                   {12, {0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329}},
+                   {22, {0.63, 0.34, 0.295, 0.605, 0.155, 0.077, 0.3127, 0.329}}};
+    const unsigned char *p = png->told[OLAT__CICP].data;
+    const double alpha = 1.09929682680944, beta = 0.018053968510807; /* of BT.709 */
+    olat__code *code = space->code;
+    int i = 0;
+    snprintf(space->source, sizeof space->source, "cICP %d %d %d %d", p[0], p[1], p[2], p[3]);
+    while (i < 10 && known[i].code != p[0]) i++;
+    if (p[0] != 1 && i == 10) return "primaries that are not known";
+    if (i < 10) space->differs = olat__primaries(known[i].xy, space->matrix) == 2;
+    if (p[1] == 1 || p[1] == 6 || p[1] == 14 || p[1] == 15)
+        olat__power(code, 1 / 0.45, 1 / alpha, 1 - 1 / alpha, 1 / 4.5, 4.5 * beta);
+    else if (p[1] == 4 || p[1] == 5 || p[1] == 8)
+        olat__power(code, p[1] == 4 ? 2.2 : p[1] == 5 ? 2.8 : 1, 1, 0, 0, 0);
+    else if (p[1] == 16 || p[1] == 18) code->kind = p[1] == 16 ? OLAT__PQ : OLAT__HLG;
+    else if (p[1] != 13) return "a curve that is not known";
+    code[1] = code[2] = code[0];
+    space->high = code->kind != OLAT__POWER;
+    space->narrow = !p[3];
+    return NULL;
+}
+
+/* What the PNG's chunks say; the later ones in this list know more. */
+static int olat__png_space(const char *name, olat__png *png, olat__space *space, olat__found *found,
+                           char *error) {
+    static const struct {
+        int kind, other;
+        const char *name;
+    } chunks[4] = {{OLAT__GAMA, OLAT__CHRM, "gAMA or cHRM"},
+                   {OLAT__SRGB, OLAT__SRGB, "sRGB"},
+                   {OLAT__ICCP, OLAT__ICCP, "an ICC profile"},
+                   {OLAT__CICP, OLAT__CICP, "cICP"}};
+    const unsigned char *cicp = png->told[OLAT__CICP].data;
+    olat__srgb_space(space);
+    if (cicp && cicp[2])
+        return olat__fail(error,
+                          "%s: cICP: matrix coefficients %d: a PNG holds red, green and blue, which is 0: "
+                          "convert the picture to RGB, or drop the chunk where it is RGB already",
+                          olat__tail(name), cicp[2]);
+    for (int i = 0; i < 4; i++) {
+        const int kind = chunks[i].kind, other = chunks[i].other;
+        const int told = png->told[kind].data || png->told[other].data;
+        const char *problem = NULL;
+        olat__space next;
+        olat__srgb_space(&next);
+        if (!told && !png->damaged[kind] && !png->damaged[other]) continue;
+        if (told && kind == OLAT__GAMA) problem = olat__gama_space(png, &next);
+        else if (told && kind == OLAT__SRGB) snprintf(next.source, sizeof next.source, "sRGB");
+        else if (told && kind == OLAT__ICCP) problem = olat__iccp_space(png, &next);
+        else if (told) problem = olat__cicp_space(png, &next);
+        else problem = "damaged";
+        if (problem && !strcmp(problem, "out of memory"))
+            return olat__fail(error, "%s: out of memory", olat__tail(name));
+        if (problem) {
+            olat__tell(found, OLAT__NAMED,
+                       "marked with %s that cannot be used (%s): read without; export as sRGB, or with a "
+                       "profile of a matrix and curves",
+                       chunks[i].name, problem);
+            continue;
+        }
+        if (*space->source && *next.source && olat__space_distance(space, &next) > 0.05)
+            olat__tell(found, OLAT__NAMED, "marked in two ways that contradict (%s; %s): the latter is taken",
+                       space->source, next.source);
+        *space = next;
+    }
+    return 0;
+}
+
+/* Brings colours to the sRGB curve in 16 bits, or to light in halves where some may be brighter than white;
+   alpha stays. */
+static int olat__png_convert(olat__png *png, const olat__space *space, olat__found *found) {
+    const size_t pixels = (size_t)png->width * (size_t)png->height;
+    const int wide = png->format == SSDGS_PIXELS_RGBA16, plain = !space->differs && !space->high;
+    const unsigned top = wide ? 65535 : 255;
+    const double black = space->narrow ? wide ? 16 * 256 : 16 : 0,
+                 range = space->narrow ? wide ? 219 * 256 : 219 : top;
+    uint16_t *out = (uint16_t *)malloc(4 * pixels * sizeof *out);
+    double *table = (double *)malloc(3 * ((size_t)top + 1) * sizeof *table);
+    size_t outside = 0;
+    if (!out || !table) {
+        free(out), free(table);
+        return 1;
+    }
+    for (size_t i = 0; i < 3 * ((size_t)top + 1); i++) {
+        const double v = ((double)(i % (top + 1)) - black) / range;
+        table[i] = olat__light(space->code + i / (top + 1), v < 0 ? 0 : v > 1 ? 1 : v);
+        if (plain) table[i] = 65535 * olat__to_srgb(table[i]) + 0.5;
+    }
+    for (size_t i = 0; i < pixels; i++) {
+        const unsigned alpha = olat__sample(png->out, png->format, 4 * i + 3);
+        double stored[3], v[3];
+        int odd = 0;
+        for (size_t c = 0; c < 3; c++)
+            stored[c] = table[c * (top + 1) + olat__sample(png->out, png->format, 4 * i + c)];
+        olat__transform(space->matrix, stored, v);
+        for (size_t c = 0; c < 3; c++) {
+            if (!plain) {
+                odd |= v[c] < -1e-3 || (v[c] > 1 + 1e-3 && !space->high);
+                v[c] = v[c] < 0 ? 0 : v[c] > 1 && !space->high ? 1 : v[c];
+                if (!space->high) v[c] = 65535 * olat__to_srgb(v[c]) + 0.5;
+            }
+            out[4 * i + c] = space->high ? olat__to_half((float)v[c]) : (uint16_t)v[c];
+        }
+        out[4 * i + 3] =
+            space->high ? olat__to_half((float)alpha / (float)top) : (uint16_t)(alpha * (65535 / top));
+        outside += odd && alpha;
+    }
+    if (outside > pixels / 1000)
+        olat__tell(found, OLAT__NAMED,
+                   "of colours that sRGB does not hold, in more than 0.1 %% of the pixels: "
+                   "these are clamped");
+    free(table);
+    free(png->out);
+    png->out = (unsigned char *)out;
+    png->format = space->high ? SSDGS_PIXELS_RGBA16F : SSDGS_PIXELS_RGBA16;
+    return 0;
+}
+
+/* The orientation that an eXIf chunk tells, 1 if none. */
+static int olat__exif_orientation(const unsigned char *p, size_t size) {
+    if (size < 8 || (memcmp(p, "II*\0", 4) != 0 && memcmp(p, "MM\0*", 4) != 0)) return 1;
+    const int high = p[0] == 'I', low = !high; /* where a word has which byte */
+    const uint32_t big = olat__be32(p + 4), at = high ? olat__le32(p + 4) : big;
+    if (at > size - 2) return 1;
+    const int count = p[at + (uint32_t)low] | p[at + (uint32_t)high] << 8;
+    for (size_t i = 0; i < (size_t)count && i < (size - 2 - at) / 12; i++) {
+        const unsigned char *entry = p + at + 2 + 12 * i;
+        if ((entry[low] | entry[high] << 8) == 0x112) return entry[8 + low] | entry[8 + high] << 8;
+    }
+    return 1;
+}
+
+/* Makes a decoded PNG's pixels those of a photograph. */
+static int olat__png_photo(const char *name, olat__png *png, olat__found *found, char *error) {
+    static const char *const what[4] = {"converted to sRGB", "converted to the sRGB curve",
+                                        "read as light, of which 203 nits are 1",
+                                        "read as the scene's light, of which 75 % of the signal are 1"};
+    const unsigned char *exif = png->told[OLAT__EXIF].data, *phys = png->told[OLAT__PHYS].data;
+    const int turned = exif ? olat__exif_orientation(exif, png->told[OLAT__EXIF].size) : 1;
+    olat__space space, srgb;
+    png->packed = NULL;
+    olat__srgb_space(&srgb);
+    int failed = olat__png_space(name, png, &space, found, error), linear = 1;
+    if (!failed && (space.differs || olat__space_distance(&space, &srgb) > 0.002)) {
+        for (int c = 0; c < 3; c++) linear &= fabs(olat__light(space.code + c, 0.5) - 0.5) < 2e-3;
+        olat__tell(found, 0, "%s (%s): %s",
+                   linear       ? "linear"
+                   : space.high ? "HDR"
+                                : "not sRGB",
+                   space.source, what[space.high ? 1 + space.code->kind - OLAT__TABLE : !space.differs]);
+        failed =
+            olat__png_convert(png, &space, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
+    }
+    free(png->packed);
+    if (turned > 1 && turned < 9)
+        olat__tell(
+            found, OLAT__NAMED,
+            "to be turned or mirrored for viewing (eXIf orientation %d): read as stored, and poses must "
+            "be of that",
+            turned);
+    if (phys) {
+        const double x = olat__be32(phys), y = olat__be32(phys + 4);
+        if (x > 0 && y > 0 && fabs(x / y - 1) > 0.01)
+            olat__tell(
+                found, OLAT__NAMED,
+                "of pixels that are not square (pHYs %g x %g): read as stored, and fl_x and fl_y must be "
+                "of that",
+                x, y);
+    }
+    return failed;
+}
+
+/* Reads a PNG or OpenEXR, as a photograph or as a mask. */
+static int olat__image_file(const char *path, int is_mask, int *width, int *height, ssdgs_pixels *format,
+                            void **pixels, olat__found *found, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
     *pixels = NULL;
-    *gamma = 0;
     int failed = olat__read_file(path, &bytes, &size, error);
     if (!failed && size >= 4 && olat__le32(bytes) == OLAT__EXR_MAGIC)
-        failed = olat__exr_decode(path, bytes, size, width, height, format, pixels, broken, error);
-    else if (!failed)
-        failed = olat__png_decode(path, bytes, size, width, height, format, pixels, gamma, error);
+        failed = olat__exr_decode(path, bytes, size, width, height, format, pixels, &found->broken, error);
+    else if (!failed) {
+        olat__png png;
+        memset(&png, 0, sizeof png);
+        png.is_mask = is_mask;
+        failed = olat__png_decode(path, bytes, size, &png, error);
+        if (!failed && !is_mask) failed = olat__png_photo(path, &png, found, error);
+        if (png.labels)
+            olat__tell(found, OLAT__OF_MASK, "of labels, by a palette of colours: all but index 0 is kept");
+        *width = png.width;
+        *height = png.height;
+        *format = png.format;
+        *pixels = png.out;
+    }
     free(bytes);
     return failed;
 }
@@ -2133,72 +2567,55 @@ static void olat__read_paths(olat__json *j, const olat__node *node, const char *
     if (of_mask && of_mask->type != OLAT__NULL) *mask = olat__join(j, folder, of_mask, NULL, 0, flags);
 }
 
-/* Whether numbers are light, not stored values. */
-static int olat__is_light(ssdgs_pixels format) {
-    return format == SSDGS_PIXELS_RGBA16F || format == SSDGS_PIXELS_RGBA32F;
-}
-
-/* A number of a photograph of bytes or words. */
-static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
-    return format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)pixels)[i] : ((const unsigned char *)pixels)[i];
-}
-
-/* Of any, bytes and words from 0 to 1. */
-static ssdgs_real olat__number(const void *pixels, ssdgs_pixels format, size_t i) {
-    const ssdgs_real unit =
-        format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
-    if (format == SSDGS_PIXELS_RGBA32F) return (ssdgs_real)((const float *)pixels)[i];
-    if (format == SSDGS_PIXELS_RGBA16F) return (ssdgs_real)olat__from_half(((const uint16_t *)pixels)[i]);
-    return unit * (ssdgs_real)olat__sample(pixels, format, i);
-}
-
-/* Brings colours that are light to the power of gamma / 100000 to the sRGB curve, in 16 bits; alpha stays. */
-static int olat__to_srgb(olat_frame *frame, uint32_t gamma, char *error) {
-    const size_t count = 4 * (size_t)frame->camera.width * (size_t)frame->camera.height;
-    const unsigned top = frame->format == SSDGS_PIXELS_RGBA16 ? 65535 : 255;
-    uint16_t *out = (uint16_t *)malloc(count * sizeof *out),
-             *curve = (uint16_t *)malloc((top + 1) * sizeof *curve);
-    const int failed = !out || !curve;
-    for (size_t i = 0; !failed && i <= top; i++) {
-        const double light = pow((double)i / top, 1e5 / gamma);
-        curve[i] =
-            (uint16_t)(65535 * (light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055) +
-                       0.5);
-    }
-    for (size_t i = 0; !failed && i < count; i++) {
-        const unsigned value = olat__sample(frame->pixels, frame->format, i);
-        out[i] = i % 4 == 3 ? (uint16_t)(value * (65535 / top)) : curve[value];
-    }
-    free(curve);
-    free(failed ? (void *)out : frame->pixels);
-    if (failed) return olat__fail(error, "%s: out of memory", olat__tail(frame->file));
-    frame->pixels = out;
-    frame->format = SSDGS_PIXELS_RGBA16;
-    return 0;
-}
-
-/* Multiplies the photograph's alpha by its mask: white keeps, black leaves nothing. */
-static int olat__apply_mask(olat_frame *frame, char *error) {
-    int width, height, failed = 0;
+/* Multiplies the photograph's alpha by its mask: by alpha where that varies, else by brightness. white: what
+   keeps all, of 1; 0 where that is not known yet: then masks without anything bright wait. */
+static int olat__apply_mask(olat_frame *frame, double white, olat__found *found, char *error) {
+    const int w = frame->camera.width, h = frame->camera.height;
+    const size_t pixels = (size_t)w * (size_t)h;
+    const unsigned long broken = found->broken;
+    const int told = found->count;
+    int width, height, varies = 0;
     ssdgs_pixels format;
     char problem[512];
     void *mask;
-    if (olat_read_png(frame->mask, &width, &height, &format, &mask, problem)) {
+    if (olat__image_file(frame->mask, 1, &width, &height, &format, &mask, found, problem)) {
         return olat__fail(error, "mask_path: %s", problem);
     }
-    if (width != frame->camera.width || height != frame->camera.height) {
-        failed = olat__fail(
-            error, "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
-            olat__tail(frame->mask), width, height, frame->camera.width, frame->camera.height);
+    if (width != w || height != h) {
+        free(mask);
+        return olat__fail(error,
+                          "%s: the mask has %d x %d pixels, its photograph %d x %d: make them the same size",
+                          olat__tail(frame->mask), width, height, w, h);
     }
-    for (size_t i = 0; !failed && i < (size_t)width * (size_t)height; i++) {
-        const uint64_t top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255, one = top * top;
-        uint64_t value = 0;
-        for (uint64_t c = 0; c < 3; c++) {
-            const unsigned v = olat__sample(mask, format, 4 * i + (size_t)c);
-            if (v > value) value = v;
+    const unsigned top = format == SSDGS_PIXELS_RGBA8 ? 255 : 65535;
+    uint32_t *values = (uint32_t *)malloc(pixels * sizeof *values), largest = 0;
+    if (!values) {
+        free(mask);
+        return olat__fail(error, "%s: out of memory", olat__tail(frame->mask));
+    }
+    for (size_t i = 0; i < pixels; i++)
+        varies |= olat__mask_sample(mask, format, 4 * i + 3) != olat__mask_sample(mask, format, 3);
+    for (size_t i = 0; i < pixels; i++) {
+        values[i] = varies ? top : 0;
+        for (size_t c = 0; c < 3 && !varies; c++) {
+            const unsigned v = olat__mask_sample(mask, format, 4 * i + c);
+            if (v > values[i]) values[i] = v;
         }
-        value *= olat__sample(mask, format, 4 * i + 3);
+        values[i] *= olat__mask_sample(mask, format, 4 * i + 3);
+        if (values[i] > largest) largest = values[i];
+    }
+    free(mask);
+    uint64_t one = (uint64_t)top * top, smallest = one;
+    found->largest = (double)largest / (double)one;
+    found->waits = !(white > 0) && found->largest <= 0.6;
+    if (white > 0) one = (uint64_t)(white * (double)one + 0.5);
+    double border = 0, middle = 0, of_border = 0, of_middle = 0;
+    for (size_t i = 0; i < pixels && !found->waits; i++) {
+        const int x = (int)(i % (size_t)w), y = (int)(i / (size_t)w);
+        const uint64_t value = values[i] < one ? values[i] : one;
+        if (value < smallest) smallest = value;
+        if (x == 0 || y == 0 || x == w - 1 || y == h - 1) border += (double)value, of_border++;
+        if (x >= w / 3 && x < w - w / 3 && y >= h / 3 && y < h - h / 3) middle += (double)value, of_middle++;
         if (olat__is_light(frame->format)) {
             const float alpha =
                 (float)olat__number(frame->pixels, frame->format, 4 * i + 3) * (float)value / (float)one;
@@ -2206,22 +2623,34 @@ static int olat__apply_mask(olat_frame *frame, char *error) {
             else ((uint16_t *)frame->pixels)[4 * i + 3] = olat__to_half(alpha);
             continue;
         }
-        value = (olat__sample(frame->pixels, frame->format, 4 * i + 3) * value + one / 2) / one;
-        if (frame->format == SSDGS_PIXELS_RGBA16) ((uint16_t *)frame->pixels)[4 * i + 3] = (uint16_t)value;
-        else ((unsigned char *)frame->pixels)[4 * i + 3] = (unsigned char)value;
+        const uint64_t alpha =
+            (olat__sample(frame->pixels, frame->format, 4 * i + 3) * value + one / 2) / one;
+        if (frame->format == SSDGS_PIXELS_RGBA16) ((uint16_t *)frame->pixels)[4 * i + 3] = (uint16_t)alpha;
+        else ((unsigned char *)frame->pixels)[4 * i + 3] = (unsigned char)alpha;
     }
-    free(mask);
-    return failed;
+    free(values);
+    if (found->waits) { /* what there is to say is said then */
+        found->broken = broken;
+        found->count = told;
+        return 0;
+    }
+    found->inverted = border > 0.9 * of_border * (double)one && middle < 0.7 * of_middle * (double)one;
+    if (!largest) olat__tell(found, OLAT__OF_MASK | OLAT__NAMED, "black everywhere: nothing is kept");
+    else if (smallest == one) olat__tell(found, OLAT__OF_MASK | OLAT__NAMED, "white everywhere: all is kept");
+    else if (found->largest <= 0.6 && !(white < 1))
+        olat__tell(found, OLAT__OF_MASK | OLAT__NAMED,
+                   "of no more than 0.6 of white, where others have more: used as stored");
+    return 0;
 }
 
-/* The frame's photograph as training takes it; gamma: what its file had, 0 = like sRGB. Adds to broken the
-   values that are not finite. */
-static int olat__read_photo(olat_frame *frame, uint32_t *gamma, unsigned long *broken, char *error) {
+/* The frame's photograph as training takes it. */
+static int olat__read_photo(olat_frame *frame, olat__found *found, char *error) {
     ssdgs_camera *camera = &frame->camera;
+    memset(found, 0, sizeof *found);
     frame->has_image = 1;
-    return olat__image_file(frame->file, &camera->width, &camera->height, &frame->format, &frame->pixels,
-                            gamma, broken, error) ||
-           (*gamma && olat__to_srgb(frame, *gamma, error)) || (frame->mask && olat__apply_mask(frame, error));
+    return olat__image_file(frame->file, 0, &camera->width, &camera->height, &frame->format, &frame->pixels,
+                            found, error) ||
+           (frame->mask && olat__apply_mask(frame, 0, found, error));
 }
 
 /* Adds a line to the notes. */
@@ -2240,62 +2669,130 @@ static int olat__side(double middle) {
 }
 
 /* Photographs being read, on any threads. */
-typedef struct olat__found {
-    uint32_t gamma;
-    unsigned long broken;
-    int failed;
-} olat__found;
 typedef struct olat__reading {
     olat_frame *frames; /* those at hand */
     olat__found *found; /* what was found in each */
+    char *waits;        /* of all: its mask waits until all have been seen */
+    double white;       /* then what keeps all, of 1; before 0 */
 } olat__reading;
+
+/* What all photographs have in common. */
+typedef struct olat__tally {
+    olat__remark remark;
+    int count, first[3]; /* how many, frames */
+} olat__tally;
+enum { OLAT__TALLIES = 12 };
+typedef struct olat__seen {
+    olat__tally tallies[OLAT__TALLIES];
+    int count, masks, inverted;
+    unsigned long broken;
+    double largest; /* of all masks, of 1 */
+} olat__seen;
+
+static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
+    for (int i = 0; i < found->count; i++) {
+        const olat__remark *remark = found->remarks + i;
+        int k = 0;
+        while (k < seen->count && strcmp(seen->tallies[k].remark.text, remark->text) != 0) k++;
+        if (k == OLAT__TALLIES) continue;
+        olat__tally *tally = seen->tallies + k;
+        if (k == seen->count) seen->count++, tally->remark = *remark;
+        if (tally->count < 3) tally->first[tally->count] = frame;
+        tally->count++;
+    }
+    seen->inverted += found->inverted;
+    seen->broken += found->broken;
+    if (found->largest > seen->largest) seen->largest = found->largest;
+}
+
+static int olat__read_one(const olat__reading *r, int i, char *error) {
+    if (!(r->white > 0)) return olat__read_photo(r->frames + i, r->found + i, error);
+    memset(r->found + i, 0, sizeof *r->found);
+    return olat__apply_mask(r->frames + i, r->white, r->found + i, error);
+}
 
 static void olat__read_task(void *data, int i) {
     const olat__reading *r = (const olat__reading *)data;
     char error[512]; /* what is wrong is told when the frame's turn comes: it is read once more then */
-    r->found[i].failed = olat__read_photo(r->frames + i, &r->found[i].gamma, &r->found[i].broken, error);
+    if (!(r->white > 0) || r->waits[i]) r->found[i].failed = olat__read_one(r, i, error);
 }
 
-/* Reads all photographs and counts what is to be noted of them. */
-static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dataset *out) {
+/* Reads all photographs, or applies the masks that wait. */
+static void olat__read_all(olat__json *j, const olat_reader *reader, olat_dataset *out, olat__reading *r,
+                           olat__seen *seen) {
     const int most = reader ? 16 + 4 * ssdgs_context_threads(reader->context) : 1; /* at a time */
-    int masked = 0, curved = 0;
-    uint32_t first_gamma = 0;
-    unsigned long broken = 0;
-    olat__reading r;
-    r.found = (olat__found *)calloc((size_t)most, sizeof *r.found);
-    if (!r.found) j->failed = olat__fail(j->error, "out of memory");
+    char *const waits = r->waits;
     for (int begin = 0; begin < out->count && !j->failed; begin += most) {
         const int count = begin + most < out->count ? most : out->count - begin;
-        r.frames = out->frames + begin;
-        memset(r.found, 0, (size_t)most * sizeof *r.found);
-        if (reader && ssdgs_context_run(reader->context, count, olat__read_task, &r))
+        r->frames = out->frames + begin;
+        r->waits = waits + begin;
+        memset(r->found, 0, (size_t)most * sizeof *r->found);
+        if (reader && ssdgs_context_run(reader->context, count, olat__read_task, r))
             j->failed = olat__fail(j->error, "%s", ssdgs_error_message(reader->context));
         for (int i = 0; i < count && !j->failed; i++) {
-            olat_frame *frame = r.frames + i;
-            uint32_t gamma = r.found[i].gamma;
-            if (!reader || r.found[i].failed) {
-                free(frame->pixels);
-                frame->pixels = NULL;
-                r.found[i].broken = 0;
-                j->failed = olat__read_photo(frame, &gamma, &r.found[i].broken, j->error);
+            if (r->white > 0 && !r->waits[i]) continue;
+            if (!reader || r->found[i].failed) {
+                if (!(r->white > 0)) {
+                    free(r->frames[i].pixels);
+                    r->frames[i].pixels = NULL;
+                }
+                j->failed = olat__read_one(r, i, j->error);
             }
-            masked += frame->mask != NULL;
-            curved += gamma != 0;
-            if (!first_gamma) first_gamma = gamma;
-            broken += r.found[i].broken;
+            r->waits[i] = (char)r->found[i].waits;
+            olat__see(seen, r->found + i, begin + i);
         }
-        if (reader && reader->progress && !j->failed)
+        if (reader && reader->progress && !j->failed && !(r->white > 0))
             reader->progress(reader->user, begin + count, out->count);
     }
-    free(r.found);
-    if (masked) olat__note(out, "masks of %d of the %d photographs are used", masked, out->count);
-    if (curved) {
-        olat__note(out, "%d of the %d photographs %s %s (gAMA %g): converted to the sRGB curve", curved,
-                   out->count, curved == 1 ? "is" : "are", first_gamma == 100000 ? "linear" : "not sRGB",
-                   first_gamma / 1e5);
+    r->waits = waits;
+}
+
+static void olat__note_tally(olat_dataset *out, const olat__tally *tally, int masks) {
+    const int of_mask = tally->remark.flags & OLAT__OF_MASK;
+    char names[3 * 64] = "";
+    for (int i = 0; i < 3 && i < tally->count && (tally->remark.flags & OLAT__NAMED); i++) {
+        const olat_frame *frame = out->frames + tally->first[i];
+        const char *name = of_mask ? frame->mask : frame->file;
+        const size_t length = strlen(name), used = strlen(names);
+        snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : ": ",
+                 name + (length > 60 ? length - 60 : 0));
     }
-    if (broken) olat__note(out, "%lu values in the photographs are not finite: taken as 0", broken);
+    olat__note(out, "%d of the %d %s %s %s%s%s", tally->count, of_mask ? masks : out->count,
+               of_mask ? "masks" : "photographs", tally->count == 1 ? "is" : "are", tally->remark.text, names,
+               *names && tally->count > 3 ? ", ..." : "");
+}
+
+/* Reads all photographs and notes what is to be noted of them. A mask without anything bright is right where
+   others are brighter; where none is, all are scaled alike: so a dim one among soft masks stays dim. */
+static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dataset *out) {
+    const int most = reader ? 16 + 4 * ssdgs_context_threads(reader->context) : 1;
+    olat__reading r;
+    olat__seen seen;
+    memset(&seen, 0, sizeof seen);
+    memset(&r, 0, sizeof r);
+    r.found = (olat__found *)calloc((size_t)most, sizeof *r.found);
+    r.waits = (char *)calloc((size_t)out->count, 1);
+    if (!r.found || !r.waits) j->failed = olat__fail(j->error, "out of memory");
+    for (int i = 0; i < out->count; i++) seen.masks += out->frames[i].mask != NULL;
+    olat__read_all(j, reader, out, &r, &seen);
+    const int dim = seen.largest > 0 && seen.largest <= 0.6;
+    r.white = dim ? seen.largest : 1;
+    if (seen.masks) olat__read_all(j, reader, out, &r, &seen);
+    free(r.found);
+    free(r.waits);
+    if (seen.masks) olat__note(out, "masks of %d of the %d photographs are used", seen.masks, out->count);
+    if (seen.masks && dim)
+        olat__note(out,
+                   "no mask is brighter than %.4g of 255: all are scaled, so that this keeps all and half of "
+                   "it half",
+                   255 * seen.largest);
+    if (2 * seen.inverted > seen.masks)
+        olat__note(out,
+                   "%d of the %d masks keep the border and drop the middle: white is kept, so invert them if"
+                   " that is wrong",
+                   seen.inverted, seen.masks);
+    for (int i = 0; i < seen.count; i++) olat__note_tally(out, seen.tallies + i, seen.masks);
+    if (seen.broken) olat__note(out, "%lu values in the photographs are not finite: taken as 0", seen.broken);
 }
 
 static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin,
