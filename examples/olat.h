@@ -1434,13 +1434,6 @@ static ssdgs_real olat__number(const void *pixels, ssdgs_pixels format, size_t i
     return unit * (ssdgs_real)olat__sample(pixels, format, i);
 }
 
-/* A number of a mask, words for light. */
-static unsigned olat__mask_sample(const void *mask, ssdgs_pixels format, size_t i) {
-    if (!olat__is_light(format)) return olat__sample(mask, format, i);
-    const ssdgs_real v = olat__number(mask, format, i);
-    return (unsigned)(65535 * (v < 1 ? v : 1) + (ssdgs_real)0.5);
-}
-
 /* How a number from 0 to 1 stands for light. */
 enum { OLAT__POWER, OLAT__TABLE, OLAT__PQ, OLAT__HLG };
 typedef struct olat__code {
@@ -2567,6 +2560,13 @@ static void olat__read_paths(olat__json *j, const olat__node *node, const char *
     if (of_mask && of_mask->type != OLAT__NULL) *mask = olat__join(j, folder, of_mask, NULL, 0, flags);
 }
 
+/* A number of a mask, words for light. */
+static unsigned olat__mask_sample(const void *mask, ssdgs_pixels format, size_t i) {
+    if (!olat__is_light(format)) return olat__sample(mask, format, i);
+    const ssdgs_real v = olat__number(mask, format, i);
+    return (unsigned)(65535 * (v < 1 ? v : 1) + (ssdgs_real)0.5);
+}
+
 /* Multiplies the photograph's alpha by its mask: by alpha where that varies, else by brightness. white: what
    keeps all, of 1; 0 where that is not known yet: then masks without anything bright wait. */
 static int olat__apply_mask(olat_frame *frame, double white, olat__found *found, char *error) {
@@ -2788,8 +2788,8 @@ static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dat
                    255 * seen.largest);
     if (2 * seen.inverted > seen.masks)
         olat__note(out,
-                   "%d of the %d masks keep the border and drop the middle: white is kept, so invert them if"
-                   " that is wrong",
+                   "the border is white and the middle black in %d of the %d masks: white is kept, so invert "
+                   "them if that is wrong",
                    seen.inverted, seen.masks);
     for (int i = 0; i < seen.count; i++) olat__note_tally(out, seen.tallies + i, seen.masks);
     if (seen.broken) olat__note(out, "%lu values in the photographs are not finite: taken as 0", seen.broken);

@@ -1475,6 +1475,372 @@ static void test_units(void) {
     }
 }
 
+/* ---- how the numbers of a PNG stand for light ---- */
+
+static size_t store(const unsigned char *data, size_t size, unsigned char *packed) {
+    const unsigned char head[7] = {0x78,
+                                   1,
+                                   1,
+                                   (unsigned char)(size & 255),
+                                   (unsigned char)(size >> 8),
+                                   (unsigned char)(~size & 255),
+                                   (unsigned char)(~size >> 8 & 255)};
+    memcpy(packed, head, 7);
+    memcpy(packed + 7, data, size);
+    olat__put_be32(packed + 7 + size, olat__adler32(data, size));
+    return size + 11;
+}
+
+static void put_data(const unsigned char *raw, size_t size) {
+    static unsigned char packed[4096];
+    put_chunk("IDAT", packed, store(raw, size, packed));
+    put_chunk("IEND", NULL, 0);
+}
+
+/* Two pixels of 16 bits, RGBA: a colour and white, not opaque. */
+static void put_two(void) {
+    static const unsigned short v[8] = {40000, 30000, 20000, 30000, 65535, 65535, 65535, 65535};
+    unsigned char raw[17] = {0};
+    for (int i = 0; i < 16; i++) raw[1 + i] = (unsigned char)(v[i / 2] >> (i % 2 ? 0 : 8) & 255);
+    put_header(2, 1, 16, 6, 0);
+    put_data(raw, sizeof raw);
+}
+
+/* ---- an ICC profile ---- */
+
+enum { TAGS = 12, HEAD = 132 + 12 * TAGS };
+static unsigned char profile[8192];
+static size_t profile_size;
+static int profile_tags;
+
+static void put_tag(const char *name, const unsigned char *data, size_t size) {
+    unsigned char *entry = profile + 132 + 12 * profile_tags++;
+    memcpy(entry, name, 4);
+    olat__put_be32(entry + 4, (uint32_t)profile_size), olat__put_be32(entry + 8, (uint32_t)size);
+    memcpy(profile + profile_size, data, size);
+    profile_size += (size + 3) / 4 * 4;
+    olat__put_be32(profile, (uint32_t)profile_size), olat__put_be32(profile + 128, (uint32_t)profile_tags);
+}
+
+static void put_fixed(unsigned char *p, double value) {
+    olat__put_be32(p, (uint32_t)(int32_t)floor(value * 65536 + 0.5));
+}
+
+enum { SRGB_D50, ADOBE_D50, GREY, LUT, CMYK, NO_COLORS };
+
+/* kind: a function of `para` by v, -1 an empty `curv`, -2 one entry, v[0], -3 five entries. */
+static void make_profile(int colors, int kind, const double *v) {
+    static const double xyz[2][9] = {
+        {0.43607, 0.22249, 0.01392, 0.38515, 0.71687, 0.09708, 0.14307, 0.06061, 0.7141},
+        {0.60974, 0.31111, 0.01947, 0.20528, 0.62567, 0.06087, 0.14919, 0.06322, 0.74457}};
+    static const char *const names[7] = {"rXYZ", "gXYZ", "bXYZ", "rTRC", "gTRC", "bTRC", "kTRC"};
+    static const unsigned char counts[5] = {1, 3, 4, 5, 7};
+    static const unsigned short table[5] = {0, 3000, 9000, 30000, 65535};
+    unsigned char tag[64];
+    memset(profile, 0, sizeof profile);
+    profile_size = HEAD, profile_tags = 0;
+    profile[8] = 4;
+    memcpy(profile + 12,
+           colors == CMYK   ? "prtrCMYKLab "
+           : colors == GREY ? "mntrGRAYXYZ "
+                            : "mntrRGB XYZ ",
+           12);
+    if (colors == LUT) memcpy(profile + 20, "Lab ", 4);
+    memcpy(profile + 36, "acsp", 4);
+    put_tag("desc", (const unsigned char *)"mluc\0\0\0\0\0\0\0\0\0\0\0\014", 16);
+    if (colors >= LUT) {
+        put_tag("A2B0", (const unsigned char *)"mft2\0\0\0\0\3\3\2\0", 12);
+        return;
+    }
+    for (int c = 0; c < 3 && colors < GREY; c++) {
+        memcpy(tag, "XYZ \0\0\0\0", 8);
+        for (int i = 0; i < 3; i++) put_fixed(tag + 8 + 4 * i, xyz[colors][3 * c + i]);
+        put_tag(names[c], tag, 20);
+    }
+    size_t size = 12;
+    memset(tag, 0, sizeof tag);
+    memcpy(tag, kind < 0 ? "curv" : "para", 4);
+    if (kind < 0) olat__put_be32(tag + 8, kind == -1 ? 0 : kind == -2 ? 1 : 5);
+    else tag[9] = (unsigned char)kind;
+    for (int i = 0; kind >= 0 && i < counts[kind]; i++, size += 4) put_fixed(tag + 12 + 4 * i, v[i]);
+    if (kind == -2) tag[12] = (unsigned char)v[0], tag[13] = (unsigned char)(v[0] * 256), size += 2;
+    for (int i = 0; kind == -3 && i < 5; i++, size += 2)
+        tag[12 + 2 * i] = (unsigned char)(table[i] >> 8), tag[13 + 2 * i] = (unsigned char)(table[i] & 255);
+    if (colors == GREY) put_tag("kTRC", tag, size);
+    for (int c = 3; c < 6 && colors < GREY; c++) put_tag(names[c], tag, size);
+}
+
+/* Puts it into the file. */
+static void insert_profile(void) {
+    static unsigned char chunk[9000] = "p\0";
+    const size_t size = store(profile, profile_size, chunk + 3);
+    insert_chunk(33, "iCCP", chunk, 3 + size, 0);
+}
+
+/* Is the file loaded as this light and alpha, and with no note but that? */
+static int light_is(const double *want, ssdgs_pixels format, const char *note) {
+    int wrong = 0;
+    write_bytes(FOLDER "/g.png");
+    char text[1200];
+    snprintf(text, sizeof text, PHOTO, "");
+    if (!loads(text, 0)) return 0;
+    wrong |= set.frames->format != format || strcmp(set.notes, note) != 0;
+    for (size_t i = 0; i < 8 && !wrong; i++) {
+        double got = (double)olat__number(set.frames->pixels, format, i);
+        if (i % 4 < 3 && format != SSDGS_PIXELS_RGBA16F) got = (double)ssdgs_srgb_decode((ssdgs_real)got);
+        wrong |= !(fabs(got - want[i]) < (format == SSDGS_PIXELS_RGBA16F ? 6e-4 * (1 + want[i]) : 5e-5));
+        if (wrong) printf("%d: %f, not %f\n", (int)i, got, want[i]);
+    }
+    if (wrong) printf("\"%s\", not \"%s\"\n", set.notes, note);
+    olat_free(&set);
+    return !wrong && live == 0;
+}
+
+#define NOTE_ICC(what, to) "1 of the 1 photographs is " what " (ICC profile): converted to " to
+#define LINEAR NOTE_ICC("linear", "the sRGB curve")
+#define CURVED NOTE_ICC("not sRGB", "the sRGB curve")
+
+/* Light as an independent program has it for 40000, 30000, 20000 of 65535, and for white. */
+static void test_profiles(void) {
+    static const double srgb[7] = {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045, 0, 0};
+    static const struct {
+        int colors, kind;
+        double v[7], want[3], white;
+        const char *note;
+    } cases[] = {
+        {SRGB_D50, -1, {0}, {0.610361, 0.457771, 0.30518}, 1, LINEAR},
+        {SRGB_D50, -2, {1}, {0.610361, 0.457771, 0.30518}, 1, LINEAR},
+        {SRGB_D50, 0, {1}, {0.610361, 0.457771, 0.30518}, 1, LINEAR},
+        {SRGB_D50, 0, {2.2}, {0.337513, 0.179236, 0.073456}, 1, CURVED},
+        {ADOBE_D50, -2, {2.19921875}, {0.400708, 0.179342, 0.068983}, 1, NOTE_ICC("not sRGB", "sRGB")},
+        {SRGB_D50, -3, {0}, {0.278787, 0.121866, 0.065985}, 1, CURVED},
+        {SRGB_D50, 1, {2, 1.25, -0.25}, {0.263119, 0.103821, 0.017286}, 1, CURVED},
+        {SRGB_D50, 2, {2, 0.8, 0.1, 0.15}, {0.496084, 0.367358, 0.268435}, 0.96, CURVED},
+        {SRGB_D50, 4, {2, 0.9, 0.05, 0.5, 0.35, 0.02, 0.03}, {0.37919, 0.233438, 0.18259}, 0.9225, CURVED},
+        {GREY, 0, {1.8}, {0.411203, 0.245, 0.118087}, 1, CURVED},
+        {GREY, -1, {0}, {0.610361, 0.457771, 0.30518}, 1, LINEAR}};
+    static const struct {
+        int colors;
+        const char *note;
+    } bad[] = {{LUT, "an ICC profile that cannot be used (of tables, without curves and a matrix)"},
+               {NO_COLORS, "an ICC profile that cannot be used (of tables, without curves and a matrix)"},
+               {CMYK, "an ICC profile that cannot be used (of another kind of colours than RGB)"}};
+    static const picture kinds[3] = {{9, 7, 6, 8, 0, 0}, {9, 7, 6, 16, 0, 0}, {9, 7, 3, 8, 0, 1}};
+    static const unsigned char linear[4] = {0, 1, 0x86, 0xA0};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const double *w = cases[i].want, white = cases[i].white,
+                     want[8] = {w[0], w[1], w[2], 30000 / 65535.0, white, white, white, 1};
+        make_profile(cases[i].colors, cases[i].kind, cases[i].v);
+        put_two(), insert_profile();
+        if (!CHECK(light_is(want, SSDGS_PIXELS_RGBA16, cases[i].note))) printf("    case %d\n", (int)i);
+    }
+    for (size_t k = 0; k < 3; k++) { /* sRGB's own leaves every bit */
+        make_profile(SRGB_D50, 3, srgb);
+        encode(&kinds[k]), insert_profile();
+        CHECK(photo_is(&kinds[k], 0));
+        encode(&kinds[k]), insert_profile(), insert_chunk(33, "gAMA", linear, 4, 0);
+        CHECK(photo_tells(&kinds[k], 0, "contradict (gAMA 1; ICC profile): the latter is taken: "));
+        make_profile(SRGB_D50, 0, srgb); /* gamma 2.4 is not */
+        encode(&kinds[k]), insert_profile();
+        CHECK(photo_tells(&kinds[k], 1e5 / floor(2.4 * 65536 + 0.5) * 65536, NULL));
+        for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+            make_profile(bad[i].colors, 0, srgb);
+            encode(&kinds[k]), insert_profile();
+            CHECK(photo_tells(&kinds[k], 0, bad[i].note));
+            encode(&kinds[k]), insert_profile(), insert_chunk(33, "gAMA", linear, 4, 0);
+            CHECK(photo_tells(&kinds[k], 100000, bad[i].note)); /* what is beside it counts then */
+        }
+    }
+    CHECK(strstr(bad[0].note, "tables") && live == 0);
+}
+
+/* The same for chunks. */
+static void test_code_points(void) {
+    static const unsigned char p3[32] = {0,    0,    0x7A, 0x26, 0,    0,    0x80, 0x84, 0,    1,   0x09,
+                                         0xA0, 0,    0,    0x7D, 0,    0,    0,    0x67, 0x84, 0,   1,
+                                         0x0D, 0x88, 0,    0,    0x3A, 0x98, 0,    0,    0x17, 0x70};
+    static const unsigned char gama[4] = {0, 0, 0xB1, 0x8F};
+    static const struct {
+        unsigned char code[4];
+        double want[3], white;
+        const char *what;
+    } cases[] = {
+        {{12, 13, 0, 1}, {0.365361, 0.170548, 0.062867}, 1, "not sRGB (cICP 12 13 0 1): converted to sRGB"},
+        {{9, 8, 0, 1}, {0.722262, 0.44004, 0.284294}, 1, "linear (cICP 9 8 0 1): converted to sRGB"},
+        {{1, 1, 0, 1},
+         {0.378121, 0.220792, 0.108409},
+         1,
+         "not sRGB (cICP 1 1 0 1): converted to the sRGB curve"},
+        {{1, 6, 0, 1},
+         {0.378121, 0.220792, 0.108409},
+         1,
+         "not sRGB (cICP 1 6 0 1): converted to the sRGB curve"},
+        {{1, 14, 0, 1},
+         {0.378121, 0.220792, 0.108409},
+         1,
+         "not sRGB (cICP 1 14 0 1): converted to the sRGB curve"},
+        {{1, 15, 0, 1},
+         {0.378121, 0.220792, 0.108409},
+         1,
+         "not sRGB (cICP 1 15 0 1): converted to the sRGB curve"},
+        {{1, 13, 0, 0},
+         {0.367768, 0.180576, 0.065415},
+         1,
+         "not sRGB (cICP 1 13 0 0): converted to the sRGB curve"},
+        {{1, 16, 0, 1},
+         {1.325909, 0.295624, 0.052789},
+         10000 / 203.0,
+         "HDR (cICP 1 16 0 1): read as light, of which 203 nits are 1"},
+        {{9, 16, 0, 1},
+         {2.024094, 0.169328, 0.005257},
+         10000 / 203.0,
+         "HDR (cICP 9 16 0 1): read as light, of which 203 nits are 1"},
+        {{1, 18, 0, 1},
+         {0.506547, 0.263627, 0.117168},
+         3.774118,
+         "HDR (cICP 1 18 0 1): read as the scene's light, of which 75 % of the signal are 1"},
+        {{9, 18, 0, 1},
+         {0.677662, 0.234594, 0.095369},
+         3.774118,
+         "HDR (cICP 9 18 0 1): read as the scene's light, of which 75 % of the signal are 1"}};
+    static const double of_p3[8] = {0.365361, 0.170548, 0.062867, 30000 / 65535.0, 1, 1, 1, 1},
+                        plain[8] = {0.330774, 0.177015, 0.07583, 30000 / 65535.0, 1, 1, 1, 1};
+    unsigned char raw[7] = {0, 0, 255, 0, 255, 255, 255}, code[4] = {9, 8, 0, 1}, chrm[32];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const double *w = cases[i].want, white = cases[i].white,
+                     want[8] = {w[0], w[1], w[2], 30000 / 65535.0, white, white, white, 1};
+        char note[200];
+        snprintf(note, sizeof note, "1 of the 1 photographs is %s", cases[i].what);
+        put_two(), insert_chunk(33, "cICP", cases[i].code, 4, 0);
+        if (white > 1.5) CHECK(light_is(want, SSDGS_PIXELS_RGBA16F, note));
+        else if (cases[i].code[3]) CHECK(light_is(want, SSDGS_PIXELS_RGBA16, note));
+        else CHECK(light_is(want, SSDGS_PIXELS_RGBA16, note)); /* brighter than video's white: clamped */
+    }
+    put_two(), insert_chunk(33, "cHRM", p3, 32, 0), insert_chunk(33, "gAMA", gama, 4, 0);
+    CHECK(light_is(of_p3, SSDGS_PIXELS_RGBA16,
+                   "1 of the 1 photographs is not sRGB (gAMA 0.45455, cHRM): converted to sRGB"));
+    put_two(), insert_chunk(33, "cHRM", p3, 32, 0);
+    CHECK(
+        light_is(of_p3, SSDGS_PIXELS_RGBA16, "1 of the 1 photographs is not sRGB (cHRM): converted to sRGB"));
+    memset(chrm, 0, sizeof chrm);
+    put_two(), insert_chunk(33, "cHRM", chrm, 32, 0);
+    CHECK(light_is(
+        plain, SSDGS_PIXELS_RGBA16,
+        "1 of the 1 photographs is marked with gAMA or cHRM that cannot be used (primaries that no light "
+        "has): read without; export as sRGB, or with a profile of a matrix and curves: " FOLDER "/g.png"));
+    /* the green of BT.2020 is none that sRGB holds */
+    put_header(2, 1, 8, 2, 0), put_data(raw, sizeof raw), insert_chunk(33, "cICP", code, 4, 0);
+    {
+        static const double green[8] = {0, 1, 0, 1, 1, 1, 1, 1};
+        CHECK(light_is(
+            green, SSDGS_PIXELS_RGBA16,
+            "1 of the 1 photographs is linear (cICP 9 8 0 1): converted to sRGB\n"
+            "1 of the 1 photographs is of colours that sRGB does not hold, in more than 0.1 % of the "
+            "pixels: these are clamped: " FOLDER "/g.png"));
+    }
+    code[2] = 9;
+    put_two(), insert_chunk(33, "cICP", code, 4, 0), write_bytes(FOLDER "/g.png");
+    char text[1200];
+    snprintf(text, sizeof text, PHOTO, "");
+    CHECK(load_fails(text, 0, "g.png: cICP: matrix coefficients 9: a PNG holds red, green and blue"));
+    code[2] = 0, code[0] = 3;
+    put_two(), insert_chunk(33, "cICP", code, 4, 0);
+    CHECK(light_is(
+        plain, SSDGS_PIXELS_RGBA16,
+        "1 of the 1 photographs is marked with cICP that cannot be used (primaries that are not known): "
+        "read without; export as sRGB, or with a profile of a matrix and curves: " FOLDER "/g.png"));
+}
+
+/* eXIf and pHYs, which change nothing but are told. */
+static void test_marks(void) {
+    static const picture rgba = {9, 7, 6, 8, 0, 0};
+    static const unsigned char exif[2][26] = {
+        {'I', 'I', 42, 0, 8, 0, 0, 0, 1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, 6, 0, 0, 0, 0, 0, 0, 0},
+        {'M', 'M', 0, 42, 0, 0, 0, 8, 0, 1, 1, 0x12, 0, 3, 0, 0, 0, 1, 0, 3, 0, 0, 0, 0, 0, 0}};
+    unsigned char phys[9] = {0, 0, 11, 19, 0, 0, 22, 38, 1}, cut[26];
+    for (int i = 0; i < 2; i++)
+        for (int behind = 0; behind < 2; behind++) {
+            encode(&rgba), insert_chunk(behind ? file_size - 12 : 33, "eXIf", exif[i], 26, 0);
+            CHECK(photo_tells(
+                &rgba, 0,
+                i ? "is to be turned or mirrored for viewing (eXIf orientation 3): read as stored, and "
+                    "poses must be of that: " FOLDER "/g.png"
+                  : "viewing (eXIf orientation 6): read as stored"));
+        }
+    for (size_t size = 1; size < 26; size++) {
+        encode(&rgba), insert_chunk(33, "eXIf", exif[0], size, 0);
+        CHECK(size < 22 ? photo_is(&rgba, 0) : photo_tells(&rgba, 0, "orientation 6"));
+    }
+    memcpy(cut, exif[0], 26), cut[18] = 1;
+    encode(&rgba), insert_chunk(33, "eXIf", cut, 26, 0);
+    CHECK(photo_is(&rgba, 0));
+    encode(&rgba), insert_chunk(33, "pHYs", phys, 9, 0);
+    CHECK(photo_tells(&rgba, 0, "is of pixels that are not square (pHYs 2835 x 5670): read as stored"));
+    phys[6] = 11, phys[7] = 19;
+    encode(&rgba), insert_chunk(33, "pHYs", phys, 9, 0);
+    CHECK(photo_is(&rgba, 0));
+}
+
+/* Reads an exact copy as a photograph: 0 where something is wrong. */
+static int photographed(const unsigned char *bytes, size_t size) {
+    static olat__found found;
+    unsigned char *copy = (unsigned char *)malloc(size + !size);
+    olat__png png;
+    memset(&png, 0, sizeof png);
+    memset(&found, 0, sizeof found);
+    memset(error, 0, sizeof error);
+    memcpy(copy, bytes, size);
+    const int failed =
+        olat__png_decode("PNG", copy, size, &png, error) || olat__png_photo("PNG", &png, &found, error);
+    free(copy);
+    meter_free(png.out);
+    return live == 0 && (failed ? error[0] != 0 : png.format < SSDGS_PIXELS_RGBA32F && found.count < 4);
+}
+
+/* Every byte of profiles and chunks changed and left out, behind sound checksums. */
+static void test_profile_damage(void) {
+    static const double v[7] = {2, 0.9, 0.05, 0.5, 0.35, 0.02, 0.03};
+    static const unsigned char code[4] = {9, 16, 0, 1}, steps[5] = {1, 0x80, 0xFF, 0x55, 0x7F};
+    static unsigned char kept[sizeof profile];
+    int wrong = 0;
+    for (int which = 0; which < 3; which++) {
+        make_profile(which == 2 ? GREY : which, which == 1 ? -3 : 4, v);
+        const size_t size = profile_size;
+        memcpy(kept, profile, size);
+        for (size_t i = 0; i < size; i++) {
+            for (int k = 0; k < 5; k++) {
+                profile[i] ^= steps[k];
+                put_two(), insert_profile();
+                wrong |= !photographed(file, file_size);
+                profile[i] ^= steps[k];
+            }
+            profile_size = i;
+            put_two(), insert_profile();
+            wrong |= !photographed(file, file_size);
+            profile_size = size;
+        }
+        put_two(), insert_profile();
+        const size_t length = file_size;
+        for (size_t i = 0; i < length; i++) {
+            for (int k = 0; k < 5; k++) {
+                file[i] ^= steps[k];
+                wrong |= !photographed(file, length);
+                file[i] ^= steps[k];
+            }
+            wrong |= !photographed(file, i);
+        }
+    }
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 256; k++) {
+            unsigned char changed[4];
+            memcpy(changed, code, 4);
+            changed[i] = (unsigned char)k;
+            put_two(), insert_chunk(33, "cICP", changed, 4, 0);
+            wrong |= !photographed(file, file_size);
+        }
+    CHECK(!wrong);
+}
+
 static void test_masks(void) {
     static const picture masks[6] = {{9, 7, 0, 8, 0, 0},  {9, 7, 2, 16, 0, 0}, {9, 7, 6, 8, 1, 0},
                                      {9, 7, 6, 16, 0, 0}, {9, 7, 3, 8, 0, 1},  {9, 7, 0, 1, 0, 0}};
@@ -1974,6 +2340,128 @@ static void test_exr(void) {
     }
     CHECK(live == 0);
     remove(FOLDER "/e.exr");
+}
+
+/* ---- kinds of masks ---- */
+
+static void write_mask(const char *name, int depth, int color, const unsigned char *palette, size_t entries,
+                       const unsigned char *raw, size_t size) {
+    put_header(3, 2, depth, color, 0);
+    if (entries) put_chunk("PLTE", palette, 3 * entries);
+    put_data(raw, size);
+    write_bytes(name);
+}
+
+/* Does it leave these alphas of an opaque photograph of 3 x 2 pixels, frame `at` of the dataset, and this
+   note? */
+static int mask_leaves(const char *frames, int at, const unsigned char *alpha, const char *note) {
+    char text[1200];
+    int wrong = 0;
+    snprintf(text, sizeof text, TOP "%s]}", frames);
+    if (!loads(text, 0)) return 0;
+    for (int i = 0; i < 6; i++) wrong |= ((unsigned char *)set.frames[at].pixels)[4 * i + 3] != alpha[i];
+    for (int i = 0; wrong && i < 6; i++) printf("%d ", ((unsigned char *)set.frames[at].pixels)[4 * i + 3]);
+    wrong |= strcmp(set.notes, note) != 0;
+    if (wrong) printf("\"%s\", not \"%s\"\n", set.notes, note);
+    olat_free(&set);
+    return !wrong && live == 0;
+}
+
+#define MASKED(name) "{\"file_path\":\"small\",\"mask_path\":\"" name "\"," LIGHT POSE "}"
+#define USED "masks of 1 of the 1 photographs are used"
+#define SCALED(value) \
+    "\nno mask is brighter than " value " of 255: all are scaled, so that this keeps all and half of it " \
+    "half"
+
+static void test_mask_kinds(void) {
+    static const unsigned char photo[20] = {0, 9, 9, 9, 9, 9, 9, 9, 9, 9, 0, 9, 9, 9, 9, 9, 9, 9, 9, 9},
+                               voc[9] = {0, 0, 0, 128, 0, 0, 0, 128, 0},
+                               greys[9] = {0, 0, 0, 9, 9, 9, 255, 255, 255},
+                               turned[9] = {255, 255, 255, 0, 0, 0, 128, 128, 128},
+                               tinted[9] = {9, 0, 0, 128, 0, 0, 0, 200, 0},
+                               labels[8] = {0, 0, 1, 2, 0, 2, 1, 0};
+    static const unsigned char by_label[6] = {0, 255, 255, 255, 255, 0}, by_grey[6] = {0, 9, 255, 255, 9, 0},
+                               by_turned[6] = {255, 0, 128, 128, 0, 255},
+                               by_tint[6] = {9, 128, 200, 200, 128, 9};
+    write_mask(FOLDER "/small.png", 8, 2, NULL, 0, photo, sizeof photo);
+    write_mask(FOLDER "/m.png", 8, 3, voc, 3, labels, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_label,
+                      USED
+                      "\n1 of the 1 masks is of labels, by a palette of colours: all but index 0 is kept"));
+    write_mask(FOLDER "/m.png", 8, 3, greys, 3, labels, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_grey, USED));
+    write_mask(FOLDER "/m.png", 8, 3, turned, 3, labels, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_turned, USED));
+    write_mask(FOLDER "/m.png", 8, 3, tinted, 3, labels, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_tint, USED));
+    /* a cut-out: its colours do not matter */
+    static const unsigned char cut[26] = {0, 1,   2,   3,   0, 9, 0, 0, 128, 7, 7, 7, 255,
+                                          0, 255, 255, 255, 0, 0, 0, 0, 255, 3, 3, 3, 1},
+                               by_cut[6] = {0, 128, 255, 0, 255, 1};
+    write_mask(FOLDER "/m.png", 8, 6, NULL, 0, cut, sizeof cut);
+    CHECK(mask_leaves(MASKED("m"), 0, by_cut, USED));
+    /* 0 and 1 of 255, labels, a mask of half brightness; words; one bit */
+    static const unsigned char ones[8] = {0, 0, 1, 1, 0, 1, 1, 0}, half[8] = {0, 0, 50, 100, 0, 100, 50, 0},
+                               words[14] = {0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0},
+                               bits[4] = {0, 0x40, 0, 0xA0}, dim[8] = {0, 0, 100, 40, 0, 0, 0, 0},
+                               soft[8] = {0, 0, 255, 154, 0, 77, 1, 0};
+    static const unsigned char by_ones[6] = {0, 255, 255, 255, 255, 0},
+                               by_half[6] = {0, 128, 255, 255, 128, 0},
+                               by_words[6] = {0, 255, 255, 0, 255, 0}, by_bits[6] = {0, 255, 0, 255, 0, 255},
+                               by_dim[6] = {0, 100, 40, 0, 0, 0};
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, ones, sizeof ones);
+    CHECK(mask_leaves(MASKED("m"), 0, by_ones, USED SCALED("1")));
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, half, sizeof half);
+    CHECK(mask_leaves(MASKED("m"), 0, by_half, USED SCALED("100")));
+    write_mask(FOLDER "/m.png", 16, 0, NULL, 0, words, sizeof words);
+    CHECK(mask_leaves(MASKED("m"), 0, by_words, USED SCALED("0.003891")));
+    write_mask(FOLDER "/m.png", 1, 0, NULL, 0, bits, sizeof bits);
+    CHECK(mask_leaves(MASKED("m"), 0, by_bits, USED));
+    /* by the brightest of all masks, so that a dim one among others stays */
+    write_mask(FOLDER "/dim.png", 8, 0, NULL, 0, dim, sizeof dim);
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, soft, sizeof soft);
+    CHECK(mask_leaves(
+        MASKED("dim") "," MASKED("m"), 0, by_dim,
+        "masks of 2 of the 2 photographs are used\n1 of the 2 masks is of no more than 0.6 of white, where "
+        "others have more: used as stored: " FOLDER "/dim.png"));
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, ones, sizeof ones);
+    static const unsigned char scaled[6] = {0, 255, 102, 0, 0, 0};
+    CHECK(mask_leaves(MASKED("dim") "," MASKED("m"), 0, scaled,
+                      "masks of 2 of the 2 photographs are used" SCALED("100")));
+    /* all, nothing, and inverted */
+    static const unsigned char nothing[8] = {0, 0, 0, 0, 0, 0, 0, 0},
+                               all[8] = {0, 255, 255, 255, 0, 255, 255, 255},
+                               by_all[6] = {255, 255, 255, 255, 255, 255};
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, nothing, sizeof nothing);
+    CHECK(mask_leaves(MASKED("m"), 0, nothing,
+                      USED "\n1 of the 1 masks is black everywhere: nothing is kept: " FOLDER "/m.png"));
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, all, sizeof all);
+    CHECK(mask_leaves(MASKED("m"), 0, by_all,
+                      USED "\n1 of the 1 masks is white everywhere: all is kept: " FOLDER "/m.png"));
+    /* an OpenEXR */
+    const exr one = {0, {0, 0}, {0, 0, 2, 1}, {0, 0, 2, 1}, {"Y", NULL}, {2}, 0};
+    static const unsigned char by_exr[6] = {0, 191, 255, 0, 0, 255};
+    static const float light[6] = {0, 0.75f, 1, 0, -1, 7};
+    encode_exr(&one);
+    for (int y = 0; y < 2; y++) memcpy(file + file_size - 12 - (size_t)(1 - y) * 20, light + 3 * y, 12);
+    write_bytes(FOLDER "/m.exr");
+    CHECK(mask_leaves(MASKED("m.exr"), 0, by_exr, USED));
+    for (int inverted = 0; inverted < 2; inverted++) {
+        unsigned char raw[10 * 9];
+        for (int i = 0; i < 90; i++)
+            raw[i] =
+                i % 10 == 0 || ((i % 10 > 3 && i % 10 < 8 && i / 10 > 2 && i / 10 < 7) != inverted) ? 0 : 255;
+        put_header(9, 9, 8, 0, 0), put_data(raw, sizeof raw), write_bytes(FOLDER "/m.png");
+        put_header(9, 9, 8, 0, 0), put_data(raw, sizeof raw), write_bytes(FOLDER "/round.png");
+        CHECK(loads(TOP "{\"file_path\":\"round\",\"mask_path\":\"m\"," LIGHT POSE "}]}", 0) &&
+              !strcmp(set.notes, !inverted ? USED "\nthe border is white and the middle black in 1 of the 1 "
+                                                  "masks: white is kept, so invert them if that is wrong"
+                                           : USED));
+        for (int i = 0; i < 81; i++)
+            CHECK(((unsigned char *)set.frames->pixels)[4 * i + 3] == raw[i / 9 * 10 + 1 + i % 9]);
+        olat_free(&set);
+    }
+    remove(FOLDER "/m.exr");
 }
 
 /* The data forms of NRHints, GS3 and SSS-GS: twins of one scene have the same cameras, lights and pixels. */
@@ -2596,7 +3084,12 @@ int main(void) {
     test_units();
     test_primaries();
     test_curves();
+    test_profiles();
+    test_code_points();
+    test_marks();
+    test_profile_damage();
     test_masks();
+    test_mask_kinds();
     test_kinds_of_image();
     TEST_ROW("96", "OpenEXR of every kind, every byte changed, every truncation", test_exr());
     test_twins();

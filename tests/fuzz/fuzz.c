@@ -728,13 +728,29 @@ static void fuzz_ply(const unsigned char *data, size_t size) {
 /* ---- images: as they are, and with every checksum mended ---- */
 
 static void read_png(const unsigned char *bytes, size_t size) {
+    static olat__found found;
     ssdgs_pixels format;
     int width, height;
     void *pixels;
     char error[512] = "";
-    if (olat_decode_png(bytes, size, &width, &height, &format, &pixels, error)) HOLDS(!pixels && error[0]);
+    const int failed = olat_decode_png(bytes, size, &width, &height, &format, &pixels, error);
+    if (failed) HOLDS(!pixels && error[0]);
     else HOLDS(width > 0 && height > 0 && pixels);
     free(pixels);
+    for (int is_mask = 0; is_mask < 2; is_mask++) {
+        olat__png png;
+        memset(&png, 0, sizeof png);
+        memset(&found, 0, sizeof found);
+        png.is_mask = is_mask;
+        error[0] = 0;
+        HOLDS(failed == olat__png_decode("", bytes, size, &png, error));
+        if (!failed && !is_mask && olat__png_photo("", &png, &found, error)) HOLDS(error[0]);
+        for (size_t i = 0; !error[0] && i < 4 * (size_t)width * (size_t)height; i++) {
+            const ssdgs_real number = olat__number(png.out, png.format, i);
+            HOLDS(number >= 0 && number <= (i % 4 < 3 && olat__is_light(png.format) ? 65504 : 1));
+        }
+        free(png.out);
+    }
 }
 
 /* What is read is light: finite, not negative, with an alpha from 0 to 1. */
