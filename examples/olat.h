@@ -1719,7 +1719,7 @@ static int olat__png_convert(olat__png *png, const olat__space *space, olat__fou
         olat__transform(space->matrix, stored, v);
         for (size_t c = 0; c < 3; c++) {
             if (!plain) {
-                odd |= v[c] < -1e-3 || (v[c] > 1 + 1e-3 && !space->high);
+                odd |= v[c] < -0.01 || (v[c] > 1.01 && !space->high); /* more than bytes round */
                 v[c] = v[c] < 0 ? 0 : v[c] > 1 && !space->high ? 1 : v[c];
                 if (!space->high) v[c] = 65535 * olat__to_srgb(v[c]) + 0.5;
             }

@@ -30,7 +30,11 @@ int main(int argc, char **argv) {
     if (fclose(file)) return failed("FILE.json cannot be written");
     snprintf(json, sizeof json, "%s.json", name);
     if (olat_load(folder, json, 0, &set, error)) return failed(error);
-    if (*set.notes) printf("note: %s\n", set.notes);
+    const char *line = set.notes;
+    for (int length; *line; line += length + (line[length] == '\n')) {
+        length = (int)strcspn(line, "\n");
+        printf("note: %.*s\n", length, line);
+    }
     const olat_frame *frame = set.frames;
     for (int y = 0; y < frame->camera.height; y++)
         for (int x = 0; x < frame->camera.width; x++) {

@@ -781,9 +781,22 @@ static void fuzz_exr(const unsigned char *data, size_t size) {
     free(copy);
 }
 
+/* As an ICC profile, which lies packed in a PNG. */
+static void read_profile(const unsigned char *bytes, size_t size) {
+    olat__space space;
+    memset(&space, 0, sizeof space);
+    if (olat__icc_space(bytes, size, &space)) return;
+    for (int i = 0; i < 3 * 257; i++) {
+        const double light = olat__light(space.code + i / 257, i % 257 / 256.0);
+        HOLDS(light >= 0 && light <= 1);
+    }
+    for (int i = 0; i < 9 && space.differs; i++) HOLDS(fabs(space.matrix[i]) < 16);
+}
+
 static void fuzz_png(const unsigned char *data, size_t size) {
     unsigned char *copy = copy_of(data, size);
     size_t at = 8;
+    read_profile(copy, size);
     if (size > 24 && olat__be32(data + 16) > 2048)
         copy[16] = copy[17] = 0, copy[18] &= 7; /* a large image is slow to clear */
     if (size > 24 && olat__be32(data + 20) > 2048) copy[20] = copy[21] = 0, copy[22] &= 7;
