@@ -12,17 +12,23 @@
    fl_x fl_y cx cy w h. A frame's key wins over the top's, one for a focal length over all such keys of the
    top.
 
-   In frames[]: file_path (+ file_ext) or img_path. mask_path: white is kept. transform_matrix (camera to
-   world, OpenGL axes), or R_opt and T_opt. pl_pos or pl_dir. pl_intensity. pl_mu and pl_axis: an LED, which
+   In frames[]: file_path (+ file_ext) or img_path. mask_path, see MASKS. transform_matrix (camera to world,
+   OpenGL axes), or R_opt and T_opt. pl_pos or pl_dir. pl_intensity. pl_mu and pl_axis: an LED, which
    fades as cos^mu of the angle to that axis. pl_lights: where several lights shine, a list of objects with
    pl_ keys.
 
    Or a frame is a camera's, with lists: light_positions, light_intensities, file_paths, less those that
    exclude_list.txt names. Distorted lenses are refused.
 
-   IMAGES  PNG of any kind, as bytes or words. OpenEXR of one part, scan lines or tiles, unpacked, RLE, ZIPS
-   or ZIP, halves or floats: the display window, alpha divided out, R G B A or Y of the image or its first
-   layer. A name without an ending is .png, or .exr where there is no such PNG.
+   IMAGES  PNG of any kind, as bytes or words of sRGB: what cICP, else an ICC profile of curves and a matrix,
+   else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR of one part,
+   scan lines or tiles, unpacked, RLE, ZIPS or ZIP, halves or floats: the display window, alpha divided out,
+   R G B A or Y of the image or its first layer. A name without an ending is .png, or .exr where there is no
+   such PNG.
+
+   MASKS  Where a mask's alpha varies it is what is kept, of an indexed image with a palette of colours and
+   black as index 0 all but that, else what is white. Where no mask of the dataset has more than 0.6 of white,
+   the most that any has keeps all: so 0 and 1 of 255 do, and one dim mask among others stays dim.
 
    ADAPTED  Coordinates far from 0 become relative to an origin, photographs that say they are not sRGB become
    so, masks become alpha. The dataset's notes say what was done.
@@ -729,7 +735,7 @@ static const char *olat__png_palette(olat__png *png, const unsigned char *data, 
     png->palette_size = (int)(length / 3);
     for (size_t i = 0; i < 4 * (length / 3); i++)
         png->palette[i / 4][i % 4] = i % 4 < 3 ? data[i / 4 * 3 + i % 4] : 255;
-    for (size_t i = 0; i < length && png->is_mask && !data[0] && !data[1] && !data[2]; i++)
+    for (size_t i = 0; i < length && png->is_mask && png->color == 3 && !data[0] && !data[1] && !data[2]; i++)
         png->labels |= abs(data[i] - data[i - i % 3]) > 32; /* colours, not greys that were rounded */
     for (size_t i = 1; i < length / 3 && png->labels; i++) memset(png->palette[i], 255, 3);
     return NULL;
@@ -1505,22 +1511,25 @@ static double olat__space_distance(const olat__space *a, const olat__space *b) {
 
 /* Those that follow fill a space that is sRGB from a chunk, and return what is wrong with it, or NULL. */
 
-/* gAMA, cHRM, either or both. Gammas near sRGB's are meant to be that. */
+/* gAMA, cHRM, either or both, or neither; one that is wrong leaves the other. Gammas near sRGB's are meant to
+   be that. */
 static const char *olat__gama_space(const olat__png *png, olat__space *space) {
     const unsigned char *gama = png->told[OLAT__GAMA].data, *chrm = png->told[OLAT__CHRM].data;
     const uint32_t gamma = gama ? olat__be32(gama) : 45455;
-    double xy[8];
-    if (gamma < 16 || gamma > 625000000) return "damaged"; /* libpng's limits */
-    if (gama) snprintf(space->source, sizeof space->source, "gAMA %g", gamma / 1e5);
-    for (int c = 0; c < 3 && (gamma < 40000 || gamma > 50000); c++)
+    const int good = gamma >= 16 && gamma <= 625000000; /* libpng's limits */
+    double xy[8], matrix[9];
+    if (gama && good) snprintf(space->source, sizeof space->source, "gAMA %g", gamma / 1e5);
+    for (int c = 0; c < 3 && good && (gamma < 40000 || gamma > 50000); c++)
         olat__power(space->code + c, 1e5 / gamma, 1, 0, 0, 0);
     for (int i = 0; chrm && i < 8; i++) xy[(i + 6) % 8] = olat__be32(chrm + 4 * i) / 1e5;
-    const int primaries = chrm ? olat__primaries(xy, space->matrix) : 1;
-    space->differs = primaries == 2;
-    const size_t used = strlen(space->source);
-    if (space->differs)
+    const int primaries = chrm ? olat__primaries(xy, matrix) : 1;
+    if (primaries == 2) {
+        const size_t used = strlen(space->source);
         snprintf(space->source + used, sizeof space->source - used, "%scHRM", used ? ", " : "");
-    return primaries ? NULL : "primaries that no light has";
+        memcpy(space->matrix, matrix, sizeof matrix);
+        space->differs = 1;
+    }
+    return !primaries ? "primaries that no light has" : good ? NULL : "damaged";
 }
 
 static double olat__icc_number(const unsigned char *p) { return (int32_t)olat__be32(p) / 65536.0; }
@@ -1605,7 +1614,7 @@ static const char *olat__iccp_space(olat__png *png, olat__space *space) {
     z.out = png->packed = (unsigned char *)malloc(z.capacity);
     if (!z.out) return "out of memory";
     const char *problem = olat__inflate(&z);
-    return problem ? z.length == most ? "of more than 16 MiB" : "damaged"
+    return problem ? z.length > most - 258 ? "of more than 16 MiB" : "damaged"
                    : olat__icc_space(z.out, z.length, space);
 }
 
@@ -1663,25 +1672,25 @@ static int olat__png_space(const char *name, olat__png *png, olat__space *space,
                           olat__tail(name), cicp[2]);
     for (int i = 0; i < 4; i++) {
         const int kind = chunks[i].kind, other = chunks[i].other;
-        const int told = png->told[kind].data || png->told[other].data;
+        const int told = png->told[kind].data || png->told[other].data,
+                  damaged = png->damaged[kind] || png->damaged[other];
         const char *problem = NULL;
         olat__space next;
         olat__srgb_space(&next);
-        if (!told && !png->damaged[kind] && !png->damaged[other]) continue;
-        if (told && kind == OLAT__GAMA) problem = olat__gama_space(png, &next);
+        if (!told && !damaged) continue;
+        if (kind == OLAT__GAMA) problem = olat__gama_space(png, &next);
         else if (told && kind == OLAT__SRGB) snprintf(next.source, sizeof next.source, "sRGB");
         else if (told && kind == OLAT__ICCP) problem = olat__iccp_space(png, &next);
         else if (told) problem = olat__cicp_space(png, &next);
-        else problem = "damaged";
+        if (!problem && damaged && (!told || kind == OLAT__GAMA)) problem = "damaged";
         if (problem && !strcmp(problem, "out of memory"))
             return olat__fail(error, "%s: out of memory", olat__tail(name));
-        if (problem) {
+        if (problem)
             olat__tell(found, OLAT__NAMED,
                        "marked with %s that cannot be used (%s): read without; export as sRGB, or with a "
                        "profile of a matrix and curves",
                        chunks[i].name, problem);
-            continue;
-        }
+        if (problem && kind != OLAT__GAMA) continue;
         if (*space->source && *next.source && olat__space_distance(space, &next) > 0.05)
             olat__tell(found, OLAT__NAMED, "marked in two ways that contradict (%s; %s): the latter is taken",
                        space->source, next.source);
@@ -2684,7 +2693,7 @@ typedef struct olat__tally {
 enum { OLAT__TALLIES = 12 };
 typedef struct olat__seen {
     olat__tally tallies[OLAT__TALLIES];
-    int count, masks, inverted;
+    int count, masks, inverted, more; /* more: what had no place in tallies */
     unsigned long broken;
     double largest; /* of all masks, of 1 */
 } olat__seen;
@@ -2694,7 +2703,10 @@ static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
         const olat__remark *remark = found->remarks + i;
         int k = 0;
         while (k < seen->count && strcmp(seen->tallies[k].remark.text, remark->text) != 0) k++;
-        if (k == OLAT__TALLIES) continue;
+        if (k == OLAT__TALLIES) {
+            seen->more++;
+            continue;
+        }
         olat__tally *tally = seen->tallies + k;
         if (k == seen->count) seen->count++, tally->remark = *remark;
         if (tally->count < 3) tally->first[tally->count] = frame;
@@ -2792,6 +2804,7 @@ static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dat
                    "them if that is wrong",
                    seen.inverted, seen.masks);
     for (int i = 0; i < seen.count; i++) olat__note_tally(out, seen.tallies + i, seen.masks);
+    if (seen.more) olat__note(out, "%d more remarks like these are left out", seen.more);
     if (seen.broken) olat__note(out, "%lu values in the photographs are not finite: taken as 0", seen.broken);
 }
 

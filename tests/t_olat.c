@@ -1704,7 +1704,8 @@ static void test_code_points(void) {
          3.774118,
          "HDR (cICP 9 18 0 1): read as the scene's light, of which 75 % of the signal are 1"}};
     static const double of_p3[8] = {0.365361, 0.170548, 0.062867, 30000 / 65535.0, 1, 1, 1, 1},
-                        plain[8] = {0.330774, 0.177015, 0.07583, 30000 / 65535.0, 1, 1, 1, 1};
+                        plain[8] = {0.330774, 0.177015, 0.07583, 30000 / 65535.0, 1, 1, 1, 1},
+                        linear[8] = {0.610361, 0.457771, 0.30518, 30000 / 65535.0, 1, 1, 1, 1};
     unsigned char raw[7] = {0, 0, 255, 0, 255, 255, 255}, code[4] = {9, 8, 0, 1}, chrm[32];
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const double *w = cases[i].want, white = cases[i].white,
@@ -1728,6 +1729,19 @@ static void test_code_points(void) {
         plain, SSDGS_PIXELS_RGBA16,
         "1 of the 1 photographs is marked with gAMA or cHRM that cannot be used (primaries that no light "
         "has): read without; export as sRGB, or with a profile of a matrix and curves: " FOLDER "/g.png"));
+    olat__put_be32(chrm + 28, 100000);
+    put_two(), insert_chunk(33, "cHRM", chrm, 32, 0), insert_chunk(33, "gAMA", chrm + 28, 4, 0);
+    CHECK(light_is(
+        linear, SSDGS_PIXELS_RGBA16,
+        "1 of the 1 photographs is marked with gAMA or cHRM that cannot be used (primaries that no light "
+        "has): read without; export as sRGB, or with a profile of a matrix and curves: " FOLDER "/g.png\n"
+        "1 of the 1 photographs is linear (gAMA 1): converted to the sRGB curve"));
+    put_two(), insert_chunk(33, "cHRM", p3, 32, 0), insert_chunk(33, "gAMA", gama, 4, 1);
+    CHECK(light_is(of_p3, SSDGS_PIXELS_RGBA16,
+                   "1 of the 1 photographs is marked with gAMA or cHRM that cannot be used (damaged): "
+                   "read without; export as sRGB, or with a profile of a matrix and curves: " FOLDER
+                   "/g.png\n"
+                   "1 of the 1 photographs is not sRGB (cHRM): converted to sRGB"));
     /* the green of BT.2020 is none that sRGB holds */
     put_header(2, 1, 8, 2, 0), put_data(raw, sizeof raw), insert_chunk(33, "cICP", code, 4, 0);
     {
@@ -2394,6 +2408,11 @@ static void test_mask_kinds(void) {
     CHECK(mask_leaves(MASKED("m"), 0, by_turned, USED));
     write_mask(FOLDER "/m.png", 8, 3, tinted, 3, labels, 8);
     CHECK(mask_leaves(MASKED("m"), 0, by_tint, USED));
+    static const unsigned char rgb[20] = {0, 0, 0, 0, 7, 0, 0, 255, 0, 0, 0, 0, 200, 0, 9, 0, 1, 0, 0, 0},
+                               by_rgb[6] = {0, 7, 255, 200, 9, 0};
+    write_mask(FOLDER "/m.png", 8, 2, voc, 3, rgb,
+               sizeof rgb); /* what a palette beside true colours is for */
+    CHECK(mask_leaves(MASKED("m"), 0, by_rgb, USED));
     /* a cut-out: its colours do not matter */
     static const unsigned char cut[26] = {0, 1,   2,   3,   0, 9, 0, 0, 128, 7, 7, 7, 255,
                                           0, 255, 255, 255, 0, 0, 0, 0, 255, 3, 3, 3, 1},
