@@ -1061,7 +1061,7 @@ OLAT__API int olat_write_png(const char *path, int width, int height, int channe
     return failed;
 }
 
-/* ==== OpenEXR: one image in scan lines or tiles; plain, RLE, ZIPS, ZIP; half and float ==== */
+/* ==== OpenEXR: one image in scan lines or tiles; plain, RLE, ZIPS, ZIP, PIZ, PXR24; half and float ==== */
 
 /* What is written into a file is linear light times alpha; what comes out is straight alpha. */
 enum { OLAT__EXR_MAGIC = 20000630, OLAT__EXR_CHANNELS = 256, OLAT__EXR_HALF = 1, OLAT__EXR_FLOAT = 2 };
@@ -1079,6 +1079,7 @@ typedef struct olat__exr {
     int channel_count, wide; /* wide: a colour is float */
     size_t pixel_size;
     unsigned char *raw, *turned; /* a block unpacked, and before its bytes are sorted */
+    struct olat__piz *piz;       /* what unpacking PIZ needs */
     ssdgs_real *color, *alpha;   /* of the display window */
     unsigned long broken;        /* values that are not finite */
 } olat__exr;
@@ -1151,18 +1152,21 @@ static void olat__exr_window(olat__exr *e, int *window) {
 }
 
 static void olat__exr_packing(olat__exr *e) {
+    static const int lines[6] = {1, 1, 1, 16, 32, 16};
+    const unsigned char *p = olat__exr_take(e, 1);
+    e->packing = p ? *p : 0;
+    e->lines = e->packing < 6 ? lines[e->packing] : 1;
+}
+
+/* Why a picture cannot be unpacked; NULL if it can. */
+static const char *olat__exr_packed(int packing) {
 #define OLAT__REPACK(kind) \
     kind " compression cannot be read: repack, for instance with: oiiotool in.exr --compression zip -o " \
          "out.exr"
-    static const char *const others[] = {OLAT__REPACK("PIZ"),  OLAT__REPACK("PXR24"), OLAT__REPACK("B44"),
-                                         OLAT__REPACK("B44A"), OLAT__REPACK("DWAA"),  OLAT__REPACK("DWAB")};
+    static const char *const others[] = {OLAT__REPACK("B44"), OLAT__REPACK("B44A"), OLAT__REPACK("DWAA"),
+                                         OLAT__REPACK("DWAB"), OLAT__REPACK("unknown")};
 #undef OLAT__REPACK
-    const unsigned char *p = olat__exr_take(e, 1);
-    const int packing = p ? *p : 0;
-    if (packing > 9) olat__exr_bad(e, "unknown compression");
-    else if (packing > 3) olat__exr_bad(e, others[packing - 4]);
-    e->packing = packing;
-    e->lines = packing == 3 ? 16 : 1;
+    return packing < 6 ? NULL : others[packing > 10 ? 4 : packing - 6];
 }
 
 static void olat__exr_tiles(olat__exr *e) {
@@ -1262,24 +1266,235 @@ static void olat__exr_runs(olat__exr *e, const unsigned char *in, size_t size, s
     if (!e->problem && length < capacity) olat__exr_bad(e, "less data than the image needs");
 }
 
-/* A block's bytes, `capacity` of them. What was packed are differences, first of the even bytes, then of the
-   odd ones. */
-static const unsigned char *olat__exr_unpack(olat__exr *e, const unsigned char *in, size_t size,
-                                             size_t capacity) {
+/* Bits of PIZ, the highest of a byte first. */
+typedef struct olat__bits {
+    const unsigned char *in;
+    size_t size, at;
+    uint64_t bits; /* read but not consumed, highest first, zeros below */
+    int count;
+} olat__bits;
+
+static void olat__bits_fill(olat__bits *b) {
+    for (; b->count <= 56 && b->at < b->size; b->count += 8)
+        b->bits |= (uint64_t)b->in[b->at++] << (56 - b->count);
+}
+
+/* The next 1 .. 57 bits. */
+static uint64_t olat__bits_take(olat__exr *e, olat__bits *b, int n) {
+    olat__bits_fill(b);
+    const uint64_t value = b->bits >> (64 - n);
+    if (b->count < n) return (uint64_t)olat__exr_bad(e, "the data end early");
+    b->bits <<= n;
+    b->count -= n;
+    return value;
+}
+
+/* PIZ packs 16-bit words: a word becomes its place among those that occur, the places of a channel are
+   halved to means and differences in both directions until few are left, and what results is coded after
+   Huffman. */
+enum { OLAT__PIZ_WORDS = 1 << 16, OLAT__PIZ_FAST = 12, OLAT__PIZ_LONGEST = 57 };
+typedef struct olat__piz {
+    uint16_t values[OLAT__PIZ_WORDS]; /* the words that occur */
+    unsigned char lengths[OLAT__PIZ_WORDS + 1];
+    uint32_t symbols[OLAT__PIZ_WORDS + 1], fast[1 << OLAT__PIZ_FAST]; /* fast: symbol << 6 | length of the
+                                           code in the high bits; 0: a longer one */
+    uint32_t begin[OLAT__PIZ_LONGEST + 1];                            /* where each length's symbols begin */
+    uint64_t first[OLAT__PIZ_LONGEST + 1]; /* the first code of each length; longer codes are smaller */
+} olat__piz;
+
+/* Reads the lengths of the codes of the symbols from `low` to `high` and builds the code, which must be
+   complete: every sequence of bits then stands for symbols. */
+static void olat__piz_codes(olat__exr *e, olat__bits *b, uint32_t low, uint32_t high) {
+    olat__piz *piz = e->piz;
+    uint32_t count[OLAT__PIZ_LONGEST + 1] = {0}, place = 0;
+    uint64_t code = 0;
+    int complete = 1;
+    for (uint32_t symbol = low; symbol <= high;) {
+        const uint32_t word = (uint32_t)olat__bits_take(e, b, 6), length = word < 59 ? word : 0;
+        uint32_t run = word < 59 ? 1 : word < 63 ? word - 57 : 6 + (uint32_t)olat__bits_take(e, b, 8);
+        if (run > high + 1 - symbol) olat__exr_bad(e, "too many code lengths");
+        if (length > OLAT__PIZ_LONGEST) olat__exr_bad(e, "a code is longer than 57 bits");
+        if (e->problem) return;
+        count[length] += run;
+        for (; run > 0; run--) piz->lengths[symbol++] = (unsigned char)length;
+    }
+    for (int i = OLAT__PIZ_LONGEST; i > 0; i--) {
+        piz->first[i] = code;
+        code += count[i];
+        complete &= !(code & 1);
+        code >>= 1;
+    }
+    if (!complete || code != 1) olat__exr_bad(e, "bad codes");
+    if (e->problem) return;
+    for (int i = 1; i <= OLAT__PIZ_LONGEST; place += count[i++]) piz->begin[i] = place;
+    memset(piz->fast, 0, sizeof piz->fast);
+    memset(count, 0, sizeof count);
+    for (uint32_t symbol = low; symbol <= high; symbol++) {
+        const int length = piz->lengths[symbol], rest = OLAT__PIZ_FAST - length;
+        if (!length) continue;
+        const uint32_t rank = count[length]++;
+        piz->symbols[piz->begin[length] + rank] = symbol;
+        for (uint32_t i = 0; rest >= 0 && i < 1u << rest; i++)
+            piz->fast[((uint32_t)piz->first[length] + rank) << rest | i] = symbol << 6 | (uint32_t)length;
+    }
+}
+
+static uint32_t olat__piz_symbol(olat__exr *e, olat__bits *b) {
+    const olat__piz *piz = e->piz;
+    olat__bits_fill(b);
+    const uint32_t entry = piz->fast[b->bits >> (64 - OLAT__PIZ_FAST)];
+    int length = OLAT__PIZ_FAST + 1;
+    if (entry) {
+        olat__bits_take(e, b, (int)(entry & 63));
+        return entry >> 6;
+    }
+    while (b->bits >> (64 - length) < piz->first[length]) length++; /* the longest length's first is 0 */
+    return piz->symbols[piz->begin[length] + (olat__bits_take(e, b, length) - piz->first[length])];
+}
+
+/* Huffman's codes become `count` words. The highest symbol repeats the last word. */
+static void olat__piz_words(olat__exr *e, const unsigned char *in, size_t size, uint16_t *words,
+                            size_t count) {
+    olat__bits b;
+    size_t length = 0;
+    memset(&b, 0, sizeof b);
+    if (size < 20) olat__exr_bad(e, "the data end early");
+    if (e->problem) return;
+    const uint32_t low = olat__le32(in), high = olat__le32(in + 4), bits = olat__le32(in + 12);
+    if (low > high || high > OLAT__PIZ_WORDS) olat__exr_bad(e, "codes of unknown words");
+    b.in = in + 20;
+    b.size = size - 20;
+    if (!e->problem) olat__piz_codes(e, &b, low, high);
+    if (e->problem) return;
+    const size_t begin = b.at - (size_t)b.count / 8;
+    if (b.size - begin < (bits + (size_t)7) / 8) olat__exr_bad(e, "the data end early");
+    else b.size = begin + (bits + (size_t)7) / 8;
+    b.at = begin;
+    b.bits = 0;
+    b.count = 0;
+    while (length < count && !e->problem) {
+        const uint32_t symbol = olat__piz_symbol(e, &b);
+        size_t run = symbol == high ? (size_t)olat__bits_take(e, &b, 8) : 1;
+        const uint16_t word = symbol < high ? (uint16_t)symbol : length ? words[length - 1] : 0;
+        if (symbol == high && !length) olat__exr_bad(e, "a repeat before the first word");
+        if (run > count - length) olat__exr_bad(e, "more data than the image needs");
+        for (; run > 0 && !e->problem; run--) words[length++] = word;
+    }
+    if (8 * (uint64_t)(b.at - begin) - (uint64_t)b.count != bits)
+        olat__exr_bad(e, "more data than the image needs");
+}
+
+/* A mean and a difference become the two words that they were made of. */
+static inline void olat__piz_pair(uint16_t *mean, uint16_t *difference, int narrow) {
+    const int m = *mean, d = *difference, change = d > 32767 ? d - 65536 : d;
+    const int second = narrow ? m + (change + (d & 1)) / 2 - change : m - d / 2;
+    *mean = (uint16_t)(narrow ? second + change : second + d - 32768);
+    *difference = (uint16_t)second;
+}
+
+/* Undoes the halving of w x h words, of which a row's lie `across` apart and a column's `down`. Words below
+   2^14 are halved in another way than all of 16 bits. */
+static void olat__piz_unhalve(uint16_t *words, int w, int h, size_t across, size_t down, int narrow) {
+    int apart = 1;
+    while (2 * apart <= (w < h ? w : h)) apart *= 2;
+    for (apart /= 2; apart > 0; apart /= 2) {
+        const int full_w = w - w % (2 * apart), full_h = h - h % (2 * apart);
+        const size_t right = across * (size_t)apart, below = down * (size_t)apart;
+        for (int y = 0; y < full_h; y += 2 * apart) {
+            uint16_t *at = words + (size_t)y * down;
+            for (int x = 0; x < full_w; x += 2 * apart, at += 2 * right) {
+                olat__piz_pair(at, at + below, narrow);
+                olat__piz_pair(at + right, at + right + below, narrow);
+                olat__piz_pair(at, at + right, narrow);
+                olat__piz_pair(at + below, at + below + right, narrow);
+            }
+            if (w & apart) olat__piz_pair(at, at + below, narrow);
+        }
+        uint16_t *at = words + (size_t)full_h * down;
+        for (int x = 0; x < full_w && (h & apart); x += 2 * apart, at += 2 * right)
+            olat__piz_pair(at, at + right, narrow);
+    }
+}
+
+/* A block of PIZ: which words occur, as bits of a part of a bitmap, and the coded ones, channel after
+   channel. */
+static void olat__exr_piz(olat__exr *e, const unsigned char *in, size_t size, int w, int h) {
+    const size_t pixels = (size_t)w * (size_t)h, words = pixels * e->pixel_size / 2;
+    uint16_t *word = (uint16_t *)(void *)e->turned;
+    int count = 1; /* 0 always occurs */
+    e->piz->values[0] = 0;
+    if (size < 8) olat__exr_bad(e, "the data end early");
+    if (e->problem) return;
+    const int low = in[0] | in[1] << 8, high = in[2] | in[3] << 8;
+    const size_t bitmap = low > high ? 0 : (size_t)(high - low) + 1;
+    if (high >= OLAT__PIZ_WORDS / 8) olat__exr_bad(e, "a bitmap of unknown words");
+    else if (size - 8 < bitmap || olat__le32(in + 4 + bitmap) > size - 8 - bitmap)
+        olat__exr_bad(e, "the data end early");
+    if (e->problem) return;
+    for (int i = 8 * low; i < 8 * (high + 1); i++)
+        if (i && in[4 + i / 8 - low] >> (i & 7) & 1) e->piz->values[count++] = (uint16_t)i;
+    olat__piz_words(e, in + 8 + bitmap, olat__le32(in + 4 + bitmap), word, words);
+    size_t offset = 0; /* of the channel, in a row */
+    for (int c = 0; c < e->channel_count && !e->problem; c++) {
+        const size_t each = e->channels[c].type == OLAT__EXR_HALF ? 1 : 2, row = each * (size_t)w;
+        for (size_t k = 0; k < each; k++) olat__piz_unhalve(word + k, w, h, each, row, count <= 1 << 14);
+        for (size_t y = 0; y < (size_t)h; y++) {
+            unsigned char *out = e->raw + y * e->pixel_size * (size_t)w + offset;
+            for (size_t i = 0; i < row; i++, word++) {
+                if (*word >= count) olat__exr_bad(e, "a word that does not occur");
+                const uint16_t value = e->piz->values[*word < count ? *word : 0];
+                out[2 * i] = (unsigned char)(value & 255);
+                out[2 * i + 1] = (unsigned char)(value >> 8);
+            }
+        }
+        offset += 2 * row;
+    }
+}
+
+static void olat__exr_inflate(olat__exr *e, const unsigned char *in, size_t size, size_t capacity) {
+    olat__inflater z;
+    memset(&z, 0, sizeof z);
+    z.in = in;
+    z.size = size;
+    z.out = e->turned;
+    z.capacity = capacity;
+    const char *problem = olat__inflate(&z);
+    if (problem) olat__exr_bad(e, problem);
+}
+
+/* A block of PXR24: rows of differences of neighbours, the highest byte of all first; floats lack their
+   lowest byte. */
+static void olat__exr_pxr24(olat__exr *e, const unsigned char *in, size_t size, int w, int h) {
+    static const int kept[3] = {4, 2, 3}; /* bytes of a sample, by type */
+    const unsigned char *at = e->turned;
+    unsigned char *out = e->raw;
+    size_t pixel = 0;
+    for (int c = 0; c < e->channel_count; c++) pixel += (size_t)kept[e->channels[c].type];
+    olat__exr_inflate(e, in, size, pixel * (size_t)w * (size_t)h);
+    for (int i = 0; i < h * e->channel_count && !e->problem; i++) {
+        const int type = e->channels[i % e->channel_count].type, bytes = kept[type];
+        uint32_t value = 0; /* from the highest bit on */
+        for (int x = 0; x < w; x++, at++) {
+            for (int k = 0; k < bytes; k++) value += (uint32_t)at[k * w] << (24 - 8 * k);
+            for (int k = type == OLAT__EXR_HALF ? 2 : 0; k < 4; k++)
+                *out++ = (unsigned char)(value >> 8 * k & 255);
+        }
+        at += (bytes - 1) * w;
+    }
+}
+
+/* A block's bytes, of w x h pixels. */
+static const unsigned char *olat__exr_unpack(olat__exr *e, const unsigned char *in, size_t size, int w,
+                                             int h) {
+    const size_t capacity = (size_t)w * (size_t)h * e->pixel_size;
     if (size == capacity) return in; /* what does not get smaller is stored as it is */
     if (!e->packing) olat__exr_bad(e, "a block has another size than its pixels");
     else if (e->packing == 1) olat__exr_runs(e, in, size, capacity);
-    else {
-        olat__inflater z;
-        memset(&z, 0, sizeof z);
-        z.in = in;
-        z.size = size;
-        z.out = e->turned;
-        z.capacity = capacity;
-        const char *problem = olat__inflate(&z);
-        if (problem) olat__exr_bad(e, problem);
-    }
-    if (e->problem) return in;
+    else if (e->packing == 4) olat__exr_piz(e, in, size, w, h);
+    else if (e->packing == 5) olat__exr_pxr24(e, in, size, w, h);
+    else olat__exr_inflate(e, in, size, capacity);
+    if (e->problem || e->packing > 3) return e->raw;
+    /* these are differences, first of the even bytes, then of the odd ones */
     for (size_t i = 1; i < capacity; i++)
         e->turned[i] = (unsigned char)((e->turned[i - 1] + e->turned[i] + 128) & 255);
     for (size_t i = 0; i < capacity; i++) e->raw[i] = e->turned[i / 2 + (i & 1) * (capacity / 2)];
@@ -1337,7 +1552,7 @@ static void olat__exr_block(olat__exr *e, int number) {
     const uint32_t size = (uint32_t)olat__exr_int(e);
     const unsigned char *packed = olat__exr_take(e, size);
     if (!packed) return;
-    packed = olat__exr_unpack(e, packed, size, (size_t)w * (size_t)h * e->pixel_size);
+    packed = olat__exr_unpack(e, packed, size, w, h);
     if (!e->problem)
         olat__exr_put(e, packed, x + e->data[0] - e->display[0], y + e->data[1] - e->display[1], w, h);
 }
@@ -1356,6 +1571,7 @@ static void olat__exr_mend(olat__exr *e, size_t pixels) {
 static void olat__exr_read(olat__exr *e) {
     olat__exr_header(e);
     if (!e->problem) olat__exr_choose(e);
+    if (!e->problem && olat__exr_packed(e->packing)) olat__exr_bad(e, olat__exr_packed(e->packing));
     if (e->problem) return;
     const uint64_t columns = (uint64_t)e->display[2] - (uint64_t)e->display[0] + 1,
                    rows = (uint64_t)e->display[3] - (uint64_t)e->display[1] + 1,
@@ -1373,7 +1589,8 @@ static void olat__exr_read(olat__exr *e) {
         olat__exr_bad(e, "the display window is much larger than what the file holds");
         return;
     }
-    if (width * height * e->pixel_size / 1032 > e->size || blocks > (e->size - e->at) / 8) {
+    if (width * height * e->pixel_size / (e->packing == 5 ? 1376 : 1032) > e->size ||
+        blocks > (e->size - e->at) / 8) {
         olat__exr_bad(e, "less data than the image needs"); /* deflate packs no better */
         return;
     }
@@ -1382,7 +1599,9 @@ static void olat__exr_read(olat__exr *e) {
     e->alpha = (ssdgs_real *)calloc((size_t)(columns * rows), sizeof *e->alpha);
     if (block <= OLAT__MAX_FILE) e->raw = (unsigned char *)malloc((size_t)block);
     if (block <= OLAT__MAX_FILE) e->turned = (unsigned char *)malloc((size_t)block);
-    if (!e->color || !e->alpha || !e->raw || !e->turned) olat__exr_bad(e, "out of memory");
+    if (e->packing == 4) e->piz = (olat__piz *)malloc(sizeof *e->piz);
+    if (!e->color || !e->alpha || !e->raw || !e->turned || (e->packing == 4 && !e->piz))
+        olat__exr_bad(e, "out of memory");
     for (size_t i = 0; i < blocks && !e->problem; i++) {
         const uint64_t at = olat__le32(table + 8 * i) | (uint64_t)olat__le32(table + 8 * i + 4) << 32;
         if (at < 8 || at > e->size) olat__exr_bad(e, "a block lies outside of the file: it was not finished");
@@ -1414,7 +1633,7 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
         ssdgs_to_pixels(&image, *width, *height, SSDGS_TRANSFER_NONE, e.wide ? SSDGS_RGBA32F : SSDGS_RGBA16F,
                         *pixels, (ptrdiff_t)pitch);
     *broken += e.broken;
-    free(e.raw), free(e.turned), free(e.color), free(e.alpha);
+    free(e.raw), free(e.turned), free(e.piz), free(e.color), free(e.alpha);
     return e.problem ? olat__fail(error, "%s: byte %lu: %s", olat__tail(name), (unsigned long)e.at, e.problem)
                      : 0;
 }
