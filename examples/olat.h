@@ -152,14 +152,18 @@ OLAT__API void olat_hear(void *user, ssdgs_result code, const char *message) {
 
 /* ==== errors and files ==== */
 
+/* Names come from files and must not steer a terminal. */
+static void olat__tame(char *text) {
+    for (; *text; text++)
+        if ((unsigned char)*text < 32 || *text == 127) *text = '?';
+}
+
 OLAT__PRINTF(2, 3) static int olat__fail(char *error, const char *format, ...) {
     va_list list;
     va_start(list, format);
     vsnprintf(error, 512, format, list);
     va_end(list);
-    for (; *error; error++) { /* names come from files and must not steer a terminal */
-        if ((unsigned char)*error < 32 || *error == 127) *error = '?';
-    }
+    olat__tame(error);
     return 1;
 }
 
@@ -167,6 +171,12 @@ OLAT__PRINTF(2, 3) static int olat__fail(char *error, const char *format, ...) {
 static const char *olat__tail(const char *path) {
     size_t length = strlen(path);
     return length > 160 ? path + (length - 160) : path;
+}
+
+static int olat__same_letters(const char *text, const char *lower, size_t length) {
+    size_t i = 0;
+    while (i < length && (text[i] >= 'A' && text[i] <= 'Z' ? text[i] + 32 : text[i]) == lower[i]) i++;
+    return i == length;
 }
 
 /* Reads a regular file whole and appends a NUL. */
@@ -548,6 +558,9 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 /* ==== what is to be noted of files ==== */
 
 enum { OLAT__NAMED = 1, OLAT__OF_MASK = 2, OLAT__REMARKS = 8 };
+#define OLAT__OUTSIDE \
+    "of colours that sRGB does not hold, in more than 0.1 %% of the pixels: these are clamped"
+#define OLAT__TURNED "to be turned or mirrored for viewing (%s %d): read as stored, and poses must be of that"
 typedef struct olat__remark {
     int flags; /* OLAT__NAMED: the files' names belong to it; OLAT__OF_MASK: it is about masks */
     char text[240];
@@ -571,6 +584,7 @@ OLAT__PRINTF(3, 4) static void olat__tell(olat__found *found, int flags, const c
     va_start(list, format);
     vsnprintf(remark->text, sizeof remark->text, format, list);
     va_end(list);
+    olat__tame(remark->text);
 }
 
 /* ==== primaries ==== */
@@ -1061,23 +1075,48 @@ OLAT__API int olat_write_png(const char *path, int width, int height, int channe
     return failed;
 }
 
-/* ==== OpenEXR: one image in scan lines or tiles; plain, RLE, ZIPS, ZIP, PIZ, PXR24; half and float ==== */
+/* ==== OpenEXR: scan lines or tiles; plain, RLE, ZIPS, ZIP, PIZ, PXR24; half and float ==== */
 
 /* What is written into a file is linear light times alpha; what comes out is straight alpha. */
-enum { OLAT__EXR_MAGIC = 20000630, OLAT__EXR_CHANNELS = 256, OLAT__EXR_HALF = 1, OLAT__EXR_FLOAT = 2 };
+enum {
+    OLAT__EXR_MAGIC = 20000630,
+    OLAT__EXR_CHANNELS = 256,
+    OLAT__EXR_PARTS = 1024,
+    OLAT__EXR_HALF = 1,
+    OLAT__EXR_FLOAT = 2,
+    OLAT__EXR_NONE = 64 /* the rank of what has no colours */
+};
+typedef struct olat__exr_text {
+    const char *text;
+    size_t size;
+} olat__exr_text;
 typedef struct olat__exr {
     const unsigned char *bytes;
     size_t size, at; /* what is read next */
     const char *problem;
-    int data[4], display[4]; /* windows: left, top, right, bottom, all inside */
-    int found;               /* bits of the attributes that must be there */
-    int packing, tiled, lines, tile[2];
+    char text[240]; /* the problem's, where it has names */
+    int several;    /* parts: each block names its own */
+    /* of a part, the one at hand or chosen */
+    int part, found;                    /* found: bits of the attributes that are there */
+    olat__exr_text name, type, views;   /* views: numbers of 4 bytes and so many letters, the default first */
+    int data[4], display[4];            /* windows: left, top, right, bottom, all inside */
+    int packing, tiled, lines, tile[2]; /* lines: of a block */
+    int sparse, deep;                   /* what cannot be read: channels of fewer samples, lists of depths */
+    uint32_t blocks;                    /* where there are several parts */
+    int has_xy;                         /* chromaticities */
+    double xy[8];
+    float aspect;
+    int turned_by; /* Orientation */
     struct {
         const char *name;
+        size_t layer; /* letters before its own name */
         int type, to; /* to: 0 .. 3 of RGBA, 4 grey, -1 nowhere */
     } channels[OLAT__EXR_CHANNELS];
     int channel_count, wide; /* wide: a colour is float */
     size_t pixel_size;
+    int chosen, letters, rank; /* a channel of the layer; those it has, as bits; the lower the better */
+    int colours, greys;        /* layers that could have been chosen, of all parts */
+    /* of the picture */
     unsigned char *raw, *turned; /* a block unpacked, and before its bytes are sorted */
     struct olat__piz *piz;       /* what unpacking PIZ needs */
     ssdgs_real *color, *alpha;   /* of the display window */
@@ -1113,7 +1152,7 @@ static int32_t olat__exr_int(olat__exr *e) {
 }
 
 /* A name that ends with a zero byte before `end`; "" after a failure. */
-static const char *olat__exr_text(olat__exr *e, size_t end) {
+static const char *olat__exr_text_at(olat__exr *e, size_t end) {
     const char *text = (const char *)e->bytes + e->at;
     const size_t left = e->at < end ? end - e->at : 0;
     if (e->problem || !left || !memchr(text, 0, left < 256 ? left : 256)) {
@@ -1124,18 +1163,24 @@ static const char *olat__exr_text(olat__exr *e, size_t end) {
     return text;
 }
 
+static int olat__exr_is(olat__exr_text text, const char *word) {
+    return text.size == strlen(word) && !memcmp(text.text, word, text.size);
+}
+
 static void olat__exr_channels(olat__exr *e, size_t end) {
     const char *name;
-    while (*(name = olat__exr_text(e, end))) {
+    while (*(name = olat__exr_text_at(e, end))) {
         const int type = olat__exr_int(e);
         olat__exr_take(e, 4);
         const int across = olat__exr_int(e), down = olat__exr_int(e);
         if (e->problem) return;
         if (type < 0 || type > 2) olat__exr_bad(e, "a channel of unknown type");
-        if (across != 1 || down != 1) olat__exr_bad(e, "channels of fewer samples cannot be read");
         if (e->channel_count == OLAT__EXR_CHANNELS) olat__exr_bad(e, "more than 256 channels");
         if (e->problem) return;
+        const char *dot = strrchr(name, '.');
+        e->sparse |= across != 1 || down != 1;
         e->channels[e->channel_count].name = name;
+        e->channels[e->channel_count].layer = dot ? (size_t)(dot + 1 - name) : 0;
         e->channels[e->channel_count++].type = type;
         e->pixel_size += type == OLAT__EXR_HALF ? 2 : 4;
     }
@@ -1178,75 +1223,234 @@ static void olat__exr_tiles(olat__exr *e) {
     olat__exr_take(e, 1); /* levels: the first is the whole image */
 }
 
+static float olat__exr_float(const unsigned char *p) {
+    const uint32_t bits = olat__le32(p);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* Reads what a part tells of itself. Attributes that only add something count where they are what their names
+   tell. */
 static void olat__exr_header(olat__exr *e) {
     static const struct {
         const char *name, *type;
         uint32_t size; /* 0: any */
-    } wanted[5] = {{"channels", "chlist", 0},
-                   {"compression", "compression", 1},
-                   {"dataWindow", "box2i", 16},
-                   {"displayWindow", "box2i", 16},
-                   {"tiles", "tiledesc", 9}};
+    } wanted[] = {{"channels", "chlist", 0},
+                  {"compression", "compression", 1},
+                  {"dataWindow", "box2i", 16},
+                  {"displayWindow", "box2i", 16},
+                  {"tiles", "tiledesc", 9},
+                  {"chunkCount", "int", 4},
+                  {"type", "string", 0},
+                  {"name", "string", 0},
+                  {"multiView", "stringvector", 0},
+                  {"chromaticities", "chromaticities", 32},
+                  {"pixelAspectRatio", "float", 4},
+                  {"Orientation", "int", 4}};
+    enum { CHANNELS, PACKING, DATA, DISPLAY, TILES, BLOCKS, TYPE, NAME, VIEWS, XY, ASPECT, TURNED, KINDS };
     const char *name;
-    olat__exr_take(e, 4);
-    const uint32_t version = (uint32_t)olat__exr_int(e);
-    if ((version & 255) != 2) olat__exr_bad(e, "not version 2 of the format");
-    if (version & 0x1800) olat__exr_bad(e, "files of several parts or deep pixels cannot be read");
-    e->tiled = (version & 0x200) != 0;
-    while (*(name = olat__exr_text(e, e->size))) {
-        const char *type = olat__exr_text(e, e->size);
+    while (*(name = olat__exr_text_at(e, e->size))) {
+        const char *type = olat__exr_text_at(e, e->size);
         const uint32_t length = (uint32_t)olat__exr_int(e);
         if (!e->problem && length > e->size - e->at) olat__exr_bad(e, "the file ends early");
         if (e->problem) return;
         const size_t end = e->at + length;
-        for (int i = 0; i < 5; i++) {
+        const unsigned char *p = e->bytes + e->at;
+        const olat__exr_text text = {(const char *)p, length};
+        for (int i = 0; i < KINDS; i++) {
             if (strcmp(name, wanted[i].name) != 0) continue;
-            if (strcmp(type, wanted[i].type) != 0 || (wanted[i].size && wanted[i].size != length))
-                olat__exr_bad(e, "an attribute of another type than its name tells");
+            const int matches =
+                !strcmp(type, wanted[i].type) && (!wanted[i].size || wanted[i].size == length);
+            if (!matches && i > TILES) continue;
+            if (!matches) olat__exr_bad(e, "an attribute of another type than its name tells");
             if (e->found >> i & 1) olat__exr_bad(e, "an attribute twice");
             e->found |= 1 << i;
-            if (i == 0) olat__exr_channels(e, end);
-            else if (i == 1) olat__exr_packing(e);
-            else if (i < 4) olat__exr_window(e, i == 2 ? e->data : e->display);
-            else olat__exr_tiles(e);
+            if (i == CHANNELS) olat__exr_channels(e, end);
+            if (i == PACKING) olat__exr_packing(e);
+            if (i == DATA) olat__exr_window(e, e->data);
+            if (i == DISPLAY) olat__exr_window(e, e->display);
+            if (i == TILES) olat__exr_tiles(e);
+            if (i == BLOCKS) e->blocks = olat__le32(p);
+            if (i == TYPE) e->type = text;
+            if (i == NAME) e->name = text;
+            if (i == VIEWS) e->views = text;
+            e->has_xy |= i == XY;
+            for (int k = 0; i == XY && k < 8; k++) e->xy[k] = (double)olat__exr_float(p + 4 * k);
+            if (i == ASPECT) e->aspect = olat__exr_float(p);
+            if (i == TURNED) e->turned_by = olat__exr_int(e);
         }
         if (e->problem) return;
         e->at = end;
     }
     if (e->problem) return;
-    if ((e->found & 15) != 15 || (e->tiled && !(e->found & 16)))
+    if (e->several) {
+        if (!(e->found >> BLOCKS & 1)) olat__exr_bad(e, "a part does not tell its chunkCount");
+        e->tiled = olat__exr_is(e->type, "tiledimage");
+        e->deep = !e->tiled && !olat__exr_is(e->type, "scanlineimage");
+    } else e->name.size = 0;
+    if ((e->found & 15) != 15 || (e->tiled && !(e->found >> TILES & 1)))
         olat__exr_bad(e, "channels, compression, dataWindow, displayWindow or tiles are missing");
 }
 
-/* Finds R, G, B and A, or Y: of the image itself, else of the first layer that has R or Y. */
-static void olat__exr_choose(olat__exr *e) {
-    static const char letters[] = "RGBAY";
-    size_t layer = SIZE_MAX; /* letters before the channel's own name */
-    const char *prefix = "";
-    int found = 0;
-    for (int i = 0; i < e->channel_count; i++) {
-        const char *name = e->channels[i].name, *dot = strrchr(name, '.'), *own = dot ? dot + 1 : name;
-        const size_t before = (size_t)(own - name);
-        if ((strcmp(own, "R") != 0 && strcmp(own, "Y") != 0) || (layer != SIZE_MAX && before)) continue;
-        layer = before;
-        prefix = name;
+static int olat__exr_same_layer(const olat__exr *e, int i, int k) {
+    const size_t length = e->channels[i].layer;
+    return e->channels[k].layer == length && !memcmp(e->channels[i].name, e->channels[k].name, length);
+}
+
+/* What a channel is by its own name: 0 .. 3 of RGBA, 4 Y, 5 X, -1 none of them. */
+static int olat__exr_letter(const olat__exr *e, int i) {
+    static const char letters[] = "RGBAYX";
+    const char *own = e->channels[i].name + e->channels[i].layer;
+    const char *at = own[0] && !own[1] ? strchr(letters, own[0]) : NULL;
+    return at ? (int)(at - letters) : -1;
+}
+
+/* Takes the last part off a name of parts between dots. */
+static olat__exr_text olat__exr_last(olat__exr_text *name) {
+    olat__exr_text last = *name;
+    while (name->size && name->text[name->size - 1] != '.') name->size--;
+    last.text += name->size;
+    last.size -= name->size;
+    name->size -= name->size > 0;
+    return last;
+}
+
+/* The place of a name among the part's views, -1 if it is none. */
+static int olat__exr_view(const olat__exr *e, olat__exr_text name) {
+    olat__exr_text left = e->views;
+    for (int i = 0; left.size >= 4; i++) {
+        const size_t size = olat__le32((const unsigned char *)left.text);
+        left.text += 4;
+        left.size -= 4;
+        if (size > left.size) break;
+        if (size && size == name.size && !memcmp(left.text, name.text, size)) return i;
+        left.text += size;
+        left.size -= size;
+    }
+    return -1;
+}
+
+/* How well a layer suits as the picture, by its name, that of its part where it has none, and its letters:
+   Combined as Blender has it, the one without a name, what others call it, with alpha, without; then those of
+   other views than the default; then grey ones; then whole numbers. X Y Z is a place or a direction. */
+static int olat__exr_rank(const olat__exr *e, int channel, int letters, int whole) {
+    const int colours = (letters & 7) == 7;
+    olat__exr_text name = {e->channels[channel].name, e->channels[channel].layer};
+    if (!colours && (letters & 0x30) != 0x10) return OLAT__EXR_NONE;
+    if (!name.size) name = e->name;
+    else name.size--;
+    olat__exr_text last = olat__exr_last(&name);
+    const int view = olat__exr_view(e, last);
+    if (view >= 0) last = olat__exr_last(&name);
+    const int rank = olat__exr_is(last, "Combined") ? 0
+                     : !last.size                   ? 1
+                     : (last.size == 4 && olat__same_letters(last.text, "rgba", 4)) ||
+                             (last.size == 6 && olat__same_letters(last.text, "beauty", 6))
+                         ? 2
+                     : letters & 8 ? 3
+                                   : 4;
+    return rank + 8 * (view > 0) + 16 * !colours + 32 * ((whole & (colours ? 15 : 24)) != 0);
+}
+
+/* Chooses the part's layer that suits best, the first one of equals; `most` becomes the letters of the one
+   that has most of R, G, B so far. */
+static void olat__exr_choose(olat__exr *e, int *most) {
+    e->rank = OLAT__EXR_NONE;
+    for (int i = 0; i < e->channel_count && !e->deep; i++) {
+        int letters = 0, whole = 0;
+        const int own = olat__exr_letter(e, i);
+        if (own < 0) continue;
+        for (int k = 0; k < e->channel_count; k++) {
+            const int letter = olat__exr_same_layer(e, i, k) ? olat__exr_letter(e, k) : -1;
+            if (letter >= 0) letters |= 1 << letter;
+            if (letter >= 0 && !e->channels[k].type) whole |= 1 << letter;
+        }
+        const int rgb = letters & 7, of[8] = {0, 1, 1, 2, 1, 2, 2, 3};
+        if (of[rgb] > of[*most & 7]) *most = letters;
+        const int rank = own == (rgb == 7 ? 0 : 4) ? olat__exr_rank(e, i, letters, whole) : OLAT__EXR_NONE;
+        if (rank == OLAT__EXR_NONE) continue;
+        if (rgb == 7) e->colours++;
+        else e->greys++;
+        if (rank >= e->rank) continue;
+        e->rank = rank;
+        e->chosen = i;
+        e->letters = rgb == 7 ? letters & 15 : letters & 24;
     }
     for (int i = 0; i < e->channel_count; i++) {
-        const char *name = e->channels[i].name, *letter;
-        e->channels[i].to = -1;
-        if (layer == SIZE_MAX || strlen(name) != layer + 1 || memcmp(name, prefix, layer) != 0) continue;
-        if ((letter = strchr(letters, name[layer])) != NULL) e->channels[i].to = (int)(letter - letters);
+        const int letter = olat__exr_letter(e, i);
+        const int used = e->rank < OLAT__EXR_NONE && letter >= 0 && olat__exr_same_layer(e, e->chosen, i) &&
+                         (e->letters >> letter & 1);
+        e->channels[i].to = used ? letter : -1;
+        e->wide |= used && e->channels[i].type == OLAT__EXR_FLOAT;
     }
-    for (int i = 0; i < e->channel_count; i++)
-        if (e->channels[i].to >= 0) found |= 1 << e->channels[i].to;
-    for (int i = 0; i < e->channel_count; i++) {
-        int *to = &e->channels[i].to;
-        if (*to == 4 && (found & 7) == 7) *to = -1;
-        if (*to >= 0 && !e->channels[i].type) olat__exr_bad(e, "a channel of colour holds whole numbers");
-        e->wide |= *to >= 0 && e->channels[i].type == OLAT__EXR_FLOAT;
+}
+
+/* Reads the headers of all parts and chooses one as layers are chosen. What is read next are its blocks'
+   places. */
+static void olat__exr_parts(olat__exr *e) {
+    olat__exr blank, best;
+    char channels[160] = "";
+    int most = 0, deep = 0, colours = 0, greys = 0;
+    uint64_t before = 0, blocks = 0; /* places before those of the best part, of the parts so far */
+    olat__exr_take(e, 4);
+    const uint32_t version = (uint32_t)olat__exr_int(e);
+    if (!e->problem && (version & 255) != 2) olat__exr_bad(e, "not version 2 of the format");
+    e->several = (version & 0x1000) != 0;
+    e->tiled = !e->several && (version & 0x200);
+    e->deep = !e->several && (version & 0x800);
+    e->aspect = 1;
+    e->name.text = e->type.text = e->views.text = "";
+    if (e->problem) return;
+    blank = *e;
+    best = *e;
+    for (int part = 0; !part || (e->several && e->at < e->size && e->bytes[e->at]); part++) {
+        blank.at = e->at;
+        *e = blank;
+        e->part = part;
+        olat__exr_header(e);
+        if (part == OLAT__EXR_PARTS) olat__exr_bad(e, "more than 1024 parts");
+        if (e->problem) return;
+        olat__exr_choose(e, &most);
+        deep |= e->deep;
+        colours += e->colours;
+        greys += e->greys;
+        for (int i = 0; i < e->channel_count; i++) {
+            const size_t used = strlen(channels);
+            snprintf(channels + used, sizeof channels - used, "%s%s", used ? ", " : "", e->channels[i].name);
+        }
+        if (!part || e->rank < best.rank) {
+            best = *e;
+            before = blocks;
+        }
+        blocks += e->blocks;
     }
-    if ((found & 7) != 7 && !(found & 16)) olat__exr_bad(e, "it has no channels R, G, B, nor Y");
-    e->found = found;
+    if (e->several) olat__exr_take(e, 1); /* what ends the headers */
+    if (!e->problem && best.rank == OLAT__EXR_NONE && deep)
+        olat__exr_bad(e, "deep pixels cannot be read: flatten them, for instance with: oiiotool in.exr "
+                         "--flatten -o out.exr");
+    if (!e->problem && best.rank == OLAT__EXR_NONE) {
+        char missing[16] = "";
+        for (int c = 0; c < 3; c++) {
+            const size_t used = strlen(missing);
+            if (!(most >> c & 1))
+                snprintf(missing + used, sizeof missing - used, "%s%c", used ? ", " : "", "RGB"[c]);
+        }
+        snprintf(e->text, sizeof e->text,
+                 "channels are missing: %s; it has %s%s: light must be named R, G, B, or Y", missing,
+                 *channels ? channels : "none", strlen(channels) + 1 == sizeof channels ? " ..." : "");
+        e->problem = e->text;
+    }
+    if (e->problem) return;
+    best.at = e->at;
+    *e = best;
+    e->colours = colours;
+    e->greys = greys;
+    if (e->rank >= 32) olat__exr_bad(e, "a channel of colour holds whole numbers");
+    if (e->sparse) olat__exr_bad(e, "channels of fewer samples cannot be read");
+    if (olat__exr_packed(e->packing)) olat__exr_bad(e, olat__exr_packed(e->packing));
+    if (before > e->size / 8) olat__exr_bad(e, "the file ends early");
+    else olat__exr_take(e, 8 * (size_t)before);
 }
 
 /* Expands runs: a count below 0 is of bytes that follow, else one more than that of copies of the next. */
@@ -1546,6 +1750,8 @@ static void olat__exr_block(olat__exr *e, int number) {
     const int x = number % across * step[0], y = number / across * step[1]; /* in the data window */
     const int w = width - x < step[0] ? width - x : step[0], h = height - y < step[1] ? height - y : step[1];
     const int wanted[4] = {number % across, number / across, 0, 0};
+    if (e->several && olat__exr_int(e) != e->part)
+        olat__exr_bad(e, "another part's block than its place in the table tells");
     for (int i = 0; i < (e->tiled ? 4 : 1); i++)
         if (olat__exr_int(e) != (e->tiled ? wanted[i] : y + e->data[1]))
             olat__exr_bad(e, "another block than its place in the table tells");
@@ -1557,21 +1763,63 @@ static void olat__exr_block(olat__exr *e, int number) {
         olat__exr_put(e, packed, x + e->data[0] - e->display[0], y + e->data[1] - e->display[1], w, h);
 }
 
-/* No light is negative, and none becomes too much for halves when it is divided by alpha. */
-static void olat__exr_mend(olat__exr *e, size_t pixels) {
-    for (size_t i = 0; i < pixels; i++) {
+/* No light is negative, and none becomes too much for halves when it is divided by alpha. Colours become
+   those of sRGB's primaries. */
+static void olat__exr_mend(olat__exr *e, size_t pixels, olat__found *found) {
+    double matrix[9], v[3], light[3];
+    size_t clear = 0, lit = 0, outside = 0;
+    const int space = e->has_xy && (e->letters & 7) ? olat__primaries(e->xy, matrix) : 1;
+    if (!space)
+        olat__exr_bad(e, "chromaticities that no colours have: take them out, for instance with: oiiotool "
+                         "in.exr --eraseattrib chromaticities -o out.exr");
+    for (size_t i = 0; i < pixels && space; i++) {
         ssdgs_real *color = e->color + 3 * i, *alpha = e->alpha + i;
-        if (!(e->found & 8)) *alpha = 1;
+        if (!(e->letters & 8)) *alpha = 1;
         *alpha = *alpha < 0 ? 0 : *alpha > 1 ? 1 : *alpha;
+        if (*alpha < (ssdgs_real)(1.0 / 255)) {
+            clear++;
+            lit += color[0] > (ssdgs_real)0.01 || color[1] > (ssdgs_real)0.01 || color[2] > (ssdgs_real)0.01;
+        }
+        if (space == 2) {
+            for (int c = 0; c < 3; c++) v[c] = (double)color[c];
+            olat__transform(matrix, v, light);
+            for (int c = 0; c < 3; c++) color[c] = (ssdgs_real)light[c];
+            outside += light[0] < -1e-3 || light[1] < -1e-3 || light[2] < -1e-3;
+        }
         for (int c = 0; c < 3; c++)
             color[c] = color[c] < 0 ? 0 : color[c] > 65504 * *alpha ? 65504 * *alpha : color[c];
     }
+    if (space == 2) olat__tell(found, 0, "of other primaries (chromaticities): converted to sRGB's");
+    if (outside > pixels / 1000) olat__tell(found, OLAT__NAMED, OLAT__OUTSIDE);
+    if (100 * lit > pixels && 4 * lit > clear)
+        olat__tell(found, OLAT__NAMED,
+                   "lit where alpha is 0, so this looks straight: OpenEXR's colours are light times alpha; "
+                   "multiply them, for instance with: oiiotool in.exr --premult -o out.exr");
 }
 
-static void olat__exr_read(olat__exr *e) {
-    olat__exr_header(e);
-    if (!e->problem) olat__exr_choose(e);
-    if (!e->problem && olat__exr_packed(e->packing)) olat__exr_bad(e, olat__exr_packed(e->packing));
+/* What is to be told of a photograph that could be read. */
+static void olat__exr_tell(const olat__exr *e, olat__found *found) {
+    const int layers = e->letters & 7 ? e->colours : e->greys;
+    const size_t letters = e->channels[e->chosen].layer;
+    const int layer = letters > 80 ? 80
+                      : letters    ? (int)letters - 1
+                                   : 0,
+              part = e->name.size > 60 ? 60 : (int)e->name.size;
+    if (layers > 1)
+        olat__tell(found, OLAT__NAMED, "of %d layers or parts with %s: %.*s%s%.*s%s is taken", layers,
+                   e->letters & 7 ? "R, G, B" : "Y", part, e->name.text, part && layer ? "." : "", layer,
+                   e->channels[e->chosen].name, part || layer ? "" : "the one without a name");
+    if (!(fabs((double)e->aspect - 1) < 0.01))
+        olat__tell(found, OLAT__NAMED,
+                   "of pixels that are not square (pixelAspectRatio %g): read as stored, and fl_x and fl_y "
+                   "must be of that",
+                   (double)e->aspect);
+    if (e->turned_by > 1 && e->turned_by < 9)
+        olat__tell(found, OLAT__NAMED, OLAT__TURNED, "OpenEXR's Orientation", e->turned_by);
+}
+
+static void olat__exr_read(olat__exr *e, olat__found *found) {
+    olat__exr_parts(e);
     if (e->problem) return;
     const uint64_t columns = (uint64_t)e->display[2] - (uint64_t)e->display[0] + 1,
                    rows = (uint64_t)e->display[3] - (uint64_t)e->display[1] + 1,
@@ -1590,7 +1838,7 @@ static void olat__exr_read(olat__exr *e) {
         return;
     }
     if (width * height * e->pixel_size / (e->packing == 5 ? 1376 : 1032) > e->size ||
-        blocks > (e->size - e->at) / 8) {
+        blocks > (e->size - e->at) / 8 || (e->several && blocks > e->blocks)) {
         olat__exr_bad(e, "less data than the image needs"); /* deflate packs no better */
         return;
     }
@@ -1608,11 +1856,12 @@ static void olat__exr_read(olat__exr *e) {
         else e->at = (size_t)at;
         olat__exr_block(e, (int)i);
     }
-    if (!e->problem) olat__exr_mend(e, (size_t)(columns * rows));
+    if (!e->problem) olat__exr_mend(e, (size_t)(columns * rows), found);
+    if (!e->problem) olat__exr_tell(e, found);
 }
 
 static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t size, int *width,
-                            int *height, ssdgs_pixels *format, void **pixels, unsigned long *broken,
+                            int *height, ssdgs_pixels *format, void **pixels, olat__found *found,
                             char *error) {
     olat__exr e;
     ssdgs_image image;
@@ -1620,7 +1869,7 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
     memset(&image, 0, sizeof image);
     e.bytes = bytes;
     e.size = size;
-    olat__exr_read(&e);
+    olat__exr_read(&e, found);
     *width = e.problem ? 0 : e.display[2] - e.display[0] + 1;
     *height = e.problem ? 0 : e.display[3] - e.display[1] + 1;
     *format = e.wide ? SSDGS_PIXELS_RGBA32F : SSDGS_PIXELS_RGBA16F;
@@ -1632,7 +1881,7 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
     if (!e.problem)
         ssdgs_to_pixels(&image, *width, *height, SSDGS_TRANSFER_NONE, e.wide ? SSDGS_RGBA32F : SSDGS_RGBA16F,
                         *pixels, (ptrdiff_t)pitch);
-    *broken += e.broken;
+    found->broken += e.broken;
     free(e.raw), free(e.turned), free(e.piz), free(e.color), free(e.alpha);
     return e.problem ? olat__fail(error, "%s: byte %lu: %s", olat__tail(name), (unsigned long)e.at, e.problem)
                      : 0;
@@ -1957,10 +2206,7 @@ static int olat__png_convert(olat__png *png, const olat__space *space, olat__fou
             space->high ? olat__to_half((float)alpha / (float)top) : (uint16_t)(alpha * (65535 / top));
         outside += odd && alpha;
     }
-    if (outside > pixels / 1000)
-        olat__tell(found, OLAT__NAMED,
-                   "of colours that sRGB does not hold, in more than 0.1 %% of the pixels: "
-                   "these are clamped");
+    if (outside > pixels / 1000) olat__tell(found, OLAT__NAMED, OLAT__OUTSIDE);
     free(table);
     free(png->out);
     png->out = (unsigned char *)out;
@@ -2004,12 +2250,7 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
             olat__png_convert(png, &space, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
     }
     free(png->packed);
-    if (turned > 1 && turned < 9)
-        olat__tell(
-            found, OLAT__NAMED,
-            "to be turned or mirrored for viewing (eXIf orientation %d): read as stored, and poses must "
-            "be of that",
-            turned);
+    if (turned > 1 && turned < 9) olat__tell(found, OLAT__NAMED, OLAT__TURNED, "eXIf orientation", turned);
     if (phys) {
         const double x = olat__be32(phys), y = olat__be32(phys + 4);
         if (x > 0 && y > 0 && fabs(x / y - 1) > 0.01)
@@ -2027,11 +2268,13 @@ static int olat__image_file(const char *path, int is_mask, int *width, int *heig
                             void **pixels, olat__found *found, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
+    const int told = found->count;
     *pixels = NULL;
     int failed = olat__read_file(path, &bytes, &size, error);
-    if (!failed && size >= 4 && olat__le32(bytes) == OLAT__EXR_MAGIC)
-        failed = olat__exr_decode(path, bytes, size, width, height, format, pixels, &found->broken, error);
-    else if (!failed) {
+    if (!failed && size >= 4 && olat__le32(bytes) == OLAT__EXR_MAGIC) {
+        failed = olat__exr_decode(path, bytes, size, width, height, format, pixels, found, error);
+        if (is_mask) found->count = told;
+    } else if (!failed) {
         olat__png png;
         memset(&png, 0, sizeof png);
         png.is_mask = is_mask;
@@ -2105,12 +2348,6 @@ static int olat__json_fail(olat__json *j, const olat__node *node, const char *fo
 }
 
 static int olat__is_digit(char c) { return c >= '0' && c <= '9'; }
-
-static int olat__same_letters(const char *text, const char *lower, size_t length) {
-    size_t i = 0;
-    while (i < length && (text[i] >= 'A' && text[i] <= 'Z' ? text[i] + 32 : text[i]) == lower[i]) i++;
-    return i == length;
-}
 
 /* Reads the JSON number at text; returns its length, 0 if there is none. strtod is given whole digits and an
    exponent, which read the same in every locale, and today's C libraries round them correctly. 767 digits

@@ -2028,10 +2028,19 @@ static double apart(const olat_dataset *a, const olat_dataset *b) {
 typedef struct exr {
     int packing, tile[2]; /* tile: 0 0 = scan lines */
     int data[4], display[4];
-    const char *names[7]; /* of the channels, in the order of the file; NULL ends them */
-    int types[7];         /* 0 whole numbers, 1 half, 2 float */
-    int odd;              /* 1: what a channel of colour holds changes little, so that it packs well */
+    const char *names[10]; /* of the channels, in the order of the file; NULL ends them */
+    int types[10];         /* 0 whole numbers, 1 half, 2 float */
+    int odd;           /* 1: what a channel of colour holds changes little, so that it packs well; 2: PIZ's
+                          words are of 16 bits */
+    const char *layer; /* whose channels are to be taken, with its dot */
 } exr;
+
+/* An attribute beside those that must be there; NULL: none. */
+static struct {
+    const char *name, *type;
+    const void *bytes;
+    size_t size;
+} exr_more;
 
 static void put_bytes(const void *bytes, size_t size) {
     if (file_size + size > sizeof file) exit(1);
@@ -2054,9 +2063,11 @@ static void put_attribute(const char *name, const char *type, const void *bytes,
 static unsigned exr_half(const exr *e, int channel, int x, int y) {
     const char *name =
         strrchr(e->names[channel], '.') ? strrchr(e->names[channel], '.') + 1 : e->names[channel];
-    const unsigned key = (unsigned)(7 * x + 131 * y + 1009 * name[0]);
-    if (name[0] == 'A') return x % 3 == 0 ? 0x3C00 : x % 3 == 1 ? 0x3555 : 0; /* 1, 1/3, 0 */
-    if (e->odd) return 0x3800 + (unsigned)(y / 3);
+    unsigned tag = 0;
+    for (const char *at = e->names[channel]; *at; at++) tag = 3 * tag + (unsigned char)*at;
+    const unsigned key = (unsigned)(7 * x + 131 * y) + 1009 * tag;
+    if (!strcmp(name, "A")) return x % 3 == 0 ? 0x3C00 : x % 3 == 1 ? 0x3555 : 0; /* 1, 1/3, 0 */
+    if (e->odd) return 0x3800 + (unsigned)(y / 3) + 32 * (tag * 5 % 29);
     return key % 97 == 0   ? 0x0007
            : key % 89 == 0 ? 0xB800
                            : 0x2000 + key * 2654435761u % 0x3000; /* up to 8 */
@@ -2095,6 +2106,147 @@ static size_t exr_pack(int packing, const unsigned char *raw, size_t size, unsig
     return olat__deflate(turned, size, out, table);
 }
 
+/* PXR24: differences of neighbours, the highest bytes of a row first. */
+static size_t exr_pxr24(const exr *e, const unsigned char *raw, int w, int h, unsigned char *out) {
+    static unsigned char planes[1 << 16];
+    static uint32_t table[65536];
+    size_t length = 0;
+    for (int y = 0; y < h; y++)
+        for (int c = 0; e->names[c]; c++) {
+            const int size = e->types[c] == 1 ? 2 : 4, skipped = e->types[c] == 2;
+            uint32_t last = 0;
+            for (int x = 0; x < w; x++, raw += size) {
+                uint32_t value = 0;
+                for (int k = skipped; k < size; k++) value |= (uint32_t)raw[k] << (8 * (k - skipped));
+                const uint32_t change = value - last;
+                last = value;
+                for (int k = 0; k < size - skipped; k++)
+                    planes[length + (size_t)(k * w + x)] =
+                        (unsigned char)(change >> 8 * (size - skipped - 1 - k) & 255);
+            }
+            length += (size_t)((size - skipped) * w);
+        }
+    memset(table, 0, sizeof table);
+    return olat__deflate(planes, length, out, table);
+}
+
+static void piz_halve(uint16_t *a, uint16_t *b, int narrow) {
+    const int first = *a, second = *b;
+    if (narrow) { /* of numbers below 2^14 and what becomes of them, with a sign */
+        const int p = (int16_t)first, q = (int16_t)second;
+        *a = (uint16_t)((int)floor((p + q) / 2.0) & 65535);
+        *b = (uint16_t)((p - q) & 65535);
+    } else {
+        const int from = (first + 32768) & 65535, difference = from - second, mean = (from + second) >> 1;
+        *a = (uint16_t)(difference < 0 ? (mean + 32768) & 65535 : mean);
+        *b = (uint16_t)(difference & 65535);
+    }
+}
+
+/* PIZ, whose Huffman code has codes of two lengths only. */
+static size_t exr_piz(const exr *e, const unsigned char *raw, int w, int h, unsigned char *out) {
+    static uint16_t words[1 << 15], place[65536];
+    static unsigned char used[65537];
+    static uint32_t codes[65537];
+    size_t count = 0, length = 0, occur = 1, low = 8191, high = 0, symbols = 1, bits = 0;
+    int row = 0, offset = 0;
+    for (int c = 0; e->names[c]; c++) row += (e->types[c] == 1 ? 2 : 4) * w;
+    for (int c = 0; e->names[c]; offset += (e->types[c++] == 1 ? 2 : 4) * w)
+        for (int y = 0; y < h; y++)
+            for (int i = 0; i < (e->types[c] == 1 ? 1 : 2) * w; i++, count++)
+                words[count] =
+                    (uint16_t)(raw[y * row + offset + 2 * i] | raw[y * row + offset + 2 * i + 1] << 8);
+    memset(used, e->odd == 2, sizeof used);
+    for (size_t i = 0; i < count; i++) used[words[i]] = 1;
+    used[0] = 0;
+    for (size_t i = 1; i < 65536; i++)
+        if (used[i]) {
+            place[i] = (uint16_t)occur++;
+            low = i / 8 < low ? i / 8 : low;
+            high = i / 8;
+        }
+    out[0] = (unsigned char)(low & 255), out[1] = (unsigned char)(low >> 8);
+    out[2] = (unsigned char)(high & 255), out[3] = (unsigned char)(high >> 8);
+    length = 4;
+    for (size_t i = low; i <= high; i++, length++) {
+        out[length] = 0;
+        for (size_t k = 0; k < 8; k++) out[length] = (unsigned char)(out[length] | used[8 * i + k] << k);
+    }
+    for (size_t i = 0; i < count; i++) words[i] = place[words[i]];
+    uint16_t *at = words;
+    for (int c = 0; e->names[c]; c++) {
+        const int each = e->types[c] == 1 ? 1 : 2;
+        for (int k = 0; k < each; k++)
+            for (int p = 1; 2 * p <= (w < h ? w : h); p *= 2)
+                for (int y = 0; y < h - h % p; y += 2 * p)
+                    for (int x = 0; x < w - w % p; x += 2 * p) { /* a square, or what is left of one */
+                        const int right = x + 2 * p <= w, below = y + 2 * p <= h, narrow = occur <= 16384;
+                        uint16_t *q = at + (y * w + x) * each + k;
+                        if (right) piz_halve(q, q + p * each, narrow);
+                        if (right && below) piz_halve(q + p * w * each, q + (p * w + p) * each, narrow);
+                        if (below) piz_halve(q, q + p * w * each, narrow);
+                        if (right && below) piz_halve(q + p * each, q + (p * w + p) * each, narrow);
+                    }
+        at += each * w * h;
+    }
+    /* the code: the first of the symbols have a bit less, and longer codes are smaller */
+    memset(used, 0, sizeof used);
+    for (size_t i = 0; i < count; i++) used[words[i]] = 1;
+    size_t first = 65536, last = 0, two = 1;
+    for (size_t i = 0; i < 65536; i++)
+        if (used[i]) {
+            first = i < first ? i : first;
+            last = i + 1;
+            symbols++;
+        }
+    used[last] = 1;
+    while (two < symbols) two *= 2, bits++;
+    uint32_t shorter = (uint32_t)(two - symbols), code[2] = {0, (uint32_t)(symbols - shorter) / 2};
+    unsigned char *const head = out + length + 4;
+    unsigned char *to = head + 20;
+    uint64_t queue = 0;
+    size_t queued = 0;
+#define PUT(value, n) \
+    for (queue = queue << (n) | (value), queued += (size_t)(n); queued >= 8; queued -= 8) \
+    *to++ = (unsigned char)(queue >> (queued - 8) & 255)
+    for (size_t i = first; i <= last;) {
+        size_t none = 0;
+        while (!used[i + none] && none < 261) none++;
+        if (none > 5) PUT(63, 6);
+        if (none > 5) PUT(none - 6, 8);
+        if (none > 1 && none < 6) PUT(57 + none, 6);
+        if (none == 1) PUT(0, 6);
+        i += none;
+        if (none) continue;
+        const int brief = shorter > 0;
+        shorter -= brief ? 1 : 0;
+        PUT(bits - (size_t)brief, 6);
+        used[i] = (unsigned char)(bits - (size_t)brief);
+        codes[i++] = code[brief]++;
+    }
+    if (queued) PUT(0, 8 - queued % 8);
+    unsigned char *const begin = to;
+    size_t total = 0;
+    for (size_t i = 0; i < count;) {
+        size_t same = 1;
+        while (i + same < count && same < 256 && words[i + same] == words[i]) same++;
+        PUT(codes[words[i]], used[words[i]]);
+        total += used[words[i]];
+        if (same > 3) {
+            PUT(codes[last], used[last]);
+            PUT(same - 1, 8);
+            total += used[last] + (size_t)8;
+        }
+        i += same > 3 ? same : 1;
+    }
+    if (queued) PUT(0, 8 - queued % 8);
+#undef PUT
+    const size_t numbers[5] = {first, last, (size_t)(begin - head) - 20, total, 0};
+    for (size_t i = 0; i < 20; i++) head[i] = (unsigned char)(numbers[i / 4] >> 8 * (i % 4) & 255);
+    for (size_t i = 0; i < 4; i++) out[length + i] = (unsigned char)((size_t)(to - head) >> 8 * i & 255);
+    return (size_t)(to - out);
+}
+
 static void put_block(const exr *e, int x0, int y0, int w, int h) {
     static unsigned char raw[1 << 16], packed[1 << 17];
     size_t size = 0;
@@ -2109,17 +2261,27 @@ static void put_block(const exr *e, int x0, int y0, int w, int h) {
                 for (int i = 0; i < (e->types[c] == 1 ? 2 : 4); i++, bits >>= 8)
                     raw[size++] = (unsigned char)(bits & 255);
             }
-    const size_t length = e->packing ? exr_pack(e->packing, raw, size, packed) : size;
-    put_le32((uint32_t)(length < size ? length : size));
-    put_bytes(length < size ? packed : raw, length < size ? length : size);
+    const size_t length = e->packing == 4   ? exr_piz(e, raw, w, h, packed)
+                          : e->packing == 5 ? exr_pxr24(e, raw, w, h, packed)
+                          : e->packing      ? exr_pack(e->packing, raw, size, packed)
+                                            : size;
+    const int smaller = length < size || e->odd == 2;
+    put_le32((uint32_t)(smaller ? length : size));
+    put_bytes(smaller ? packed : raw, smaller ? length : size);
 }
 
-static void encode_exr(const exr *e) {
-    unsigned char list[512], window[16], tiles[9] = {0}, byte = (unsigned char)e->packing;
+static void exr_blocks(const exr *e, int *across, int *down, int step[2]) {
+    const int width = e->data[2] - e->data[0] + 1, height = e->data[3] - e->data[1] + 1;
+    static const int lines[6] = {1, 1, 1, 16, 32, 16};
+    step[0] = e->tile[0] ? e->tile[0] : width;
+    step[1] = e->tile[0] ? e->tile[1] : e->packing < 6 ? lines[e->packing] : 1;
+    *across = (width + step[0] - 1) / step[0];
+    *down = (height + step[1] - 1) / step[1];
+}
+
+static void put_part(const exr *e, const char *name, const char *type) {
+    unsigned char list[512], window[16], tiles[9] = {0}, count[4] = {0}, byte = (unsigned char)e->packing;
     size_t length = 0;
-    file_size = 0;
-    put_le32(OLAT__EXR_MAGIC);
-    put_le32(2 | (e->tile[0] ? 0x200 : 0));
     for (int c = 0; e->names[c]; c++) {
         const unsigned char rest[16] = {
             (unsigned char)e->types[c], 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
@@ -2138,19 +2300,31 @@ static void encode_exr(const exr *e) {
         put_attribute(i ? "displayWindow" : "dataWindow", "box2i", window, 16);
     }
     put_attribute("lineOrder", "lineOrder", "", 1);
-    put_attribute("pixelAspectRatio", "float", "\0\0\200\77", 4);
+    if (!exr_more.name || strcmp(exr_more.name, "pixelAspectRatio") != 0)
+        put_attribute("pixelAspectRatio", "float", "\0\0\200\77", 4);
     put_attribute("screenWindowCenter", "v2f", "\0\0\0\0\0\0\0", 8);
     put_attribute("screenWindowWidth", "float", "\0\0\200\77", 4);
     if (e->tile[0]) {
         tiles[0] = (unsigned char)e->tile[0], tiles[4] = (unsigned char)e->tile[1];
         put_attribute("tiles", "tiledesc", tiles, 9);
     }
+    if (exr_more.name) put_attribute(exr_more.name, exr_more.type, exr_more.bytes, exr_more.size);
+    if (name) {
+        int across, down, step[2];
+        exr_blocks(e, &across, &down, step);
+        for (int i = 0; i < 4; i++) count[i] = (unsigned char)(across * down >> 8 * i & 255);
+        put_attribute("chunkCount", "int", count, 4);
+        put_attribute("name", "string", name, strlen(name));
+        put_attribute("type", "string", type, strlen(type));
+    }
     put_bytes("", 1);
+}
+
+/* Each pointer's low half, as offsets here stay small. */
+static void put_pixels(const exr *e, size_t table, int part) {
+    int across, down, step[2];
+    exr_blocks(e, &across, &down, step);
     const int width = e->data[2] - e->data[0] + 1, height = e->data[3] - e->data[1] + 1;
-    const int step[2] = {e->tile[0] ? e->tile[0] : width, e->tile[0] ? e->tile[1] : e->packing == 3 ? 16 : 1};
-    const int across = (width + step[0] - 1) / step[0], down = (height + step[1] - 1) / step[1];
-    size_t table = file_size;
-    file_size += 8 * (size_t)(across * down);
     for (int y = 0; y < down; y++)
         for (int x = 0; x < across; x++, table += 8) {
             const size_t here = file_size;
@@ -2158,6 +2332,7 @@ static void encode_exr(const exr *e) {
             put_le32((uint32_t)here);
             put_le32(0);
             file_size = here;
+            if (part >= 0) put_le32((uint32_t)part);
             if (e->tile[0]) put_le32((uint32_t)x), put_le32((uint32_t)y), put_le32(0), put_le32(0);
             else put_le32((uint32_t)(y * step[1] + e->data[1]));
             const int w = width - x * step[0] < step[0] ? width - x * step[0] : step[0],
@@ -2166,10 +2341,79 @@ static void encode_exr(const exr *e) {
         }
 }
 
-/* What a channel is to be taken for; 0: for nothing. The layer M is not the first, and Y stands alone. */
+static void encode_exr(const exr *e) {
+    int across, down, step[2];
+    exr_blocks(e, &across, &down, step);
+    file_size = 0;
+    put_le32(OLAT__EXR_MAGIC);
+    put_le32(2 | (e->tile[0] ? 0x200 : 0));
+    put_part(e, NULL, NULL);
+    const size_t table = file_size;
+    file_size += 8 * (size_t)(across * down);
+    put_pixels(e, table, -1);
+}
+
+/* A file of several parts; one whose name begins with `deep` says that it is deep. */
+static void encode_parts(const exr *parts, const char *const *names, int count) {
+    size_t tables[4];
+    file_size = 0;
+    put_le32(OLAT__EXR_MAGIC);
+    put_le32(2 | 0x1000);
+    for (int i = 0; i < count; i++)
+        put_part(parts + i, names[i],
+                 !strncmp(names[i], "deep", 4) ? "deepscanline"
+                 : parts[i].tile[0]            ? "tiledimage"
+                                               : "scanlineimage");
+    put_bytes("", 1);
+    for (int i = 0; i < count; i++) {
+        int across, down, step[2];
+        exr_blocks(parts + i, &across, &down, step);
+        tables[i] = file_size;
+        file_size += 8 * (size_t)(across * down);
+    }
+    for (int i = 0; i < count; i++) put_pixels(parts + i, tables[i], i);
+}
+
+/* What a channel is to be taken for; 0: for nothing. Y is what there is where no G is. */
 static char exr_letter(const exr *e, int channel) {
     const char *name = e->names[channel], *own = strrchr(name, '.') ? strrchr(name, '.') + 1 : name;
-    return own[0] && !own[1] && *name != 'M' && strchr(e->names[1] ? "RGBA" : "Y", *own) ? *own : 0;
+    const size_t layer = strlen(e->layer);
+    int colours = 0;
+    for (int c = 0; e->names[c]; c++)
+        colours |= !strncmp(e->names[c], e->layer, layer) && !strcmp(e->names[c] + layer, "G");
+    return (size_t)(own - name) == layer && !memcmp(name, e->layer, layer) && own[0] && !own[1] &&
+                   strchr(colours ? "RGBA" : "YA", *own)
+               ? *own
+               : 0;
+}
+
+/* Whether there is light where alpha is 0, in a hundredth of the pixels and a quarter of these. */
+static int exr_straight(const exr *e) {
+    int clear = 0, lit = 0, pixels = 0, has_alpha = 0;
+    for (int c = 0; e->names[c]; c++) has_alpha |= exr_letter(e, c) == 'A';
+    for (int y = e->display[1]; y <= e->display[3]; y++)
+        for (int x = e->display[0]; x <= e->display[2]; x++, pixels++) {
+            const int inside = x >= e->data[0] && x <= e->data[2] && y >= e->data[1] && y <= e->data[3];
+            double most = 0, alpha = 0;
+            for (int c = 0; e->names[c] && inside; c++) {
+                const double value = half_of(exr_half(e, c, x - e->display[0], y - e->display[1]));
+                if (exr_letter(e, c) == 'A') alpha = value;
+                else if (exr_letter(e, c)) most = fmax(most, value);
+            }
+            clear += alpha < 1.0 / 255;
+            lit += alpha < 1.0 / 255 && most > 0.01;
+        }
+    return has_alpha && lit * 100 > pixels && lit * 4 > clear;
+}
+
+/* Whether the notes are this, and what is said of straight alpha where that is so. */
+static int exr_noted(const exr *e, const char *note) {
+    const char *straight = strstr(set.notes, "1 of the 1 photographs is lit where alpha is 0");
+    const size_t length = straight ? (size_t)(straight - set.notes) : strlen(set.notes);
+    const int good = (straight != NULL) == exr_straight(e) &&
+                     (!*note ? !length : strstr(set.notes, note) != NULL) &&
+                     (!straight || (strstr(straight, "--premult") && strstr(straight, "/e.exr")));
+    return good || !printf("    notes: %s\n", set.notes);
 }
 
 /* Whether the frame has the picture's light, as straight alpha. */
@@ -2204,24 +2448,33 @@ static int shows_exr(const exr *e, const olat_frame *frame) {
 }
 
 static const exr exrs[] = {
-    {0, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", NULL}, {1, 1, 1}, 0},
-    {1, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1},
-    {1, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"R", "G", "B", "A", NULL}, {2, 2, 2, 2}, 0},
-    {2, {0, 0}, {0, 0, 30, 18}, {0, 0, 30, 18}, {"A", "B", "G", "R", "Z", NULL}, {1, 1, 1, 1, 2}, 1},
-    {3, {0, 0}, {0, 0, 12, 34}, {0, 0, 12, 34}, {"B", "G", "R", NULL}, {2, 2, 2}, 1},
-    {3, {0, 0}, {-3, 2, 9, 40}, {-5, -4, 12, 30}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1},
-    {3, {0, 0}, {4, 2, 9, 20}, {0, 0, 6, 30}, {"B", "G", "R", "id", NULL}, {1, 1, 1, 0}, 1},
-    {2, {0, 0}, {0, 0, 7, 7}, {0, 0, 7, 7}, {"Y", NULL}, {1}, 1},
+    {0, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", NULL}, {1, 1, 1}, 0, ""},
+    {1, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1, ""},
+    {1, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"R", "G", "B", "A", NULL}, {2, 2, 2, 2}, 0, ""},
+    {2, {0, 0}, {0, 0, 30, 18}, {0, 0, 30, 18}, {"A", "B", "G", "R", "Z", NULL}, {1, 1, 1, 1, 2}, 1, ""},
+    {3, {0, 0}, {0, 0, 12, 34}, {0, 0, 12, 34}, {"B", "G", "R", NULL}, {2, 2, 2}, 1, ""},
+    {3, {0, 0}, {-3, 2, 9, 40}, {-5, -4, 12, 30}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1, ""},
+    {3, {0, 0}, {4, 2, 9, 20}, {0, 0, 6, 30}, {"B", "G", "R", "id", NULL}, {1, 1, 1, 0}, 1, ""},
+    {2, {0, 0}, {0, 0, 7, 7}, {0, 0, 7, 7}, {"Y", NULL}, {1}, 1, ""},
     {3,
      {0, 0},
      {0, 0, 7, 7},
      {0, 0, 7, 7},
      {"L.A", "L.B", "L.G", "L.R", "L.Z.V", "M.R", NULL},
      {1, 1, 1, 1, 2, 2},
-     1},
-    {0, {8, 5}, {0, 0, 20, 11}, {0, 0, 20, 11}, {"B", "G", "R", NULL}, {1, 1, 1}, 0},
-    {3, {8, 5}, {-3, 2, 20, 17}, {-5, -4, 12, 30}, {"A", "B", "G", "R", NULL}, {1, 2, 1, 1}, 1},
-    {1, {64, 64}, {0, 0, 20, 11}, {0, 0, 20, 11}, {"B", "G", "R", "Y", NULL}, {1, 1, 1, 0}, 1}};
+     1,
+     "L."},
+    {0, {8, 5}, {0, 0, 20, 11}, {0, 0, 20, 11}, {"B", "G", "R", NULL}, {1, 1, 1}, 0, ""},
+    {3, {8, 5}, {-3, 2, 20, 17}, {-5, -4, 12, 30}, {"A", "B", "G", "R", NULL}, {1, 2, 1, 1}, 1, ""},
+    {1, {64, 64}, {0, 0, 20, 11}, {0, 0, 20, 11}, {"B", "G", "R", "Y", NULL}, {1, 1, 1, 0}, 1, ""},
+    {4, {0, 0}, {0, 0, 32, 40}, {0, 0, 32, 40}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1, ""},
+    {4, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", "id", NULL}, {2, 1, 2, 0}, 0, ""},
+    {4, {0, 0}, {-3, 2, 9, 40}, {-5, -4, 12, 30}, {"A", "B", "G", "R", NULL}, {1, 1, 2, 1}, 1, ""},
+    {4, {0, 0}, {0, 0, 10, 6}, {0, 0, 10, 6}, {"B", "G", "R", NULL}, {1, 1, 1}, 2, ""},
+    {4, {19, 13}, {0, 0, 40, 28}, {0, 0, 40, 28}, {"Y", NULL}, {1}, 1, ""},
+    {5, {0, 0}, {0, 0, 12, 34}, {0, 0, 12, 34}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1, ""},
+    {5, {0, 0}, {-3, 2, 9, 20}, {-5, -4, 12, 30}, {"B", "G", "R", "id", NULL}, {2, 1, 2, 0}, 1, ""},
+    {5, {7, 9}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", NULL}, {1, 2, 1}, 1, ""}};
 
 #define EXR(more) TOP "{\"file_path\":\"e\"" more "," LIGHT POSE "}]}"
 static int exr_refused(const char *message) {
@@ -2229,14 +2482,35 @@ static int exr_refused(const char *message) {
     return load_fails(EXR(), 0, message) && strstr(error, "e.exr: byte ");
 }
 
-/* Every way of storing; the value of a byte changed, or the file cut, is no crash and no leak. */
+/* The file cut anywhere is refused; the value of any byte changed is no crash and no leak. */
+static void change_exr(void) {
+    static unsigned char whole[sizeof file];
+    const size_t size = file_size;
+    memcpy(whole, file, size);
+    for (size_t i = 0; i < size; i++) {
+        int width, height;
+        ssdgs_pixels format;
+        void *pixels;
+        olat__found found;
+        memset(&found, 0, sizeof found);
+        CHECK(olat__exr_decode("e", file, i, &width, &height, &format, &pixels, &found, error) && !pixels);
+        for (int k = 0; k < 3; k++) {
+            file[i] = (unsigned char)(whole[i] ^ (k == 0 ? 1 : k == 1 ? 0x80 : 1 + random_bits() % 255));
+            if (olat__exr_decode("e", file, size, &width, &height, &format, &pixels, &found, error))
+                CHECK(!pixels && strstr(error, "e: byte "));
+            else meter_free(pixels);
+        }
+        file[i] = whole[i];
+    }
+}
+
+/* Every way of storing. */
 static void test_exr(void) {
     static const picture mask = {13, 21, 0, 8, 0, 0};
-    static unsigned char whole[sizeof file];
     remove(FOLDER "/e.png");
     for (size_t i = 0; i < sizeof exrs / sizeof *exrs; i++) {
         encode_exr(exrs + i), write_bytes(FOLDER "/e.exr");
-        if (CHECK(loads(EXR(), 0) && shows_exr(exrs + i, set.frames) && !set.notes[0] &&
+        if (CHECK(loads(EXR(), 0) && shows_exr(exrs + i, set.frames) && exr_noted(exrs + i, "") &&
                   !strcmp(set.frames->file, FOLDER "/e.exr")))
             olat_free(&set);
         else printf("    picture %d: %s\n", (int)i, error);
@@ -2281,7 +2555,7 @@ static void test_exr(void) {
         double value;
     } values[] = {{{0, 0, 0x80, 0x7F}, 1, 0}, {{0, 0, 0x80, 0xFF}, 1, 0},        {{1, 0, 0xC0, 0x7F}, 1, 0},
                   {{0, 0, 0x80, 0xBF}, 0, 0}, {{0, 0x24, 0x74, 0x49}, 0, 65504}, {{0, 0, 0, 0x40}, 0, 2}};
-    const exr one = {0, {0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {"B", "G", "R", NULL}, {2, 2, 2}, 0};
+    const exr one = {0, {0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {"B", "G", "R", NULL}, {2, 2, 2}, 0, ""};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         char note[128];
         encode_exr(&one);
@@ -2306,11 +2580,16 @@ static void test_exr(void) {
         size_t at;
         unsigned char value;
         const char *message;
-    } bytes[] = {{4, 1, "not version 2"},          {5, 0x10, "several parts"},
-                 {5, 8, "several parts"},          {5, 2, "tiles are missing"},
-                 {8, 'k', "are missing"},          {17, 'k', "another type than its name"},
-                 {26, 250, "the file ends early"}, {30, 3, "unknown type"},
-                 {38, 2, "fewer samples"},         {28, 'Q', "no channels R, G, B, nor Y"},
+    } bytes[] = {{4, 1, "not version 2"},
+                 {5, 0x10, "does not tell its chunkCount"},
+                 {5, 8, "deep pixels"},
+                 {5, 2, "tiles are missing"},
+                 {8, 'k', "are missing"},
+                 {17, 'k', "another type than its name"},
+                 {26, 250, "the file ends early"},
+                 {30, 3, "unknown type"},
+                 {38, 2, "fewer samples"},
+                 {28, 'Q', "missing: B; it has Q, G, R:"},
                  {30, 0, "holds whole numbers"}};
     for (size_t i = 0; i < sizeof bytes / sizeof *bytes; i++) {
         encode_exr(exrs);
@@ -2333,23 +2612,7 @@ static void test_exr(void) {
     CHECK(exr_refused("much larger than what the file holds"));
     for (size_t which = 0; which < sizeof exrs / sizeof *exrs; which += 2) {
         encode_exr(exrs + which);
-        const size_t size = file_size;
-        memcpy(whole, file, size);
-        for (size_t i = 0; i < size; i++) {
-            int width, height;
-            ssdgs_pixels format;
-            void *pixels;
-            unsigned long broken = 0;
-            CHECK(olat__exr_decode("e", file, i, &width, &height, &format, &pixels, &broken, error) &&
-                  !pixels);
-            for (int k = 0; k < 3; k++) {
-                file[i] = (unsigned char)(whole[i] ^ (k == 0 ? 1 : k == 1 ? 0x80 : 1 + random_bits() % 255));
-                if (olat__exr_decode("e", file, size, &width, &height, &format, &pixels, &broken, error))
-                    CHECK(!pixels && strstr(error, "e: byte "));
-                else meter_free(pixels);
-            }
-            file[i] = whole[i];
-        }
+        change_exr();
     }
     CHECK(live == 0);
     remove(FOLDER "/e.exr");
@@ -2482,6 +2745,215 @@ static void test_mask_kinds(void) {
     remove(FOLDER "/m.exr");
 }
 
+/* Which channels of which part are the picture; what is said of it. */
+static void test_exr_layers(void) {
+    static const struct {
+        const char *names[10];
+        int types[10];
+        const char *layer, *note; /* NULL: refused with the note */
+        const void *views;
+    } layers[] = {
+        /* as Blender names them: ambient occlusion is the first */
+        {{"V.AO.B", "V.AO.G", "V.AO.R", "V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "V.Combined.",
+         "is of 2 layers or parts with R, G, B: V.Combined is taken: build/t_olat_files/e.exr",
+         NULL},
+        {{"B", "Combined.B", "Combined.G", "Combined.R", "G", "R", NULL},
+         {1, 1, 1, 1, 1, 1},
+         "Combined.",
+         "is of 2 layers or parts with R, G, B: Combined is taken",
+         NULL},
+        {{"A.A", "A.B", "A.G", "A.R", "B", "G", "R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "",
+         "is of 2 layers or parts with R, G, B: the one without a name is taken",
+         NULL},
+        {{"N.B", "N.G", "N.R", "z.A", "z.B", "z.G", "z.R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "z.",
+         "of 2 layers or parts with R, G, B: z is taken",
+         NULL},
+        {{"N.A", "N.B", "N.G", "N.R", "v.Beauty.B", "v.Beauty.G", "v.Beauty.R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "v.Beauty.",
+         "R, G, B: v.Beauty is taken",
+         NULL},
+        {{"B.B", "B.G", "B.R", "a.B", "a.G", "a.R", NULL},
+         {1, 1, 1, 2, 2, 2},
+         "B.",
+         "R, G, B: B is taken",
+         NULL},
+        {{"L.B", "L.G", "L.R", "Y", NULL}, {1, 1, 1, 1}, "L.", "", NULL},
+        {{"N.X", "N.Y", "N.Z", "z.Y", NULL}, {1, 1, 1, 1}, "z.", "", NULL},
+        {{"R", "Y", NULL}, {1, 1}, "", "", NULL},
+        {{"id.B", "id.G", "id.R", "l.B", "l.G", "l.R", NULL},
+         {0, 0, 0, 1, 1, 1},
+         "l.",
+         "R, G, B: l is taken",
+         NULL},
+        /* two views, of which the first one of the list is the default: 4 letters and 5, 5 and 4 */
+        {{"left.B", "left.G", "left.R", "rite.B", "rite.G", "rite.R", NULL},
+         {1, 1, 1, 1, 1, 1},
+         "rite.",
+         "rite is taken",
+         "\4\0\0\0rite\4\0\0\0left"},
+        {{"C.left.B", "C.left.G", "C.left.R", "C.rite.A", "C.rite.B", "C.rite.G", "C.rite.R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "C.left.",
+         "C.left is taken",
+         "\4\0\0\0left\4\0\0\0rite"},
+        {{"Combined.left.B", "Combined.left.G", "Combined.left.R", "a.A", "a.B", "a.G", "a.R", NULL},
+         {1, 1, 1, 1, 1, 1, 1},
+         "Combined.left.",
+         "Combined.left is taken",
+         "\4\0\0\0left\4\0\0\0rite"},
+        {{"R", NULL}, {1}, NULL, "channels are missing: G, B; it has R: light must be named", NULL},
+        {{"U", "V", NULL}, {1, 1}, NULL, "channels are missing: R, G, B; it has U, V: light", NULL},
+        {{"B", "R", "a.R", NULL}, {1, 1, 1}, NULL, "channels are missing: G; it has B, R, a.R:", NULL},
+        {{"X", "Y", "Z", NULL}, {1, 1, 1}, NULL, "channels are missing: R, G, B; it has X, Y, Z:", NULL},
+        {{"b", "g", "r", NULL}, {1, 1, 1}, NULL, "channels are missing: R, G, B; it has b, g, r:", NULL},
+        {{"A", "B", "G", "R", NULL}, {0, 1, 1, 1}, NULL, "a channel of colour holds whole numbers", NULL}};
+    for (size_t i = 0; i < sizeof layers / sizeof *layers; i++) {
+        exr e = exrs[0];
+        memcpy(e.names, layers[i].names, sizeof e.names);
+        memcpy(e.types, layers[i].types, sizeof e.types);
+        e.layer = layers[i].layer;
+        if (layers[i].views) {
+            exr_more.name = "multiView";
+            exr_more.type = "stringvector";
+            exr_more.bytes = layers[i].views;
+            exr_more.size = 16;
+        }
+        encode_exr(&e);
+        exr_more.name = NULL;
+        if (!layers[i].layer) {
+            CHECK(exr_refused(layers[i].note));
+            continue;
+        }
+        write_bytes(FOLDER "/e.exr");
+        CHECK(loads(EXR(), 0) && shows_exr(&e, set.frames) && exr_noted(&e, layers[i].note));
+        olat_free(&set);
+    }
+    /* parts: as layers; windows, tiles and packings are their own */
+    static const exr parts[] = {
+        {3, {0, 0}, {0, 0, 4, 20}, {0, 0, 12, 20}, {"Z", NULL}, {2}, 1, ""},
+        {1, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", NULL}, {1, 1, 1}, 0, ""},
+        {3, {8, 5}, {2, 0, 12, 20}, {0, 0, 12, 20}, {"A", "B", "G", "R", NULL}, {1, 1, 1, 1}, 1, ""},
+        {4, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"B", "G", "R", NULL}, {1, 2, 1}, 1, ""},
+        {6, {0, 0}, {0, 0, 12, 20}, {0, 0, 12, 20}, {"Y", NULL}, {1}, 0, ""}};
+    static const struct {
+        int parts[3];
+        const char *names[3];
+        int count, taken; /* taken: which of them; -1: refused with the note */
+        const char *note;
+    } files[] = {{{0, 2}, {"depth", "rgba"}, 2, 1, ""},
+                 {{2, 0}, {"rgba", "depth"}, 2, 0, ""},
+                 {{1, 3}, {"first", "second"}, 2, 0, "of 2 layers or parts with R, G, B: first is taken"},
+                 {{1, 2}, {"normal", "other"}, 2, 1, "R, G, B: other is taken"},
+                 {{2, 3}, {"pass", "v.Combined"}, 2, 1, "R, G, B: v.Combined is taken"},
+                 {{2, 1}, {"pass", "RGBA"}, 2, 1, "R, G, B: RGBA is taken"},
+                 {{2, 0, 3}, {"deep", "depth", "rgb"}, 3, 2, ""},
+                 {{4, 0, 1}, {"grey", "depth", "rgb"}, 3, 2, ""},
+                 {{4, 0}, {"grey", "depth"}, 2, -1, "B44 compression cannot be read"},
+                 {{2, 0}, {"deep", "depth"}, 2, -1, "deep pixels cannot be read: flatten them"},
+                 {{0, 0}, {"depth", "more"}, 2, -1, "channels are missing: R, G, B; it has Z, Z:"}};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        exr chosen[3];
+        for (int k = 0; k < files[i].count; k++) chosen[k] = parts[files[i].parts[k]];
+        encode_parts(chosen, files[i].names, files[i].count);
+        if (files[i].taken < 0) {
+            CHECK(exr_refused(files[i].note));
+            continue;
+        }
+        write_bytes(FOLDER "/e.exr");
+        const exr *taken = chosen + files[i].taken;
+        CHECK(loads(EXR(), 0) && shows_exr(taken, set.frames) && exr_noted(taken, files[i].note));
+        olat_free(&set);
+    }
+    static const exr four[] = {
+        {0, {0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {"Z", NULL}, {1}, 1, ""},
+        {0, {0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {"B", "G", "R", NULL}, {1, 1, 1}, 1, ""}};
+    encode_parts(four, files[0].names, 2);
+    file[file_size - 18] = 0; /* of the block's part, line, size, three halves */
+    CHECK(exr_refused("another part's block than its place in the table tells"));
+    encode_parts(four, files[0].names, 2);
+    change_exr();
+    encode_parts(parts + 2, files[0].names, 2);
+    change_exr();
+    /* attributes that change or tell something */
+    static const float aces[8] = {0.7347f, 0.2653f, 0, 1, 0.0001f, -0.077f, 0.32168f, 0.33767f},
+                       srgb[8] = {0.6402f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f},
+                       nothing[8] = {0, 0, 0, 0, 0, 0, 0, 0}, wide = 2;
+    static const unsigned char six[4] = {6, 0, 0, 0};
+    static const struct {
+        const char *name, *type;
+        const void *bytes;
+        size_t size;
+        float in[3]; /* B, G, R */
+        double out[3];
+        const char *note;
+    } told[] = {
+        {"chromaticities",
+         "chromaticities",
+         aces,
+         32,
+         {0.3f, 0.5f, 0.4f}, /* by the published matrix of ACES2065-1 to linear Rec. 709 */
+         {2.52169 * 0.4 - 1.13413 * 0.5 - 0.38756 * 0.3, -0.27648 * 0.4 + 1.37272 * 0.5 - 0.09624 * 0.3,
+          -0.01538 * 0.4 - 0.15298 * 0.5 + 1.16835 * 0.3},
+         "1 of the 1 photographs is of other primaries (chromaticities): converted to sRGB's"},
+        {"chromaticities",
+         "chromaticities",
+         aces,
+         32,
+         {0.3f, 0.5f, 0.2f},
+         {0, -0.27648 * 0.2 + 1.37272 * 0.5 - 0.09624 * 0.3, -0.01538 * 0.2 - 0.15298 * 0.5 + 1.16835 * 0.3},
+         "is of colours that sRGB does not hold, in more than 0.1 % of the pixels: these are clamped"},
+        {"chromaticities", "chromaticities", srgb, 32, {0.3f, 0.5f, 0.2f}, {0.2, 0.5, 0.3}, ""},
+        {"chromaticities", "v2f", nothing, 8, {0.3f, 0.5f, 0.2f}, {0.2, 0.5, 0.3}, ""},
+        {"pixelAspectRatio",
+         "float",
+         &wide,
+         4,
+         {0.3f, 0.5f, 0.2f},
+         {0.2, 0.5, 0.3},
+         "is of pixels that are not square (pixelAspectRatio 2): read as stored"},
+        {"Orientation",
+         "int",
+         six,
+         4,
+         {0.3f, 0.5f, 0.2f},
+         {0.2, 0.5, 0.3},
+         "is to be turned or mirrored for viewing (OpenEXR's Orientation 6): read as stored"}};
+    static const exr one = {0, {0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {"B", "G", "R", NULL}, {2, 2, 2}, 0, ""};
+    for (size_t i = 0; i < sizeof told / sizeof *told; i++) {
+        exr_more.name = told[i].name, exr_more.type = told[i].type;
+        exr_more.bytes = told[i].bytes, exr_more.size = told[i].size;
+        encode_exr(&one);
+        exr_more.name = NULL;
+        for (size_t c = 0; c < 3; c++) {
+            uint32_t bits;
+            memcpy(&bits, told[i].in + c, 4);
+            for (size_t k = 0; k < 4; k++)
+                file[file_size - 12 + 4 * c + k] = (unsigned char)(bits >> 8 * k & 255);
+        }
+        write_bytes(FOLDER "/e.exr");
+        CHECK(loads(EXR(), 0) && (*told[i].note ? strstr(set.notes, told[i].note) != NULL : !*set.notes));
+        for (size_t c = 0; c < 3; c++)
+            CHECK(fabs((double)((float *)set.frames->pixels)[c] - told[i].out[c]) < 2e-4);
+        olat_free(&set);
+    }
+    exr_more.name = exr_more.type = "chromaticities";
+    exr_more.bytes = nothing, exr_more.size = 32;
+    encode_exr(&one);
+    CHECK(exr_refused("oiiotool in.exr --eraseattrib chromaticities -o out.exr"));
+    encode_exr(exrs + 7), write_bytes(FOLDER "/e.exr"); /* grey has no primaries */
+    exr_more.name = NULL;
+    CHECK(loads(EXR(), 0) && shows_exr(exrs + 7, set.frames) && !*set.notes);
+    olat_free(&set);
+    remove(FOLDER "/e.exr");
+}
+
 /* The data forms of NRHints, GS3 and SSS-GS: twins of one scene have the same cameras, lights and pixels. */
 static void test_twins(void) {
     enum { SIDE = 7, HIGH = 5, VIEWS = 2, LIGHTS = 2, FRAMES = VIEWS * LIGHTS };
@@ -2511,7 +2983,8 @@ static void test_twins(void) {
                                       {0, 0, SIDE - 1, HIGH - 1},
                                       {"B", "G", "R", NULL},
                                       {1, 1, 1},
-                                      0};
+                                      0,
+                                      ""};
             encode_exr(&plain);
             for (int y = 0; y < HIGH; y++)
                 for (int c = 0; c < 3; c++)
@@ -3110,6 +3583,7 @@ int main(void) {
     test_mask_kinds();
     test_kinds_of_image();
     TEST_ROW("96", "OpenEXR of every kind, every byte changed, every truncation", test_exr());
+    TEST_ROW("96", "OpenEXR's layers, parts, views, primaries and what is said of them", test_exr_layers());
     test_twins();
     test_far_places();
     test_saved_digits();

@@ -759,18 +759,19 @@ static void fuzz_exr(const unsigned char *data, size_t size) {
     int width, height;
     ssdgs_pixels format;
     void *pixels = NULL;
-    unsigned long infinite = 0;
+    olat__found found;
     char error[512] = "";
     olat__exr e;
     memset(&e, 0, sizeof e);
+    memset(&found, 0, sizeof found);
     e.bytes = copy;
     e.size = size;
-    olat__exr_header(&e);
+    olat__exr_parts(&e);
     const int large =
         !e.problem && (e.display[2] - e.display[0] > 2047 || e.display[3] - e.display[1] > 2047);
     if (large) {
     } /* slow to clear */
-    else if (olat__exr_decode("exr", copy, size, &width, &height, &format, &pixels, &infinite, error))
+    else if (olat__exr_decode("exr", copy, size, &width, &height, &format, &pixels, &found, error))
         HOLDS(!pixels && error[0]);
     else
         for (size_t i = 0; i < 4 * (size_t)width * (size_t)height; i++) {
