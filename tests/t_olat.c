@@ -2881,6 +2881,77 @@ static void test_exr_layers(void) {
     change_exr();
     encode_parts(parts + 2, files[0].names, 2);
     change_exr();
+    /* what only PIZ can have wrong */
+    encode_exr(exrs + 12);
+    size_t table = 16;
+    while (olat__le32(file + table) != table + 16 || olat__le32(file + table + 4)) table++;
+    const size_t piz = table + 24, bitmap = piz + 4,
+                 after = bitmap + 1 + (size_t)(file[piz + 2] - file[piz]) +
+                         256 * (size_t)(file[piz + 3] - file[piz + 1]),
+                 codes = after + 4;
+    const struct {
+        size_t at;
+        unsigned char change;
+        const char *message;
+    } changes[] = {{piz - 4, (unsigned char)(file[piz - 4] ^ 7), "the data end early"},
+                   {piz - 3, file[piz - 3], "the data end early"},
+                   {piz + 3, 32, "a bitmap of unknown words"},
+                   {piz + 2, 255, "the data end early"},
+                   {bitmap, (unsigned char)(file[bitmap] & -file[bitmap]), "a word that does not occur"},
+                   {after + 3, 127, "the data end early"},
+                   {after + 1, file[after + 1], "the data end early"},
+                   {codes + 2, 1, "bad codes"},
+                   {codes + 2, 2, "codes of unknown words"},
+                   {codes + 1, 255, "too many code lengths"},
+                   {codes + 12, 1, "more data than the image needs"},
+                   {codes + 14, 255, "the data end early"},
+                   {codes + 20, 0x20, "bad codes"},
+                   {codes + 20, (unsigned char)(file[codes + 20] ^ 0xE8), "a code is longer than 57 bits"}};
+    for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
+        file[changes[i].at] ^= changes[i].change;
+        CHECK(exr_refused(changes[i].message));
+        file[changes[i].at] ^= changes[i].change;
+    }
+    /* the same pictures as OpenEXR 3.1.5 and OpenImageIO 2.4.7 write them */
+    static const struct {
+        const char *file, *note;
+        exr e;
+    } real[] = {
+        {"half", "", {4, {0, 0}, {0, 0, 32, 40}, {0, 0, 32, 40}, {"A", "B", "G", "R"}, {1, 1, 1, 1}, 1, ""}},
+        {"levels",
+         "",
+         {4, {0, 0}, {0, 0, 32, 40}, {0, 0, 32, 40}, {"A", "B", "G", "R"}, {1, 1, 1, 1}, 1, ""}},
+        {"float", "", {4, {0, 0}, {-3, 2, 29, 32}, {-5, -4, 22, 30}, {"B", "G", "R"}, {2, 2, 2}, 1, ""}},
+        {"pxr24", "", {4, {0, 0}, {-3, 2, 29, 32}, {-5, -4, 22, 30}, {"B", "G", "R"}, {2, 2, 2}, 1, ""}},
+        {"tiles",
+         "",
+         {4, {0, 0}, {0, 0, 44, 30}, {0, 0, 44, 30}, {"B", "G", "R", "id"}, {1, 2, 1, 0}, 1, ""}},
+        {"layers",
+         "R, G, B: V.Combined is taken",
+         {4,
+          {0, 0},
+          {0, 0, 12, 20},
+          {0, 0, 12, 20},
+          {"V.AO.B", "V.AO.G", "V.AO.R", "V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R"},
+          {1, 1, 1, 1, 1, 1, 1},
+          1,
+          "V.Combined."}},
+        {"parts",
+         "R, G, B: 0p is taken",
+         {4, {0, 0}, {0, 0, 32, 40}, {0, 0, 32, 40}, {"A", "B", "G", "R"}, {1, 1, 1, 1}, 1, ""}}};
+    for (size_t i = 0; i < sizeof real / sizeof *real; i++) {
+        char path[200];
+        unsigned char *bytes = NULL;
+        const int is_piz = !strstr("pxr24 layers parts", real[i].file);
+        snprintf(path, sizeof path, "tests/fuzz/seeds/exr/openexr_%s%s.exr", is_piz ? "piz_" : "",
+                 real[i].file);
+        CHECK(!olat__read_file(path, &bytes, &file_size, error) && file_size < sizeof file);
+        if (bytes && file_size < sizeof file) memcpy(file, bytes, file_size);
+        meter_free(bytes);
+        write_bytes(FOLDER "/e.exr");
+        CHECK(loads(EXR(), 0) && shows_exr(&real[i].e, set.frames) && exr_noted(&real[i].e, real[i].note));
+        olat_free(&set);
+    }
     /* attributes that change or tell something */
     static const float aces[8] = {0.7347f, 0.2653f, 0, 1, 0.0001f, -0.077f, 0.32168f, 0.33767f},
                        srgb[8] = {0.6402f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f},
