@@ -78,5 +78,118 @@ if has oiiotool; then
         count "exiftool: orientation"
     fi
 fi
+
+exr() { # exr FILE CHANNELS: it has the light that oiiotool finds in these, alpha divided out, within halves' rounding
+    rm -f "$work/want.exr"
+    oiiotool "$1" --ch "$2" --croptofull -d float -o "$work/want.exr" && "$build/pixels" "$1" >"$work/read.txt" || return 1
+    oiiotool --info --dumpdata "$work/want.exr" | sed -n 's/^ *Pixel (\([0-9]*\), \([0-9]*\)): /\1 \2 /p' >"$work/want.txt"
+    awk '
+        FNR == NR { for (c = 3; c <= 6; c++) want[$1, $2, c] = $c; pixels++; next }
+        $1 == "note:" || NF != 6 || $0 ~ /[a-z]/ { next }
+        { alpha = want[$1, $2, 6]
+          for (c = 3; c <= 6; c++) {
+              v = c == 6 ? alpha : alpha > 0 ? want[$1, $2, c] / alpha : 0
+              if (v < 0) v = 0
+              if (c < 6 && v > 65504) v = 65504
+              off = v - $c; if (off < 0) off = -off
+              off /= 2e-6 + v
+              if (off > worst) worst = off }
+          seen++ }
+        END { if (seen != pixels || !seen || worst > 1e-3) { print "    " seen " of " pixels " pixels, off by " worst; exit 1 } }' \
+        "$work/want.txt" "$work/read.txt"
+}
+if has oiiotool && has exrmaketiled; then
+    # spread: more than 2^14 halves in a block, of which PIZ then makes other differences
+    for size in 1x1 1x40 40x1 3x5 33x31 200x150 1030x40; do
+        for kind in smooth constant steps noise spread; do
+            case $kind in
+            smooth) pattern=fill:topleft=0.1,0.2,0.3,1:topright=2,0.1,0.9,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8 ;;
+            constant) pattern=constant:color=0.25,0.5,0.75,1 ;;
+            steps) pattern=checker:width=5:height=3:color1=0.1,0.2,0.3,1:color2=0.7,0.1,0.4,0.5 ;;
+            noise) pattern=noise:type=uniform:min=0.1:max=0.9:mono=0 ;;
+            spread) pattern=noise:type=uniform:min=0.35:max=2:mono=0 ;;
+            esac
+            [ $size != 1030x40 ] || [ $kind = spread ] || continue
+            for type in half float; do
+                set -- --pattern $pattern $size 3
+                [ $kind = spread ] && set -- "$@" --powc 15
+                oiiotool "$@" -d $type --compression none -o "$work/none.exr"
+                for packing in piz pxr24; do
+                    file=$work/$packing.exr
+                    rm -f "$file" "$work/tiles.exr"
+                    oiiotool "$work/none.exr" --compression $packing -o "$file"
+                    exr "$file" R,G,B,A=1
+                    count "OpenEXR: $packing $size $kind $type"
+                    exrmaketiled -m -t 32 24 -z $packing "$work/none.exr" "$work/tiles.exr" && exr "$work/tiles.exr" R,G,B,A=1
+                    count "OpenEXR: $packing tiles $size $kind $type"
+                done
+            done
+        done
+    done
+    smooth=fill:topleft=0.1,0.2,0.3,1:topright=0.5,0.1,0.2,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8
+    oiiotool --pattern $smooth 50x40 4 --origin -7+9 --fullsize 45x50+0+0 -d half --compression piz -o "$work/windows.exr"
+    exr "$work/windows.exr" R,G,B,A && notes "$work/windows.exr" ""
+    count "OpenEXR: windows"
+    oiiotool --pattern $smooth 50x40 4 --chnames id.R,id.G,id.B,id.A -o "$work/id.exr"
+    oiiotool --pattern $smooth 50x40 4 "$work/id.exr" --chappend -d half -d id.R=uint -d id.G=uint --compression piz -o "$work/ids.exr"
+    exr "$work/ids.exr" R,G,B,A
+    count "OpenEXR: whole numbers beside"
+    oiiotool --pattern constant:color=0.5,0.5,0.5 50x40 3 --chnames N.R,N.G,N.B --pattern $smooth 50x40 4 --chnames b.R,b.G,b.B,b.A --chappend \
+        -d half --compression piz -o "$work/layers.exr"
+    exr "$work/layers.exr" b.R,b.G,b.B,b.A && notes "$work/layers.exr" "of 2 layers or parts with R, G, B: b is taken"
+    count "OpenEXR: a normal pass before beauty"
+    oiiotool --pattern constant:color=0.5 50x40 1 --chnames Z -d float -o "$work/depth.exr"
+    oiiotool --pattern $smooth 50x40 4 -d half --compression piz -o "$work/rgba.exr"
+    rm -f "$work/parts.exr"
+    exrmultipart -combine -i "$work/depth.exr" "$work/rgba.exr" -o "$work/parts.exr" >/dev/null
+    "$build/pixels" "$work/rgba.exr" >"$work/a.txt" && "$build/pixels" "$work/parts.exr" | cmp -s - "$work/a.txt"
+    count "OpenEXR: parts, depth before light"
+    oiiotool --pattern $smooth 50x40 4 --unpremult --mulc 1,1,1,0 -d half -o "$work/straight.exr"
+    notes "$work/straight.exr" "lit where alpha is 0"
+    count "OpenEXR: straight alpha"
+    oiiotool --pattern $smooth 50x40 4 --attrib Orientation 6 --attrib PixelAspectRatio 2.0 -d half -o "$work/turned.exr"
+    notes "$work/turned.exr" "(OpenEXR's Orientation 6)" && notes "$work/turned.exr" "(pixelAspectRatio 2)"
+    count "OpenEXR: Orientation, pixelAspectRatio"
+    if has exrmultiview; then
+        oiiotool --pattern constant:color=0.1,0.2,0.3 50x40 3 -d half -o "$work/right.exr"
+        exrmultiview left "$work/rgba.exr" right "$work/right.exr" "$work/views.exr" && exr "$work/views.exr" R,G,B,A &&
+            notes "$work/views.exr" "the one without a name is taken"
+        count "OpenEXR: views"
+    fi
+    if has exr2aces; then # the colours of wide gamut are bright ones of sRGB: what was there comes back
+        exr2aces "$work/rgba.exr" "$work/aces.exr" >/dev/null && notes "$work/aces.exr" "of other primaries (chromaticities)" &&
+            "$build/pixels" "$work/aces.exr" | awk 'FNR == NR { for (c = 3; c <= 6; c++) want[$1, $2, c] = $c; next } $1 == "note:" { next }
+                { for (c = 3; c <= 6; c++) { off = want[$1, $2, c] - $c; if (off < 0) off = -off; if (off > 3e-3 + 2e-3 * want[$1, $2, c]) bad++ } seen++ }
+                END { if (bad || seen != 2000) { print "    " bad " of " seen; exit 1 } }' "$work/a.txt" -
+        count "exr2aces"
+    fi
+fi
+if has darktable-cli && has oiiotool; then
+    oiiotool "$work/in.ppm" -d uint16 -o "$work/dark.png"
+    rm -f "$work/dark.exr"
+    darktable-cli "$work/dark.png" "$work/dark.exr" --icc-type LIN_REC709 --core --configdir "$work/darktable" >/dev/null 2>&1 &&
+        exr "$work/dark.exr" R,G,B,A=1
+    count "darktable: PIZ"
+fi
+if has blender && has oiiotool; then
+    cat >"$work/layers.py" <<END
+import bpy
+scene, layer = bpy.context.scene, bpy.context.view_layer
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', 1, False
+scene.render.resolution_x, scene.render.resolution_y, scene.render.film_transparent = 48, 32, True
+layer.use_pass_ambient_occlusion = layer.use_pass_normal = True
+for codec in 'PIZ', 'ZIP', 'PXR24':
+    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    scene.render.image_settings.exr_codec = codec
+    scene.render.filepath = '$PWD/$work/blender_' + codec + '.exr'
+    bpy.ops.render.render(write_still=True)
+END
+    blender -b --factory-startup -P "$work/layers.py" >"$work/blender.log" 2>&1
+    for codec in PIZ ZIP PXR24; do
+        exr "$work/blender_$codec.exr" ViewLayer.Combined.R,ViewLayer.Combined.G,ViewLayer.Combined.B,ViewLayer.Combined.A &&
+            notes "$work/blender_$codec.exr" "of 2 layers or parts with R, G, B: ViewLayer.Combined is taken"
+        count "Blender: $codec"
+    done
+fi
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]
