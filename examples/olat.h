@@ -21,10 +21,11 @@
    exclude_list.txt names. Distorted lenses are refused.
 
    IMAGES  PNG of any kind, as bytes or words of sRGB: what cICP, else an ICC profile of curves and a matrix,
-   else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR of one part,
-   scan lines or tiles, unpacked, RLE, ZIPS or ZIP, halves or floats: the display window, alpha divided out,
-   R G B A or Y of the image or its first layer. A name without an ending is .png, or .exr where there is no
-   such PNG.
+   else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR, scan lines
+   or tiles, unpacked, RLE, ZIPS, ZIP, PIZ or PXR24, halves or floats: the display window, alpha divided out,
+   in sRGB's primaries; R G B A of the layer or part named Combined, else of the one without a name, else of
+   rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. A name without an
+   ending is .png, or .exr where there is no such PNG.
 
    MASKS  Where a mask's alpha varies it is what is kept, of an indexed image with a palette of colours and
    black as index 0 all but that, else what is white. Where no mask of the dataset has more than 0.6 of white,

@@ -100,16 +100,16 @@ exr() { # exr FILE CHANNELS: it has the light that oiiotool finds in these, alph
 }
 if has oiiotool && has exrmaketiled; then
     # spread: more than 2^14 halves in a block, of which PIZ then makes other differences
-    for size in 1x1 1x40 40x1 3x5 33x31 200x150 1030x40; do
+    for size in 1x1 3x5 33x31 200x150 1030x40; do
         for kind in smooth constant steps noise spread; do
             case $kind in
             smooth) pattern=fill:topleft=0.1,0.2,0.3,1:topright=2,0.1,0.9,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8 ;;
             constant) pattern=constant:color=0.25,0.5,0.75,1 ;;
             steps) pattern=checker:width=5:height=3:color1=0.1,0.2,0.3,1:color2=0.7,0.1,0.4,0.5 ;;
             noise) pattern=noise:type=uniform:min=0.1:max=0.9:mono=0 ;;
-            spread) pattern=noise:type=uniform:min=0.35:max=2:mono=0 ;;
+            spread) pattern=noise:type=uniform:min=0.9:max=2:mono=0 ;;
             esac
-            [ $size != 1030x40 ] || [ $kind = spread ] || continue
+            case $size/$kind in 1030x40/spread | 33x31/* | 200x150/noise | 3x5/smooth | 1x1/constant) ;; *) continue ;; esac
             for type in half float; do
                 set -- --pattern $pattern $size 3
                 [ $kind = spread ] && set -- "$@" --powc 15
