@@ -92,7 +92,7 @@ exr() { # exr FILE CHANNELS: it has the light that oiiotool finds in these, alph
               if (v < 0) v = 0
               if (c < 6 && v > 65504) v = 65504
               off = v - $c; if (off < 0) off = -off
-              off /= 2e-6 + v
+              off /= 6e-4 + v # six digits are printed
               if (off > worst) worst = off }
           seen++ }
         END { if (seen != pixels || !seen || worst > 1e-3) { print "    " seen " of " pixels " pixels, off by " worst; exit 1 } }' \
