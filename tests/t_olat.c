@@ -2720,7 +2720,7 @@ static void test_mask_kinds(void) {
     CHECK(mask_leaves(MASKED("m"), 0, by_all,
                       USED "\n1 of the 1 masks is white everywhere: all is kept: " FOLDER "/m.png"));
     /* an OpenEXR */
-    const exr one = {0, {0, 0}, {0, 0, 2, 1}, {0, 0, 2, 1}, {"Y", NULL}, {2}, 0};
+    const exr one = {0, {0, 0}, {0, 0, 2, 1}, {0, 0, 2, 1}, {"Y", NULL}, {2}, 0, ""};
     static const unsigned char by_exr[6] = {0, 191, 255, 0, 0, 255};
     static const float light[6] = {0, 0.75f, 1, 0, -1, 7};
     encode_exr(&one);
