@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.4 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.2.5 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -209,7 +209,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 204 /* 0.2.4; written into files */
+#define SSDGS_VERSION 205 /* 0.2.5; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
@@ -369,7 +369,11 @@ typedef struct ssdgs_settings {
     ssdgs_real light_scale;    /* factor from the dataset's intensities to the model's */
     ssdgs_real ambient[3];     /* RGB, 0 or more: even light that the photographs have besides their lights.
                                   Training and evaluation add it; renders do where options.ambient[0] is it */
-    ssdgs_real origin[3];      /* world: where the model's 0 lies; only files use it, see CONVENTIONS */
+    ssdgs_real origin[3];      /* world: where the model's 0 lies; only programs use it, see CONVENTIONS */
+    struct {
+        ssdgs_real turn[3], scale, move[3];
+    } placement; /* where an editor of splats has put the model, see ssdgs_model_adopt(): it is drawn at scale
+                    x turned point + move. turn: axis times radians. scale: 1; below 0 it mirrors, too */
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
     } medium; /* of models made in code, where scattering.layers is 0 and transport 1: light travels in it by
@@ -426,8 +430,10 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
    0 0 0 where it has none. ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]);
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor.
-   Positions move by the difference of the origins. ERR_ARGUMENT: one is baked, or a trainer has the model.
-   ERR_MEMORY. */
+   What networks see does not turn: the Gaussians that both have, in any order, tell how the editor has
+   turned, scaled and moved the model; it comes back to the original's place, and settings.placement says
+   where it is drawn. Notes tell that, or that no such place fits. ERR_ARGUMENT: one is baked, or a trainer
+   has the model. ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
@@ -586,7 +592,8 @@ typedef struct ssdgs_object {
                                   stays as it is. Geometric lobes take roughness whole. Read in the call.
                                   NULL: all do; NULL */
 } ssdgs_object;
-SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* where and as it was trained */
+SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* as it was trained, where
+                                                                    settings.placement says */
 
 /* A scene holds no objects: it keeps what its last frame found. Views of one frame share the lights' maps on
    one scene, which is best while lights or objects move; while they rest a scene for each view is faster. To
@@ -769,7 +776,8 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
 /* Trains model on photos; the photo structs are copied. A model of 0 Gaussians starts from random points and
    gets light_scale, centre, length_unit and new networks; one that has Gaussians goes on (with
-   SSDGS_SCHEDULE_JOINT with all terms). options NULL = default. Once something else has moved the model's
+   SSDGS_SCHEDULE_JOINT with all terms), and where settings.placement is set loses it. options NULL =
+   default. Once something else has moved the model's
    Gaussians (ssdgs_model_sort(), another trainer) it neither steps, saves nor loads. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
@@ -813,7 +821,8 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics);
-/* Fits photo's camera and light to its pixels by so many steps of Adam, the model fixed. */
+/* Fits photo's camera and light to its pixels by so many steps of Adam, the model fixed. ERR_ARGUMENT: it has
+   a settings.placement. */
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations);
 #endif /* SSDGS_NO_TRAINER */
@@ -2595,7 +2604,7 @@ SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
     s.pixel_variance = (ssdgs_real)0.1;
     s.eta = (ssdgs_real)1.3;
     s.length_unit = (ssdgs_real)0.5;
-    s.light_scale = 1;
+    s.light_scale = s.placement.scale = 1;
     return s;
 }
 
@@ -2619,6 +2628,41 @@ SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
         !ssdgs__finite((ssdgs_real)(s)->field)) \
     return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field, \
                        (double)(s)->field, (double)(low), (double)(high))
+
+static int ssdgs__is_placed(const ssdgs_settings *s) {
+    ssdgs_settings here;
+    memset(&here.placement, 0, sizeof here.placement);
+    here.placement.scale = 1;
+    return memcmp(&s->placement, &here.placement, sizeof here.placement) != 0;
+}
+
+/* A turn, axis times radians, as a quaternion. */
+static void ssdgs__turn_quaternion(const double turn[3], double q[4]) {
+    const double angle = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+    q[0] = cos(0.5 * angle);
+    for (int i = 0; i < 3; i++) q[1 + i] = angle > 0 ? sin(0.5 * angle) * turn[i] / angle : 0;
+}
+
+/* The rotation of a unit quaternion. */
+static void ssdgs__quaternion_matrix(const double q[4], double r[9]) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int k = 3 - i - j; /* the third axis, where i and j differ */
+            const double cross = i == j ? 0 : (j - i + 3) % 3 == 1 ? -q[0] * q[1 + k] : q[0] * q[1 + k];
+            r[3 * i + j] = 2 * (q[1 + i] * q[1 + j] + cross) + (i == j ? 2 * q[0] * q[0] - 1 : 0);
+        }
+}
+
+/* Where a placed model is drawn, (3,4) as ssdgs_object.to_world. */
+static void ssdgs__placement_matrix(const ssdgs_settings *s, ssdgs_real m[12]) {
+    double turn[3], q[4], r[9];
+    for (int i = 0; i < 3; i++) turn[i] = (double)s->placement.turn[i];
+    ssdgs__turn_quaternion(turn, q);
+    ssdgs__quaternion_matrix(q, r);
+    for (int i = 0; i < 12; i++)
+        m[i] = i % 4 == 3 ? s->placement.move[i / 4]
+                          : (ssdgs_real)((double)s->placement.scale * r[i / 4 * 3 + i % 4]);
+}
 
 /* Whether, with these terms, light scatters by settings.medium, not by a network. */
 static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
@@ -2673,6 +2717,14 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(origin[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     SSDGS__RANGE(origin[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     SSDGS__RANGE(origin[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    for (int i = 0; i < 3; i++) {
+        SSDGS__RANGE(placement.turn[i], -7, 7);
+        SSDGS__RANGE(placement.move[i], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    }
+    SSDGS__RANGE(placement.scale, (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    if (s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9)
+        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: placement.scale = %g is too small",
+                           (double)s->placement.scale);
     const int medium = ssdgs__has_medium(s, s->terms);
     if (medium && !s->transport)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
@@ -3164,6 +3216,302 @@ static void ssdgs__gaussians_update(ssdgs_model *model, int version) {
     }
 }
 
+/* A rotation, a scale and a move: x -> scale (turned x) + move. scale below 0 mirrors, too. */
+typedef struct ssdgs__similarity {
+    double q[4], r[9], scale, move[3];
+} ssdgs__similarity;
+
+static void ssdgs__similarity_at(const ssdgs__similarity *s, const double x[3], double to[3]) {
+    for (int i = 0; i < 3; i++)
+        to[i] =
+            s->scale * (s->r[3 * i] * x[0] + s->r[3 * i + 1] * x[1] + s->r[3 * i + 2] * x[2]) + s->move[i];
+}
+
+/* Two places of one Gaussian, and how far a similarity is off. */
+typedef struct ssdgs__pair_of_places {
+    double from[3], to[3], off;
+} ssdgs__pair_of_places;
+
+static int ssdgs__off_compare(const void *a, const void *b) {
+    const double x = ((const ssdgs__pair_of_places *)a)->off, y = ((const ssdgs__pair_of_places *)b)->off;
+    return (x > y) - (x < y);
+}
+
+/* The similarity nearest to n pairs, sides +1 or, mirrored, -1 (Horn 1987: the rotation is the main
+   eigenvector of a symmetric 4 x 4 matrix); 0 where they tell none: all on a line, say. */
+static int ssdgs__similarity_of(const ssdgs__pair_of_places *pairs, int n, double side,
+                                ssdgs__similarity *s) {
+    double mean[2][3] = {{0, 0, 0}, {0, 0, 0}}, c[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, m[16], trace = 0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) mean[0][k] += pairs[i].from[k] / n, mean[1][k] += pairs[i].to[k] / n;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 9; k++)
+            c[k] += side * (pairs[i].from[k / 3] - mean[0][k / 3]) * (pairs[i].to[k % 3] - mean[1][k % 3]);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) {
+            const int a = (i ? i : j) - 1, d = j - 1; /* axes */
+            const double sum = c[0] + c[4] + c[8];
+            double v = sum; /* of the real part with itself */
+            if ((i > 0) != (j > 0))
+                v = c[3 * ((a + 1) % 3) + (a + 2) % 3] - c[3 * ((a + 2) % 3) + (a + 1) % 3];
+            if (i > 0 && j > 0) v = c[3 * a + d] + c[3 * d + a] - (i == j ? sum : 0);
+            m[4 * i + j] = v;
+        }
+    double size = 0;
+    for (int i = 0; i < 16; i++) size += fabs(m[i]);
+    if (!(size > 0)) return 0;
+    for (int i = 0; i < 16; i++) m[i] = m[i] / size + (i % 5 == 0); /* all eigenvalues positive */
+    for (int turn = 0; turn < 50; turn++) { /* squared again and again the largest one is left */
+        double square[16];
+        trace = m[0] + m[5] + m[10] + m[15];
+        for (int i = 0; i < 16; i++) {
+            square[i] = 0;
+            for (int k = 0; k < 4; k++) square[i] += m[i / 4 * 4 + k] * m[4 * k + i % 4] / (trace * trace);
+        }
+        memcpy(m, square, sizeof m);
+    }
+    int best = 0;
+    for (int i = 1; i < 4; i++) best = m[5 * i] > m[5 * best] ? i : best;
+    trace = m[0] + m[5] + m[10] + m[15];
+    double norm = 0;
+    for (int i = 0; i < 4; i++) norm += m[4 * best + i] * m[4 * best + i];
+    if (!(norm > 0.999 * m[5 * best] * trace)) return 0; /* two eigenvalues are alike */
+    for (int i = 0; i < 4; i++) s->q[i] = m[4 * best + i] / sqrt(norm);
+    ssdgs__quaternion_matrix(s->q, s->r);
+    double along = 0, square = 0;
+    for (int k = 0; k < 9; k++) along += s->r[k] * c[k % 3 * 3 + k / 3];
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            square += (pairs[i].from[k] - mean[0][k]) * (pairs[i].from[k] - mean[0][k]);
+    s->scale = side * along / square;
+    if (!(along > 0) || !(square > 0)) return 0;
+    for (int k = 0; k < 3; k++) s->move[k] = 0;
+    double centre[3];
+    ssdgs__similarity_at(s, mean[0], centre);
+    for (int k = 0; k < 3; k++) s->move[k] = mean[1][k] - centre[k];
+    return 1;
+}
+
+/* The similarity that most pairs follow, by fits to the better half, and how far off half of them are; 1e300:
+   there is none. */
+static double ssdgs__similarity_fit(ssdgs__pair_of_places *pairs, int n, double side, ssdgs__similarity *s) {
+    for (int turn = 0; turn < 12; turn++) {
+        if (!ssdgs__similarity_of(pairs, turn ? (n + 1) / 2 : n, side, s)) return 1e300;
+        for (int i = 0; i < n; i++) {
+            double at[3];
+            ssdgs__similarity_at(s, pairs[i].from, at);
+            pairs[i].off = 0;
+            for (int k = 0; k < 3; k++) pairs[i].off += (at[k] - pairs[i].to[k]) * (at[k] - pairs[i].to[k]);
+        }
+        qsort(pairs, (size_t)n, sizeof *pairs, ssdgs__off_compare);
+    }
+    return sqrt(pairs[n / 2].off);
+}
+
+/* What no editor of splats changes of a Gaussian: the properties that are ours alone. */
+enum { SSDGS__OWN = SSDGS_DIFFUSE, SSDGS__OWN_COUNT = SSDGS_CHANNELS - SSDGS_DIFFUSE };
+
+static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
+    uint64_t hash = 1;
+    for (size_t c = SSDGS__OWN; c < SSDGS_CHANNELS; c++) {
+        uint32_t bits;
+        const float value = (float)model->gaussians[c * model->capacity + i];
+        memcpy(&bits, &value, sizeof bits);
+        hash = (hash ^ bits) * UINT64_C(0x9E3779B97F4A7C15);
+        hash ^= hash >> 29;
+    }
+    return hash << 32 | (uint32_t)i;
+}
+
+static int ssdgs__own_same(const ssdgs_model *a, size_t i, const ssdgs_model *b, size_t j) {
+    size_t c = SSDGS__OWN;
+    while (c < SSDGS_CHANNELS && !memcmp(a->gaussians + c * a->capacity + i,
+                                         b->gaussians + c * b->capacity + j, sizeof *a->gaussians))
+        c++;
+    return c == SSDGS_CHANNELS;
+}
+
+/* The original's Gaussian that is Gaussian i; -1: none, or several. keys: sorted ones of the original. */
+static int ssdgs__own_match(const ssdgs_model *model, size_t i, const ssdgs_model *original,
+                            const uint64_t *keys) {
+    const uint64_t key = ssdgs__own_key(model, i) >> 32;
+    size_t low = 0, high = (size_t)original->count;
+    int found = -1;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (keys[middle] >> 32 < key) low = middle + 1;
+        else high = middle;
+    }
+    for (; low < (size_t)original->count && keys[low] >> 32 == key; low++) {
+        if (!ssdgs__own_same(model, i, original, (uint32_t)keys[low])) continue;
+        if (found >= 0) return -1;
+        found = (int)(uint32_t)keys[low];
+    }
+    return found;
+}
+
+/* Brings Gaussian i back: what the original's, j, has become by the similarity, or was left as it is, becomes
+   the original's to the bit; anything else has been edited, and is turned back. j -1: not in the original. */
+static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *original, int j,
+                              const ssdgs__similarity *s, double tolerance) {
+    ssdgs_real *g = model->gaussians + i;
+    const ssdgs_real *o = original->gaussians + (j < 0 ? 0 : j);
+    const size_t stride = model->capacity, from = original->capacity;
+    double x[3], q[4], back[4], dot = 0, norm[2] = {0, 0}, off = 0;
+    for (size_t k = 0; k < 3; k++) x[k] = (double)g[(SSDGS_POSITION + k) * stride] - s->move[k];
+    for (size_t k = 0; k < 3; k++) {
+        const double home = (s->r[k] * x[0] + s->r[3 + k] * x[1] + s->r[6 + k] * x[2]) / s->scale;
+        off += j < 0 ? 0 : fabs(home - (double)o[(SSDGS_POSITION + k) * from]);
+        g[(SSDGS_POSITION + k) * stride] = (ssdgs_real)home;
+    }
+    for (size_t k = 0; k < 3 && j >= 0 && off * fabs(s->scale) < 2 * tolerance; k++)
+        g[(SSDGS_POSITION + k) * stride] = o[(SSDGS_POSITION + k) * from];
+    for (size_t k = 0; k < 4; k++) q[k] = (double)g[(SSDGS_ROTATION + k) * stride];
+    const double *w = s->q; /* the product of its conjugate and q */
+    back[0] = w[0] * q[0] + w[1] * q[1] + w[2] * q[2] + w[3] * q[3];
+    for (int k = 1; k < 4; k++) {
+        const int a = k % 3 + 1, b = (k + 1) % 3 + 1;
+        back[k] = w[0] * q[k] - w[k] * q[0] - w[a] * q[b] + w[b] * q[a];
+    }
+    int same = j >= 0;
+    for (size_t k = 0; k < 4 && j >= 0; k++) {
+        const double own = (double)o[(SSDGS_ROTATION + k) * from];
+        same = same && !(q[k] < own) && !(q[k] > own);
+        dot += back[k] * own, norm[0] += back[k] * back[k], norm[1] += own * own;
+    }
+    same = same || (j >= 0 && dot * dot > (1 - 1e-6) * norm[0] * norm[1]);
+    for (size_t k = 0; k < 4; k++)
+        g[(SSDGS_ROTATION + k) * stride] = same ? o[(SSDGS_ROTATION + k) * from] : (ssdgs_real)back[k];
+    for (size_t k = 0; k < 3; k++) {
+        ssdgs_real *size = g + (SSDGS_LOG_SCALE + k) * stride;
+        const double home = (double)*size - log(fabs(s->scale)),
+                     own = j < 0 ? 1e300 : (double)o[(SSDGS_LOG_SCALE + k) * from];
+        const int kept = !((double)*size < own) && !((double)*size > own);
+        *size = kept || fabs(home - own) < 1e-4 ? (ssdgs_real)own : (ssdgs_real)home;
+    }
+}
+
+static const ssdgs__similarity ssdgs__unmoved = {{1, 0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1, {0, 0, 0}};
+
+/* Gives the model the original's settings, finds what has become of the original's Gaussians, and brings the
+   model back to their place. */
+static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *original) {
+    enum { MOST = 4096 };
+    ssdgs_context *context = model->context;
+    double apart[3]; /* the origins' difference, which positions of a file without settings may have or not */
+    int together = 1;
+    for (int c = 0; c < 3; c++) {
+        apart[c] = (double)model->settings.origin[c] - (double)original->settings.origin[c];
+        together = together && !(apart[c] < 0) && !(apart[c] > 0);
+    }
+    const int lost = !model->version;
+    const size_t count = (size_t)model->count, known = (size_t)original->count;
+    uint64_t *keys = (uint64_t *)ssdgs__allocate(context, (known + 1) * sizeof *keys +
+                                                              MOST * sizeof(ssdgs__pair_of_places) +
+                                                              (count + 1) * sizeof(int));
+    if (!keys) return SSDGS_ERR_MEMORY;
+    model->settings = original->settings;
+    if (!model->version) ssdgs__gaussians_update(model, original->version);
+    ssdgs__pair_of_places *pairs = (ssdgs__pair_of_places *)(keys + known + 1);
+    int *match = (int *)(pairs + MOST), n = 0;
+    size_t shared = 0, still = 0, taken = 0;
+    for (size_t i = 0; i < known; i++) keys[i] = ssdgs__own_key(original, i);
+    qsort(keys, known, sizeof *keys, ssdgs__key_compare);
+    for (size_t i = 0; i < count; i++) {
+        match[i] = ssdgs__own_match(model, i, original, keys);
+        shared += match[i] >= 0;
+    }
+    double largest = 0, spread = 0, mean[3] = {0, 0, 0};
+    for (size_t i = 0; i < count; i++) {
+        if (match[i] < 0) continue;
+        int same = 1;
+        double place[3];
+        for (size_t k = 0; k < 3; k++) {
+            place[k] = (double)model->gaussians[(SSDGS_POSITION + k) * model->capacity + i];
+            const double from =
+                (double)original->gaussians[(SSDGS_POSITION + k) * original->capacity + (size_t)match[i]];
+            same = same && !(place[k] < from) && !(place[k] > from);
+        }
+        still += (size_t)same;
+        if (taken++ * MOST / shared < (size_t)n || n == MOST) continue; /* some of all tell enough */
+        for (size_t k = 0; k < 3; k++) {
+            pairs[n].from[k] =
+                (double)original->gaussians[(SSDGS_POSITION + k) * original->capacity + (size_t)match[i]];
+            pairs[n].to[k] = place[k];
+            mean[k] += place[k];
+            largest = fabs(place[k]) > largest ? fabs(place[k]) : largest;
+        }
+        n++;
+    }
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            spread += (pairs[i].to[k] - mean[k] / n) * (pairs[i].to[k] - mean[k] / n) / n;
+    /* floats are exact to 6e-8 of themselves, what editors compute with them to some more */
+    const double tolerance = 1e-4 * sqrt(spread) + 1e-6 * largest;
+    ssdgs__similarity s = ssdgs__unmoved, mirrored;
+    int fits = 2 * still > shared && (lost || together);
+    const int stays = fits;
+    const char *problem = NULL;
+    if (!stays && (shared < 4 || 2 * shared < count))
+        problem =
+            "too few of its Gaussians are the original's to tell whether an editor has turned, scaled or "
+            "moved it";
+    else if (!stays) {
+        fits = ssdgs__similarity_fit(pairs, n, 1, &s) < tolerance;
+        if (!fits && (fits = ssdgs__similarity_fit(pairs, n, -1, &mirrored) < tolerance) != 0) s = mirrored;
+        if (!fits)
+            problem = "no rotation, scale and move brings the original's Gaussians to where they are: has an "
+                      "editor stretched it, or joined several?";
+    }
+    if (!fits) {
+        s = ssdgs__unmoved;
+        for (int k = 0; k < 3; k++) s.move[k] = -apart[k];
+        ssdgs__note(context, "the model: %s; it is not drawn as it was trained where it was moved", problem);
+    }
+    for (size_t i = 0; i < count && !stays; i++)
+        ssdgs__bring_back(model, i, original, match[i], &s, tolerance);
+    ssdgs__release(context, keys);
+    if (stays || !fits) return SSDGS_OK;
+    /* of positions beside the origin that the file lost, and in the world, what moves the model less */
+    double move2 = 0, other2 = 0, turn = 0;
+    for (int k = 0; k < 3; k++) {
+        move2 += s.move[k] * s.move[k];
+        other2 += (s.move[k] + apart[k]) * (s.move[k] + apart[k]);
+        turn += s.q[1 + k] * s.q[1 + k];
+    }
+    const int in_world = !lost || other2 < move2;
+    const double side = s.q[0] < 0 ? -1 : 1, angle = 2 * atan2(sqrt(turn), side * s.q[0]);
+    if (angle < 1e-6 && fabs(s.scale - 1) < 1e-6 && (in_world ? other2 : move2) < tolerance * tolerance)
+        return SSDGS_OK;
+    for (int k = 0; k < 3; k++) { /* without what rounding left */
+        const double turned = turn > 0 ? side * angle * s.q[1 + k] / sqrt(turn) : 0,
+                     move = s.move[k] + (in_world ? apart[k] : 0);
+        model->settings.placement.turn[k] = (ssdgs_real)(fabs(turned) < 1e-6 ? 0 : turned);
+        model->settings.placement.move[k] = (ssdgs_real)(fabs(move) < 1e-2 * tolerance ? 0 : move);
+    }
+    const double scale = fabs(fabs(s.scale) - 1) < 1e-6 ? (s.scale < 0 ? -1 : 1) : s.scale;
+    model->settings.placement.scale = (ssdgs_real)scale;
+    return SSDGS_OK;
+}
+
+/* Notes where a model stands, if not where it was trained. */
+static void ssdgs__tell_placement(const ssdgs_model *model, const char *name) {
+    const ssdgs_settings *s = &model->settings;
+    double angle = 0;
+    if (!ssdgs__is_placed(s)) return;
+    for (int k = 0; k < 3; k++) angle += (double)s->placement.turn[k] * (double)s->placement.turn[k];
+    angle = sqrt(angle);
+    const double unit = angle > 0 ? angle : 1;
+    ssdgs__note(
+        model->context,
+        "%s: stands where an editor has put it: turned by %g degrees about (%g, %g, %g), %s%g times as "
+        "large, moved by (%g, %g, %g)",
+        name, floor(angle * 5729.577951308232 + 0.5) / 100, (double)s->placement.turn[0] / unit,
+        (double)s->placement.turn[1] / unit, (double)s->placement.turn[2] / unit,
+        s->placement.scale < 0 ? "mirrored, " : "", fabs((double)s->placement.scale),
+        (double)s->placement.move[0], (double)s->placement.move[1], (double)s->placement.move[2]);
+}
+
 static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *original) {
     if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
     if (model->settings.baked || original->settings.baked)
@@ -3174,20 +3522,18 @@ static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *or
     ssdgs_real *globals =
         (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
     if (!globals) return SSDGS_ERR_MEMORY;
+    const ssdgs_result result = ssdgs__come_back(model, original);
+    if (result) {
+        ssdgs__release(model->context, globals);
+        return result;
+    }
     memcpy(globals, original->globals, original->global_count * sizeof *globals);
     ssdgs__release(model->context, model->globals);
     model->globals = globals;
     model->global_count = original->global_count;
-    for (int c = 0; c < 3; c++) {
-        const double move = (double)model->settings.origin[c] - (double)original->settings.origin[c];
-        ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
-        for (size_t i = 0; i < (size_t)model->count && (move < 0 || move > 0); i++)
-            x[i] = (ssdgs_real)((double)x[i] + move);
-    }
-    model->settings = original->settings;
-    if (!model->version) ssdgs__gaussians_update(model, original->version);
     model->version = original->version;
     ssdgs__model_changed(model);
+    ssdgs__tell_placement(model, "the model");
     return SSDGS_OK;
 }
 
@@ -3765,10 +4111,20 @@ static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds 
 
 static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o);
 
+/* A model in its own space. */
+static ssdgs_object ssdgs__object_alone(ssdgs_model *model) {
+    ssdgs_object object;
+    memset(&object, 0, sizeof object);
+    object.model = model;
+    for (int i = 0; i < 3; i++) object.to_world[5 * i] = object.tint[i] = 1;
+    object.roughness = object.specular = object.translucency = 1;
+    return object;
+}
+
 /* The bounds of a model in its space, of all that is drawn at alpha 1/255. */
 static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bounds) {
     ssdgs_context *context = model->context;
-    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_object object = ssdgs__object_alone(model);
     ssdgs_placed placed;
     ssdgs_frame frame;
     const ssdgs_result result = ssdgs__scratch_create(context);
@@ -4738,7 +5094,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__frame_of_model(ssdgs_frame *frame, ss
                                                           const ssdgs_light *lights, int light_count,
                                                           const ssdgs_render_options *options, int components,
                                                           int training) {
-    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_object object = ssdgs__object_alone(model);
     ssdgs__request request = ssdgs__request_of(&object, 1, camera, lights, light_count, options);
     request.components = components;
     request.training = training;
@@ -7656,11 +8012,9 @@ static const ssdgs_occluder *ssdgs__occluder_of(const ssdgs_scene *scene) {
 }
 
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
-    ssdgs_object object;
-    memset(&object, 0, sizeof object);
-    object.model = model;
-    for (int i = 0; i < 3; i++) object.to_world[5 * i] = object.tint[i] = 1;
-    object.roughness = object.specular = object.translucency = 1;
+    ssdgs_object object = ssdgs__object_alone(model);
+    if (model && ssdgs__is_placed(&model->settings))
+        ssdgs__placement_matrix(&model->settings, object.to_world);
     return object;
 }
 
@@ -7801,7 +8155,7 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
 static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory **memory,
                                        const ssdgs_real direction[3], ssdgs_real *exposure,
                                        ssdgs_real *sums) {
-    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_object object = ssdgs__object_alone(model);
     const ssdgs_camera camera = ssdgs__no_camera();
     const ssdgs_render_options options = ssdgs_render_options_preview();
     ssdgs_light light;
@@ -8070,7 +8424,7 @@ SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_rea
 
 static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
     ssdgs_context *context = model->context;
-    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_object object = ssdgs__object_alone(model);
     ssdgs_placed placed;
     if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
     const ssdgs_result result = ssdgs__model_box(model);
@@ -8546,33 +8900,36 @@ static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {"vertex", "ssdgs_
                                                                "scattering_weight", "shadow_weight"};
 
 /* A row is an array of 32-bit words: floats, as bits, or the integers of the settings when they are written.
-   A vertex has the model's planes first, then what only other programs use; settings lie as in their struct;
-   globals at 4 x group. */
+   A vertex has the model's planes first, then what only other programs use; settings follow each other;
+   globals lie at 4 x group. */
 enum {
     SSDGS__PLY_NORMAL = SSDGS_CHANNELS,
     SSDGS__PLY_DC = SSDGS_CHANNELS + 3,
     SSDGS__PLY_RGB = SSDGS_CHANNELS + 22, /* behind all that is written, settings too */
     SSDGS__PLY_WORDS = SSDGS_CHANNELS + 25
 };
-typedef char ssdgs__ply_settings_fit[sizeof(ssdgs_settings) / sizeof(int) <= SSDGS__PLY_RGB ? 1 : -1];
 
 typedef struct ssdgs__ply_field {
     int kind;         /* element */
     const char *stem; /* of the names stem0, stem1, .. */
     int count;        /* of those; 0 = the stem is the name */
-    int word;         /* of the first */
+    int word;         /* of the first; of a setting where it lies in ssdgs_settings, bytes */
     int integer;
+    int added;    /* 1: a setting that files of older versions lack: */
+    float before; /* what held then */
 } ssdgs__ply_field;
 
 #define SSDGS__V(stem, count, word) \
-    { SSDGS__PLY_VERTEX, stem, count, word, 0 }
+    { SSDGS__PLY_VERTEX, stem, count, word, 0, 0, 0 }
 #define SSDGS__IN(stem, member) \
-    { SSDGS__PLY_SETTINGS, stem, 0, offsetof(ssdgs_settings, member) / sizeof(int), 1 }
+    { SSDGS__PLY_SETTINGS, stem, 0, offsetof(ssdgs_settings, member), 1, 0, 0 }
 #define SSDGS__I(member) SSDGS__IN(#member, member)
 #define SSDGS__R(stem, count, member) \
-    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member) / sizeof(int), 0 }
+    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member), 0, 0, 0 }
+#define SSDGS__ADDED(stem, count, member, integer, before) \
+    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member), integer, 1, before }
 #define SSDGS__G(kind, stem, count, group) \
-    { kind, stem, count, 4 * group, 0 }
+    { kind, stem, count, 4 * group, 0, 0, 0 }
 /* In the order of the file; red, green, blue are only read. */
 static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__V("x", 0, SSDGS_POSITION),
@@ -8602,27 +8959,30 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__I(asg),
     SSDGS__I(per_channel_optics),
     SSDGS__I(depth_cue),
-    SSDGS__I(transport),
+    SSDGS__ADDED("transport", 0, transport, 1, 0),
     SSDGS__I(residual_shadow),
     SSDGS__I(shadow_on_scattering),
     SSDGS__IN("scattering_layers", scattering.layers),
     SSDGS__IN("scattering_width", scattering.width),
-    SSDGS__IN("view_octaves", octaves.view),
-    SSDGS__IN("light_octaves", octaves.light),
+    SSDGS__ADDED("view_octaves", 0, octaves.view, 1, 4),
+    SSDGS__ADDED("light_octaves", 0, octaves.light, 1, 4),
     SSDGS__IN("shadow_layers", shadow.layers),
     SSDGS__IN("shadow_width", shadow.width),
     SSDGS__IN("light_blur", light_map.blur),
     SSDGS__IN("light_map_size", light_map.size),
     SSDGS__R("light_bias", 0, light_map.bias),
-    SSDGS__R("pixel_variance", 0, pixel_variance),
+    SSDGS__ADDED("pixel_variance", 0, pixel_variance, 0, 0.3f),
     SSDGS__R("eta", 0, eta),
     SSDGS__R("centre_", 3, centre),
     SSDGS__R("length_unit", 0, length_unit),
     SSDGS__R("light_scale", 0, light_scale),
-    SSDGS__R("ambient_", 3, ambient),
-    SSDGS__R("origin_", 3, origin),
-    SSDGS__R("medium_scattering_", 3, medium.scattering),
-    SSDGS__R("medium_absorption_", 3, medium.absorption),
+    SSDGS__ADDED("ambient_", 3, ambient, 0, 0),
+    SSDGS__ADDED("origin_", 3, origin, 0, 0),
+    SSDGS__ADDED("placement_turn_", 3, placement.turn, 0, 0),
+    SSDGS__ADDED("placement_scale", 0, placement.scale, 0, 1),
+    SSDGS__ADDED("placement_move_", 3, placement.move, 0, 0),
+    SSDGS__ADDED("medium_scattering_", 3, medium.scattering, 0, 0),
+    SSDGS__ADDED("medium_absorption_", 3, medium.absorption, 0, 0),
     SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS),
     SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS),
     SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA),
@@ -8632,6 +8992,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
 #undef SSDGS__IN
 #undef SSDGS__I
 #undef SSDGS__R
+#undef SSDGS__ADDED
 #undef SSDGS__G
 
 typedef struct ssdgs__ply_cursor { /* walks properties: set field to NULL, then call ssdgs__ply_next */
@@ -8642,6 +9003,7 @@ typedef struct ssdgs__ply_cursor { /* walks properties: set field to NULL, then 
 static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
     const ssdgs__ply_field *const end =
         ssdgs__ply_fields + sizeof ssdgs__ply_fields / sizeof *ssdgs__ply_fields;
+    const int settings = kind == SSDGS__PLY_SETTINGS, next = cursor->field ? cursor->word + 1 : 0;
     if (cursor->field && cursor->index + 1 < cursor->field->count) {
         cursor->index++;
     } else {
@@ -8650,7 +9012,7 @@ static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
         while (cursor->field < end && cursor->field->kind != kind) cursor->field++;
         if (cursor->field == end) return 0;
     }
-    cursor->word = cursor->field->word + cursor->index;
+    cursor->word = settings ? next : cursor->field->word + cursor->index;
     return 1;
 }
 
@@ -8664,7 +9026,7 @@ static const char *ssdgs__ply_name(const ssdgs__ply_cursor *cursor, char name[32
 
 /* Where in ssdgs_settings a setting lies: an int or a ssdgs_real. */
 static size_t ssdgs__ply_setting(const ssdgs__ply_cursor *cursor) {
-    return (size_t)cursor->field->word * sizeof(int) + (size_t)cursor->index * sizeof(ssdgs_real);
+    return (size_t)cursor->field->word + (size_t)cursor->index * sizeof(ssdgs_real);
 }
 
 /* Where anything else lies. */
@@ -8758,7 +9120,7 @@ typedef struct ssdgs__ply {
     const char *name; /* of the file, for messages */
     const unsigned char *begin, *at, *end;
     int version;          /* that wrote it; 0: it does not say */
-    double origin[3];     /* to be taken from positions */
+    double origin[3];     /* to be taken from positions: files up to 0.2.4 have them in the world */
     double color_unit[3]; /* of red, green and blue: by their types */
     ssdgs__ply_format format;
     int newline, line, element_count, property_count;
@@ -9065,7 +9427,8 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     ssdgs__ply_cursor cursor;
     char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
-        if (cursor.word >= first && cursor.word < last && !(ply->known[kind]->present >> cursor.word & 1))
+        if (cursor.word >= first && cursor.word < last && !cursor.field->added &&
+            !(ply->known[kind]->present >> cursor.word & 1))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
                                ply->name, ssdgs__ply_kinds[kind], ssdgs__ply_name(&cursor, name),
                                kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
@@ -9088,34 +9451,16 @@ static ssdgs_result ssdgs__settings_of_file(ssdgs_context *context, const char *
 
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
-    enum { additions = 7 };
-    static const struct {
-        size_t at;
-        int count;
-        double before;
-    } added[additions] = {/* settings of later files, and what held before them */
-                          {offsetof(ssdgs_settings, transport), 1, 0},
-                          {offsetof(ssdgs_settings, octaves), 2, 4},
-                          {offsetof(ssdgs_settings, pixel_variance), 1, 0.3},
-                          {offsetof(ssdgs_settings, ambient), 3, 0},
-                          {offsetof(ssdgs_settings, origin), 3, 0},
-                          {offsetof(ssdgs_settings, medium.scattering), 3, 0},
-                          {offsetof(ssdgs_settings, medium.absorption), 3, 0}};
-    int next = 0;
     uint32_t words[SSDGS__PLY_WORDS];
-    memset(words, 0, sizeof words);
-    for (int i = 0; i <= additions; i++) {
-        const int word = i < additions ? (int)(added[i].at / sizeof(int)) : SSDGS__PLY_WORDS;
-        const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, next, word);
-        if (result) return result;
-        for (next = word; i < additions && next < word + added[i].count; next++)
-            words[next] = ssdgs__ply_bits(added[i].before);
-    }
+    const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, SSDGS__PLY_WORDS);
+    if (result) return result;
+    ssdgs__ply_cursor cursor;
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);)
+        words[cursor.word] = ssdgs__ply_bits((double)cursor.field->before);
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers",
                            ply->name);
-    ssdgs__ply_cursor cursor;
     char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
         const double value = ssdgs__ply_value(words[cursor.word]);
@@ -9276,6 +9621,7 @@ static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, con
                     "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the "
                     "original file",
                     name);
+    ssdgs__tell_placement(model, name);
 }
 
 static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_load_stats *stats) {
@@ -9304,7 +9650,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     stats->untrained = !stats->plain && !ours;
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
-        for (int c = 0; c < 3; c++) ply->origin[c] = (double)settings.origin[c];
+        for (int c = 0; c < 3 && ply->version <= 204; c++) ply->origin[c] = (double)settings.origin[c];
     } else if (stats->plain) {
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
@@ -9625,13 +9971,6 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
         } else if (cursor.word < SSDGS_CHANNELS) {
             real = *ssdgs__ply_cell(model, row, &cursor);
             *word = ssdgs__ply_bits((double)real);
-            if (kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION && ssdgs__has_origin(settings)) {
-                const double position = (double)settings->origin[cursor.word] + (double)real;
-                uint64_t bits;
-                memcpy(&bits, &position, sizeof bits);
-                ssdgs__writer_word(writer, (uint32_t)bits);
-                *word = (uint32_t)(bits >> 32);
-            }
         }
         ssdgs__writer_word(writer, *word);
     }
@@ -9661,11 +10000,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
-            const int position = kind == SSDGS__PLY_VERTEX && cursor.word < SSDGS_ROTATION;
-            snprintf(line, sizeof line, "property %s %s\n",
-                     cursor.field->integer                             ? "int"
-                     : position && ssdgs__has_origin(&model->settings) ? "double"
-                                                                       : "float",
+            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int" : "float",
                      ssdgs__ply_name(&cursor, name));
             ssdgs__writer_text(&writer, line);
         }
@@ -11960,6 +12295,13 @@ SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_phot
     trainer->options = options ? *options : ssdgs_train_options_default();
     trainer->pass = -1;
     result = ssdgs__trainer_setup(trainer, photos, photo_count);
+    if (!result && ssdgs__is_placed(&model->settings)) {
+        const ssdgs_settings unplaced = ssdgs_settings_default();
+        ssdgs__note(context,
+                    "training goes on where the model was trained: the place that an editor gave it is "
+                    "dropped");
+        model->settings.placement = unplaced.placement;
+    }
     if (result) ssdgs__trainer_drop(trainer);
     else *out = trainer;
     return ssdgs__leave(context, result);
@@ -12402,6 +12744,10 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
     if (iterations < 0)
         return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_refine_photo: %d iterations",
                            iterations);
+    if (ssdgs__is_placed(&model->settings))
+        return ssdgs__fail(
+            model->context, SSDGS_ERR_ARGUMENT,
+            "ssdgs_refine_photo: an editor has moved the model from where its photographs show it");
     ssdgs_result result = ssdgs__photo_check(model->context, photo, -1, background);
     if (result) return result;
     ssdgs__correction correction;
@@ -12507,6 +12853,7 @@ static const ssdgs__member ssdgs__members[] = {
     SSDGS__S('i', octaves.view), SSDGS__S('i', octaves.light), SSDGS__S('i', light_map.blur),
     SSDGS__S('i', light_map.size), SSDGS__S('r', light_map.bias), SSDGS__S('r', pixel_variance),
     SSDGS__S('r', eta), SSDGS__3(SSDGS__S, ambient), SSDGS__3(SSDGS__S, origin),
+    SSDGS__3(SSDGS__S, placement.turn), SSDGS__S('r', placement.scale), SSDGS__3(SSDGS__S, placement.move),
     SSDGS__3(SSDGS__S, medium.scattering), SSDGS__3(SSDGS__S, medium.absorption)};
 /* clang-format on */
 #undef SSDGS__O

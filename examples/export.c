@@ -88,6 +88,28 @@ static ssdgs_camera camera_at(const exporter *e, int i, int many, int side) {
     return ssdgs_camera_look_at(eye, e->middle, up, 0.7f, side, side);
 }
 
+/* Puts a splat and its normal where the model stands, which an editor may have moved: settings.placement. */
+static void put_in_place(const exporter *e, splat *s, float normal[3]) {
+    const ssdgs_settings *settings = ssdgs_model_settings(e->model);
+    const ssdgs_object object = ssdgs_object_default(e->model);
+    const float *turn = settings->placement.turn, *m = object.to_world,
+                size = fabsf(settings->placement.scale);
+    const float angle = sqrtf(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+    const float along = angle > 0 ? sinf(angle / 2) / angle : 0;
+    const float p[4] = {cosf(angle / 2), along * turn[0], along * turn[1], along * turn[2]};
+    const splat own = *s;
+    const float *q = own.rotation, n[3] = {normal[0], normal[1], normal[2]};
+    s->rotation[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];
+    for (int c = 0; c < 3; c++) {
+        const int a = (c + 1) % 3, b = (c + 2) % 3;
+        s->rotation[1 + c] = p[0] * q[1 + c] + p[1 + c] * q[0] + p[1 + a] * q[1 + b] - p[1 + b] * q[1 + a];
+        s->scale[c] *= size;
+        s->position[c] = m[4 * c] * own.position[0] + m[4 * c + 1] * own.position[1] +
+                         m[4 * c + 2] * own.position[2] + m[4 * c + 3];
+        normal[c] = (m[4 * c] * n[0] + m[4 * c + 1] * n[1] + m[4 * c + 2] * n[2]) / size;
+    }
+}
+
 /* The colours of all Gaussians: the mean of several eyes. */
 static ssdgs_result bake(exporter *e) {
     static float color[3 * 16 * 16];
@@ -107,6 +129,7 @@ static ssdgs_result bake(exporter *e) {
         memcpy(e->splats[i].rotation, g.rotation, sizeof g.rotation);
         memcpy(e->normals + 3 * i, g.normal, sizeof g.normal);
         e->splats[i].opacity = g.opacity;
+        put_in_place(e, e->splats + i, e->normals + 3 * i);
     }
     e->listening = 1;
     for (int i = 0; i < EYES && !result; i++) {
@@ -437,7 +460,8 @@ static ssdgs_result look(exporter *e, const double *from, char *error) {
     const ssdgs_settings *settings = ssdgs_model_settings(e->model);
     float low[3], high[3], distance2 = 0;
     const float direction[3] = {-0.5f, -0.7f, 0.5f};
-    const ssdgs_result result = ssdgs_model_bounds(e->model, low, high);
+    const ssdgs_object placed = ssdgs_object_default(e->model);
+    const ssdgs_result result = olat_bounds(&placed, low, high);
     for (int c = 0; c < 3 && !result; c++) {
         e->middle[c] = (low[c] + high[c]) / 2;
         e->radius = fmaxf(e->radius, (high[c] - low[c]) / 2);

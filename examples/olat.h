@@ -4010,6 +4010,21 @@ OLAT__API void olat_compose(const ssdgs_photo *photo, int transfer, const ssdgs_
     }
 }
 
+/* The box that holds an object where it stands, of its model's own box. */
+OLAT__API ssdgs_result olat_bounds(const ssdgs_object *object, ssdgs_real low[3], ssdgs_real high[3]) {
+    ssdgs_real own[2][3];
+    const ssdgs_result result = ssdgs_model_bounds(object->model, own[0], own[1]);
+    for (int i = 0; i < 3; i++)
+        for (int corner = 0; corner < 8; corner++) {
+            const ssdgs_real *m = object->to_world + 4 * i;
+            const ssdgs_real at = m[0] * own[corner & 1][0] + m[1] * own[corner >> 1 & 1][1] +
+                                  m[2] * own[corner >> 2][2] + m[3];
+            low[i] = corner && low[i] < at ? low[i] : at;
+            high[i] = corner && high[i] > at ? high[i] : at;
+        }
+    return result;
+}
+
 /* Where a light is; of a directional one, the unit vector towards it. */
 OLAT__API void olat_place(const ssdgs_light *light, ssdgs_real place[3]) {
     for (int i = 0; i < 3; i++)

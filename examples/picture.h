@@ -162,16 +162,16 @@ static void view_stage(void *user, const char *name) {
 OLAT__API ssdgs_result view_arrange(view_show *s) {
     float at = 0, low[3], high[3], tallest[2] = {1e30f, -1e30f};
     for (int i = 0; i < s->count; i++) {
-        const ssdgs_result result = ssdgs_model_bounds(s->models[i], low, high);
-        if (result) return result;
         s->objects[i] = ssdgs_object_default(s->models[i]);
+        const ssdgs_result result = olat_bounds(s->objects + i, low, high);
+        if (result) return result;
         const float width = high[0] - low[0];
-        if (s->count > 1) s->objects[i].to_world[3] = at - low[0];
+        if (s->count > 1) s->objects[i].to_world[3] += at - low[0];
         else at = low[0];
         at += (s->count > 1 ? 1.15f : 1) * width;
         for (int c = 1; c < 3; c++) s->radius = fmaxf(s->radius, (high[c] - low[c]) / 2);
         if (!i) s->middle[1] = (low[1] + high[1]) / 2;
-        s->objects[i].to_world[7] = s->middle[1] - (low[1] + high[1]) / 2;
+        s->objects[i].to_world[7] += s->middle[1] - (low[1] + high[1]) / 2;
         tallest[0] = fminf(tallest[0], low[2]);
         tallest[1] = fmaxf(tallest[1], high[2]);
         if (i == s->count - 1) {

@@ -324,11 +324,18 @@ static int make_trajectory(job *j) {
     orbit light_orbit;
     memset(&light_orbit, 0, sizeof light_orbit);
     ssdgs_real centre[3], up[3];
+    const ssdgs_object placed = ssdgs_object_default(j->model);
+    double own[3];
     for (int k = 0; k < 3; k++) {
         double sum = 0;
         for (int i = 0; i < model.count; i++)
             sum += (double)model.gaussians[(size_t)(SSDGS_POSITION + k) * model.stride + (size_t)i];
-        centre[k] = (ssdgs_real)(model.count ? sum / model.count : 0);
+        own[k] = model.count ? sum / model.count : 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        const ssdgs_real *m = placed.to_world + 4 * k;
+        centre[k] = (ssdgs_real)((double)m[0] * own[0] + (double)m[1] * own[1] + (double)m[2] * own[2] +
+                                 (double)m[3]);
         up[k] = (ssdgs_real)axes[2][k];
         camera_orbit.centre[k] = (double)centre[k];
         light_orbit.centre[k] = light.kind == SSDGS_LIGHT_POINT ? (double)centre[k] : 0;
@@ -592,7 +599,8 @@ static int load_frames(job *j) {
                      error))
         return !fail(error);
     olat_print_notes(&j->data, "relight");
-    if (ssdgs_model_bounds(j->model, low, high)) return !fail(ssdgs_error_message(j->context));
+    const ssdgs_object placed = ssdgs_object_default(j->model);
+    if (olat_bounds(&placed, low, high)) return !fail(ssdgs_error_message(j->context));
     if (olat_other_unit(&j->data, "the model", low, high, error))
         fprintf(stderr, "relight: note: %s\n", error);
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);

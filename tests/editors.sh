@@ -19,17 +19,65 @@ edit() { # edit FILE ACTION...: the model with what an editor does to it
     "$work/node_modules/.bin/splat-transform" -q -w "$model" "$@" "$file" >"$work/log" 2>&1 && LC_ALL=C grep -aq "^property float local_q_3" "$file" &&
         ! LC_ALL=C grep -aq "^element ssdgs_settings" "$file"
 }
-score() { # score MODEL: its PSNR, with the networks of the original
-    "$build/relight" "$1" examples/data/waxcow --networks "$model" --split test --background black --out "$work/relit" >"$work/log" 2>&1 &&
+# splats at 0 and one step along each axis, in a file of their own; what became of them moves the dataset's cameras and lamps along
+cat >"$work/move.js" <<'END'
+const fs = require('fs'), [, , work, moved] = process.argv;
+const names = ['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'];
+if (!moved) {
+    const rows = Buffer.alloc(4 * names.length * 4);
+    for (let i = 0; i < 4; i++) [i == 1, i == 2, i == 3, i, 0, 0, 0, -3, -3, -3, 1, 0, 0, 0].forEach((v, c) => rows.writeFloatLE(+v, 4 * (names.length * i + c)));
+    const head = 'ply\nformat binary_little_endian 1.0\nelement vertex 4\n' + names.map(n => `property float ${n}\n`).join('') + 'end_header\n';
+    fs.writeFileSync(work + '/axes.ply', Buffer.concat([Buffer.from(head), rows]));
+    process.exit();
+}
+const file = fs.readFileSync(moved), end = file.indexOf('end_header\n') + 11, found = [...file.toString('latin1', 0, end).matchAll(/property float (\w+)/g)].map(m => m[1]);
+const at = {};
+for (let i = 0; i < 4; i++) {
+    const get = n => file.readFloatLE(end + 4 * (found.length * i + found.indexOf(n)));
+    at[Math.round(get('f_dc_0'))] = [get('x'), get('y'), get('z')];
+}
+const axes = [1, 2, 3].map(k => at[k].map((v, c) => v - at[0][c])), scale = Math.hypot(...axes[0]); // columns
+const turn = p => [0, 1, 2].map(c => (axes[0][c] * p[0] + axes[1][c] * p[1] + axes[2][c] * p[2]) / scale);
+const place = p => turn(p).map((v, c) => scale * v + at[0][c]);
+const set = JSON.parse(fs.readFileSync('examples/data/waxcow/transforms_test.json'));
+for (const f of set.frames) {
+    const m = f.transform_matrix, column = k => [0, 1, 2].map(i => m[i][k]), to = [turn(column(0)), turn(column(1)), turn(column(2)), place(column(3))];
+    f.transform_matrix = [0, 1, 2].map(i => to.map(c => c[i])).concat([[0, 0, 0, 1]]);
+    f.pl_pos = place(f.pl_pos);
+    f.pl_intensity = [].concat(f.pl_intensity ?? 1).map(v => v * scale * scale);
+}
+fs.mkdirSync(work + '/set', {recursive: true});
+fs.rmSync(work + '/set/test', {force: true});
+fs.symlinkSync(fs.realpathSync('examples/data/waxcow/test'), work + '/set/test');
+fs.writeFileSync(work + '/set/transforms_test.json', JSON.stringify(set));
+END
+node "$work/move.js" "$work"
+moved_along() { # moved_along ACTION...: the dataset, of the actions that move
+    set -- "$@" end
+    while [ "$1" != end ]; do
+        action=$1; shift
+        case $action in
+        -r | -t | -s) set -- "$@" "$action" "$1"; shift ;;
+        -B | -V) shift ;;
+        esac
+    done
+    shift
+    rm -f "$work/moved.ply"
+    "$work/node_modules/.bin/splat-transform" -q -w "$work/axes.ply" "$@" "$work/moved.ply" >"$work/log" 2>&1 && node "$work/move.js" "$work" "$work/moved.ply"
+}
+score() { # score MODEL: its PSNR before the moved dataset's photographs, with the networks of the original
+    "$build/relight" "$1" "$work/set" --networks "$model" --split test --background black --out "$work/relit" >"$work/log" 2>&1 &&
         sed -n 's/^ "mean": {"psnr": \([-0-9.]*\).*/\1/p' "$work/relit/metrics.json"
 }
 near() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && a > b - 0.05 && a < b + 0.05) }'; } # near DB DB
 as_good() { # as_good DB ACTION...: after these the model has so many dB
     wanted=$1; shift
     check "splat-transform $*" edit "$work/edited.ply" "$@"
+    check "the dataset after $*" moved_along "$@"
     found=$(score "$work/edited.ply")
     check "$*: $found of $wanted dB" near "$found" "$wanted"
 }
+check "the dataset" moved_along
 whole=$(score "$model")
 check "the model: $whole dB" awk -v a="$whole" 'BEGIN { exit !(a > 25) }'
 as_good "$whole" -m
@@ -44,13 +92,13 @@ as_good "$whole" -s 3 -r 30,40,50 -t 1,-2,3 -m
 as_good "$whole" -m -t 1,-2,3 -r -100,20,70 -s 0.3
 # rows that are missing: half of the object, cut off before or after; about every other one
 check "a half" edit "$work/half.ply" -B -9,-9,-9,0.1,9,9
-half=$(score "$work/half.ply")
+moved_along; half=$(score "$work/half.ply")
 check "half of it: $half dB" awk -v a="$half" -v b="$whole" 'BEGIN { exit !(a > 5 && a < b - 3) }'
 as_good "$half" -B -9,-9,-9,0.1,9,9 -m
 as_good "$half" -B -9,-9,-9,0.1,9,9 -r 30,40,50
 as_good "$half" -m -s 2 -B -18,-18,-18,0.2,18,18 -r 0,0,90 -t 3,2,1
 check "every other one" edit "$work/half.ply" -V rot_1,gt,0
-thin=$(score "$work/half.ply")
+moved_along; thin=$(score "$work/half.ply")
 check "thinned: $thin dB" awk -v a="$thin" -v b="$whole" 'BEGIN { exit !(a > 5 && a < b - 3) }'
 as_good "$thin" -V rot_1,gt,0 -m -r 10,0,-60
 as_good "$half" -t 1,1,1 -B -8,-8,-8,1.1,10,10
