@@ -4,6 +4,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include "judge.h"
 
 enum { CELL = 96, COLUMNS = 12, MOST_CELLS = 96, RAYS = 1000, PLOT = 360, LISTED = 6 };
 
@@ -313,7 +314,8 @@ static int keep_time(void *user, const ssdgs_train_stats *stats) {
     return stats->iteration < 40;
 }
 
-/* Begins to train: cameras, lights and outlines that contradict each other are noted, and steps take time. */
+/* What the photographs tell against each other. Begins to train: cameras, lights and outlines that contradict
+   each other are noted, and steps take time. */
 static int report_training(check *k) {
     ssdgs_photo *photos = olat_photos(k->sets);
     ssdgs_model *model = NULL;
@@ -321,7 +323,10 @@ static int report_training(check *k) {
     ssdgs_settings settings = ssdgs_settings_default();
     pace p = {0, 0, 0};
     for (int c = 0; c < 3; c++) settings.origin[c] = (ssdgs_real)k->sets[0].origin[c]; /* notes name places */
-    ssdgs_result result = photos ? ssdgs_model_create(k->context, &settings, 0, &model) : SSDGS_ERR_MEMORY;
+    const ssdgs_logger logger = {hear, k};
+    ssdgs_result result = photos && !judge_capture(k->sets, &k->options, &logger)
+                              ? ssdgs_model_create(k->context, &settings, 0, &model)
+                              : SSDGS_ERR_MEMORY;
     if (!result) result = ssdgs_trainer_create(model, photos, k->sets[0].count, &k->options, &trainer);
     if (!result) result = ssdgs_trainer_run(trainer, keep_time, &p);
     if (result == SSDGS_ERR_CANCELLED) result = SSDGS_OK;

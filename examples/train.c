@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "olat.h"
+#include "judge.h"
 #include "picture.h"
 #include "view.h"
 #include <errno.h>
@@ -98,8 +99,9 @@ static const char *const help_end[] = {
     "",
     "Notes tell what cannot be right or cannot work: a camera whose axes, lens or pose is wrong, lights",
     "that the shading contradicts, cameras or lights that all stand in one place or move together,",
-    "masks that contradict the others (they are left out), colours multiplied by alpha, an object that",
-    "the box does not hold.",
+    "masks that contradict the others (they are left out), colours multiplied by alpha or mixed with a",
+    "background, an object that the box does not hold, frames lit from all around, exposures that differ",
+    "untold, OpenEXR that is not linear light.",
     "",
     "--refine tests with and without fitting the test views' poses and lights. Training anew with",
     "--train-json and the refined list, moved into DATASET, gains up to 0.4 dB. No file of the dataset",
@@ -634,7 +636,8 @@ static int train(job *j) {
                         j->options.bounds_max, error))
         fprintf(stderr, "train: note: %s\n", error);
     j->photos = olat_photos(&j->train_set);
-    if (!j->photos) return fail("out of memory");
+    if (!j->photos || judge_capture(&j->train_set, &j->options, &j->desc.logger))
+        return fail("out of memory");
     for (int i = 0; i < j->train_set.count; i++) {
         if (j->photos[i].camera.width > width) width = j->photos[i].camera.width;
         if (j->photos[i].camera.height > height) height = j->photos[i].camera.height;
