@@ -11472,19 +11472,68 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
     }
 }
 
+/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds'
+   picture. */
+typedef struct ssdgs__silhouette {
+    int left, right, top, bottom; /* right < left: nothing */
+    int whole;                    /* not cut by the picture's border, so that its middle is known */
+    double shown, outside;
+} ssdgs__silhouette;
+
+static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
+    const ssdgs_camera *camera = &photo->camera;
+    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0, 0};
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+    for (int corner = 0; corner < 8; corner++) {
+        double world[3];
+        for (int c = 0; c < 3; c++)
+            world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
+        double seen[3];
+        ssdgs__to_camera(camera, world, 1, seen);
+        for (int c = 0; c < 2; c++) {
+            const double f = (double)(c ? camera->fy : camera->fx),
+                         at = (double)(c ? camera->cy : camera->cx);
+            const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
+            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c]
+                                 : -1e30; /* reaching behind the camera it may be anywhere */
+            high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
+        }
+    }
+    for (int y = 0; y < camera->height; y++)
+        for (int x = 0; x < camera->width; x++) {
+            if (ssdgs__photo_alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 32768) continue;
+            if (s.right < s.left) s.left = s.right = x, s.top = y;
+            s.left = x < s.left ? x : s.left;
+            s.right = x > s.right ? x : s.right;
+            s.bottom = y;
+            s.shown++;
+            s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
+        }
+    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 &&
+              s.bottom < camera->height - 1;
+    return s;
+}
+
 /* Of eight or more outlines leaves out the wrong ones. The object's places are those where at most one
    photograph, or a tenth, is transparent. One that is transparent at more than a third of them has a wrong
-   mask or pose. */
+   mask or pose. Where most photographs show something beside the bounds' picture these do not hold the
+   object, and its edges alone would be judged: then none is wrong. */
 static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     enum { places = 2048, few = 30 };
     const int photos = trainer->photo_count;
     int *shown =
         (int *)ssdgs__allocate(trainer->context, 2 * (size_t)photos * sizeof *shown + (size_t)photos);
-    int outlined = 0, wrong = 0, first = 0;
+    int outlined = 0, beside = 0, wrong = 0, first = 0;
     if (!shown) return SSDGS_ERR_MEMORY;
     int *refused = shown + photos;
     unsigned char *side = (unsigned char *)(refused + photos);
-    for (int i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
+    for (int i = 0; i < photos; i++) {
+        if (trainer->transparent[i] != 2) continue;
+        const ssdgs__silhouette s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
+        outlined++;
+        beside += s.outside > 0.1 * s.shown;
+    }
+    if (2 * beside > outlined) outlined = 0;
     for (int place = 0; place < places && outlined >= 8; place++) {
         double u[3];
         ssdgs_real x[3];
@@ -11666,48 +11715,6 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
 
 /* ---- whether photographs, cameras and bounds suit each other: notes ---- */
 
-/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds'
-   picture. */
-typedef struct ssdgs__silhouette {
-    int left, right, top, bottom; /* right < left: nothing */
-    int whole;                    /* not cut by the picture's border, so that its middle is known */
-    double shown, outside;
-} ssdgs__silhouette;
-
-static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
-    const ssdgs_camera *camera = &photo->camera;
-    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0, 0};
-    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
-    for (int corner = 0; corner < 8; corner++) {
-        double world[3];
-        for (int c = 0; c < 3; c++)
-            world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
-        double seen[3];
-        ssdgs__to_camera(camera, world, 1, seen);
-        for (int c = 0; c < 2; c++) {
-            const double f = (double)(c ? camera->fy : camera->fx),
-                         at = (double)(c ? camera->cy : camera->cx);
-            const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
-            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c]
-                                 : -1e30; /* reaching behind the camera it may be anywhere */
-            high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
-        }
-    }
-    for (int y = 0; y < camera->height; y++)
-        for (int x = 0; x < camera->width; x++) {
-            if (ssdgs__photo_alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 32768) continue;
-            if (s.right < s.left) s.left = s.right = x, s.top = y;
-            s.left = x < s.left ? x : s.left;
-            s.right = x > s.right ? x : s.right;
-            s.bottom = y;
-            s.shown++;
-            s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
-        }
-    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 &&
-              s.bottom < camera->height - 1;
-    return s;
-}
-
 /* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the
    middles of the silhouettes meet about where the object is; `within` cameras stand within the bounds. */
 static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
@@ -11813,8 +11820,24 @@ typedef struct ssdgs__shading {
     int directional;
 } ssdgs__shading;
 
+/* About the light of a pixel laid over black; 0 where it has the colour of the first one. */
+static double ssdgs__lightness(const ssdgs_photo *photo, int transfer, const ssdgs_real corner[3],
+                               size_t pixel) {
+    static const ssdgs_real black[3] = {0, 0, 0};
+    double value = 0, apart = 0;
+    ssdgs_real stored[3];
+    ssdgs__photo_pixel(photo, transfer, black, pixel, stored);
+    for (int c = 0; c < 3; c++) {
+        const double d = fabs((double)(stored[c] - corner[c]));
+        value += (double)stored[c] * (double)stored[c];
+        apart = d > apart ? d : apart;
+    }
+    return apart < 0.02 ? 0 : value;
+}
+
 /* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture.
-   Pixels of the first one's colour count as dark. */
+   Pixels of the first one's colour count as dark, those brighter than all that lie three pixels away as the
+   brightest of these. */
 static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const double centre[3],
                              ssdgs__shading *s) {
     static const ssdgs_real black[3] = {0, 0, 0};
@@ -11829,15 +11852,15 @@ static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const doubl
             const double alpha = ssdgs__photo_alpha(photo, pixel) / 65535.0;
             const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx,
                                   (y + 0.5 - (double)camera->cy) / (double)camera->fy};
-            double value = 0, apart = 0;
-            ssdgs_real stored[3];
-            ssdgs__photo_pixel(photo, transfer, black, pixel, stored);
-            for (int c = 0; c < 3; c++) {
-                const double d = fabs((double)(stored[c] - corner[c]));
-                value += (double)stored[c] * (double)stored[c]; /* about linear */
-                apart = d > apart ? d : apart;
+            double value = ssdgs__lightness(photo, transfer, corner, pixel), around = 0;
+            for (int side = 0; side < 9 && value > around; side++) { /* a hot pixel is not the object's */
+                const int u = x + 3 * (side % 3 - 1), v = y + 3 * (side / 3 - 1);
+                if (side == 4 || u < 0 || u >= w || v < 0 || v >= h) continue;
+                const double there =
+                    ssdgs__lightness(photo, transfer, corner, (size_t)v * (size_t)w + (size_t)u);
+                around = there > around ? there : around;
             }
-            if (apart < 0.02) value = 0;
+            value = value < around ? value : around;
             area += alpha;
             light += value;
             for (int c = 0; c < 2; c++) {
