@@ -522,7 +522,8 @@ static int judge__exposures(judge *k) {
                                           value + n, value + 2 * n));
     free(term);
     if (known < few[0]) return judge__cannot(k, "too few are lit from the camera's side");
-    if (least > 0.3 + 4.0 / known) /* right captures reach two thirds of that */
+    if (least >
+        0.28 + 3.5 / known) /* right captures reach 0.85 of that where few are known, else two thirds */
         judge__say(
             k,
             "brightness differs from photograph to photograph more than views and lights explain, by a "
@@ -600,7 +601,7 @@ static double judge__power(const judge *k) {
    with light. */
 static void judge__numbers(const judge *k) {
     if (!k->numbers || k->most > 1.0005) return;
-    if (k->full * 2000 > k->numbers || k->on_grid * 2 > k->above || judge__power(k) < 0.6)
+    if (k->full * 2000 > k->numbers || k->on_grid * 2 > k->above || judge__power(k) < 0.8)
         judge__say(k,
                    "no number in the OpenEXR photographs exceeds 1: are they made from PNG, or encoded? They "
                    "must hold linear light (darktable: output profile \"linear Rec709 RGB\", LIN_REC709)");
