@@ -284,11 +284,24 @@ static void test_trainer(void) {
         frames[i].light = kept[(i + 5) % MANY].light;
     }
     CHECK(strstr(noted(), "contradicts"));
-    for (int i = 0; i < MANY; i++) { /* four times as large: the box holds a part of it */
-        frames[i].light = kept[i].light;
-        for (int c = 0; c < 3; c++) frames[i].camera.view[4 * c + 3] *= 4, frames[i].light.position[c] *= 4;
+    static const int ways[4] = {2, 6, 10, 11};
+    for (int way = 0; way < 4; way++) { /* half as large again, and beside the box: it holds a part */
+        double d[3];
+        direction_of(ways[way], 12, 0.3, d);
+        for (int i = 0; i < MANY; i++) {
+            ssdgs_real *view = frames[i].camera.view;
+            memcpy(frames + i, kept + i, sizeof *kept);
+            frames[i].pixels = bytes[i];
+            frames[i].format = SSDGS_PIXELS_RGBA8;
+            for (int c = 0; c < 3; c++) {
+                frames[i].light.position[c] =
+                    (ssdgs_real)(1.5 * (double)kept[i].light.position[c] + 1.125 * d[c]);
+                view[4 * c + 3] *= (ssdgs_real)1.5;
+                for (int l = 0; l < 3; l++) view[4 * c + 3] -= view[4 * c + l] * (ssdgs_real)(1.125 * d[l]);
+            }
+        }
+        CHECK(strstr(noted(), "lie outside of bounds_min") && !strstr(heard, "masks or poses"));
     }
-    CHECK(strstr(noted(), "lie outside of bounds_min") && !strstr(heard, "masks or poses"));
     memcpy(frames, kept, sizeof kept);
     as_bytes(0, NULL, NULL, 0);
     for (int k = 3; k < 4 * PIXELS; k += 4) bytes[5][k] = (unsigned char)(255 - bytes[5][k]);
