@@ -330,8 +330,8 @@ static void judge__fit(judge *k) {
                 const int photo = of_point ? j : i - points, point = of_point ? i : j;
                 const int at = photo * points + point;
                 if (k->kind[at] != JUDGE__LIT || k->views[photo].lit < JUDGE__LEAST) continue;
-                const double wants =
-                                 k->ratio[at] - (of_point ? k->views[photo].gain : k->points[point].albedo),
+                const double wants = (double)k->ratio[at] -
+                                     (of_point ? k->views[photo].gain : k->points[point].albedo),
                              off = fabs(wants - *value), weight = sweep && off > 0.3 ? 0.3 / off : 1;
                 sum += weight * wants;
                 weights += weight;
@@ -567,7 +567,7 @@ static int judge__edges(judge *k) {
             "half-transparent pixels' colours lead towards %s (%.2f,%.2f,%.2f): the background that the "
             "object was cut from is left in them, and shows as a rim. Let the program that cuts it out "
             "remove the background's colour (decontaminate, defringe), or make the edges opaque or clear",
-            least > 0.85 ? "white" : "one colour", behind[0], behind[1], behind[2]);
+            least > 0.75 ? "white" : "one colour", behind[0], behind[1], behind[2]);
     }
     free(values);
     return 0;
@@ -607,18 +607,53 @@ static void judge__numbers(const judge *k) {
                    "must hold linear light (darktable: output profile \"linear Rec709 RGB\", LIN_REC709)");
 }
 
+/* The share of what a photograph shows that lies beside the bounds' picture. */
+static double judge__beside(const judge *k, const judge__view *v) {
+    const ssdgs_camera *camera = &v->frame->camera;
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30}, shown = 0, beside = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        double seen[3];
+        for (int r = 0; r < 3; r++) {
+            seen[r] = (double)camera->view[4 * r + 3];
+            for (int c = 0; c < 3; c++)
+                seen[r] += (double)camera->view[4 * r + c] *
+                           (k->low[c] + (corner >> c & 1 ? JUDGE__GRID * k->cell[c] : 0));
+        }
+        if (!(seen[2] > 0)) return 0; /* reaching behind the camera it may be anywhere */
+        for (int c = 0; c < 2; c++) {
+            const double at = ((double)(c ? camera->fy : camera->fx) * seen[c] / seen[2] +
+                               (double)(c ? camera->cy : camera->cx)) /
+                              v->step;
+            low[c] = fmin(low[c], at), high[c] = fmax(high[c], at);
+        }
+    }
+    for (int y = 0; y < v->height; y++)
+        for (int x = 0; x < v->width; x++) {
+            const double alpha = (double)v->alpha[y * v->width + x];
+            shown += alpha;
+            beside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1] ? alpha : 0;
+        }
+    return shown > 0 ? beside / shown : 0;
+}
+
 /* Finds the hull and what the photographs show of it, and judges that. */
 static int judge__hull(judge *k) {
     const int n = k->set->count;
     int box[2][3];
     double toward[3] = {0, 0, 0};
-    for (int i = 0; i < n; i++) k->usable += k->views[i].outlined;
+    double beside = 0;
+    for (int i = 0; i < n; i++) {
+        k->usable += k->views[i].outlined;
+        beside += k->views[i].outlined ? judge__beside(k, k->views + i) : 0;
+    }
     if (k->usable < JUDGE__FEW) {
         char why[80];
         snprintf(why, sizeof why, "that takes %d photographs that show outlines, and %d do", JUDGE__FEW,
                  k->usable);
         return judge__cannot(k, why);
     }
+    if (beside > 0.05 * k->usable)
+        return judge__cannot(k, "bounds_min .. bounds_max do not hold what the photographs show");
     for (int level = 0; level < 2; level++) { /* coarsely, then what is left more finely */
         if (judge__carve(k, box) < 30)
             return judge__cannot(k, "the outlines leave nothing of bounds_min .. bounds_max");

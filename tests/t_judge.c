@@ -235,7 +235,7 @@ static void test_limits(void) {
     memcpy(frames, kept, sizeof kept);
     for (int i = 0; i < MANY; i++) /* nothing is in the box */
         for (int c = 0; c < 3; c++) frames[i].camera.view[4 * c + 3] += (ssdgs_real)(c ? 0 : 0.8);
-    CHECK(strstr(said(MANY), "leave nothing of bounds_min"));
+    CHECK(strstr(said(MANY), "bounds_min .. bounds_max do not hold what the photographs show"));
     memcpy(frames, kept, sizeof kept);
     olat_dataset set;
     char error[512];
@@ -301,6 +301,8 @@ static void test_trainer(void) {
             }
         }
         CHECK(strstr(noted(), "lie outside of bounds_min") && !strstr(heard, "masks or poses"));
+        CHECK(strstr(said(MANY), "do not hold") && !strstr(heard, "all around") &&
+              !strstr(heard, "brightness"));
     }
     memcpy(frames, kept, sizeof kept);
     as_bytes(0, NULL, NULL, 0);
