@@ -209,8 +209,9 @@ static void as_floats(float factor, float most, int encoded) {
 
 static void test_numbers(void) {
     float most = 0;
-    for (int i = 0; i < MANY * 4 * PIXELS; i++)
-        if (i % 4 < 3 && right[0][i] > most) most = right[0][i];
+    for (int i = 0; i < MANY; i++)
+        for (int k = 0; k < 4 * PIXELS; k++)
+            if (k % 4 < 3 && right[i][k] > most) most = right[i][k];
     as_floats(2 / most, 10, 0);
     CHECK(silent(MANY));
     as_floats(0.9f / most, 10, 0); /* nothing is bright, and all is light */
