@@ -261,8 +261,10 @@ static int judge__blocked(const judge *k, const judge__point *p, const double di
 static double judge__toward(const ssdgs_light *light, const double place[3], double direction[3]) {
     const int directional = light->kind == SSDGS_LIGHT_DIRECTIONAL;
     double distance2 = 0, e = 0, along = 0;
+    ssdgs_real from[3];
+    olat_place(light, from);
     for (int c = 0; c < 3; c++) {
-        direction[c] = (double)light->position[c] - (directional ? 0 : place[c]);
+        direction[c] = (double)from[c] - (directional ? 0 : place[c]);
         distance2 += direction[c] * direction[c];
         e += (double)light->intensity[c] / 3;
     }
@@ -430,11 +432,11 @@ static int judge__flooded(judge *k) {
     if (!k->flooded) return 0;
     char names[JUDGE__LISTED * 90 + 40];
     judge__names(k, names, sizeof names);
-    judge__say(
-        k,
-        "%d photographs of %d look lit from all around, not by the lamp given, and the others by theirs: "
-        "%s. Leave such frames out of the list, or give them the lights they have (pl_lights)",
-        k->flooded, n, names);
+    judge__say(k,
+               "%d of the %d photographs %s lit from all around, not by the lamp that the list gives: %s. "
+               "Leave such "
+               "frames out of the list, or give them the lights that they have (pl_lights)",
+               k->flooded, n, k->flooded == 1 ? "looks" : "look", names);
     return 0;
 }
 

@@ -3990,7 +3990,7 @@ OLAT__API int olat_lights(const ssdgs_photo *photo, ssdgs_light lights[OLAT_MOST
 
 /* All frames so: (count), to be freed; NULL if out of memory. */
 OLAT__API ssdgs_photo *olat_photos(const olat_dataset *set) {
-    ssdgs_photo *photos = (ssdgs_photo *)calloc((size_t)set->count, sizeof *photos);
+    ssdgs_photo *photos = (ssdgs_photo *)calloc(set->count > 0 ? (size_t)set->count : 1, sizeof *photos);
     for (int i = 0; photos && i < set->count; i++) photos[i] = olat_photo(set->frames + i);
     return photos;
 }
