@@ -101,7 +101,8 @@ DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share the batches of
   training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, SIMD128 of
   WebAssembly and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm
-  does; not so clang's with -ffast-math or -ffp-contract=fast, nor x87.
+  does; not so clang's with -ffast-math or -ffp-contract=fast, nor x87. The pool's threads keep the rounding
+  mode in which their context was made: where the host changes its own, bits depend on the threads.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
@@ -112,13 +113,16 @@ ERRORS
 
 FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
-  added, then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. Reading takes ASCII and both
-  byte orders, skips what it does not know, and mends or drops broken Gaussians (ssdgs_load_stats). Limits:
-  2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties. A plain splat file loads as baked
-  colours: drawn as they are, not trained. With settings.origin x y z are doubles. Checkpoints have native
-  byte order and are refused by other versions, precisions, options, cameras or lights. Files are written
-  under another name and renamed when complete: a link is replaced, not followed. A process that is killed
-  may leave a file PATH.tmp.*
+  added, then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. PlayCanvas' tools, three,
+  Babylon, Spark, GaussianSplats3D and loaders.gl read it; gsplat and spz-js take nothing behind the
+  vertices: examples/export.c writes files for them. x y z are relative to settings.origin. Reading takes
+  ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
+  (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties. A plain
+  splat file loads as baked colours: drawn as they are, not trained. Editors of splats drop what lies behind
+  the vertices, and move these: ssdgs_model_adopt() mends that. Checkpoints have native byte order and are
+  refused by other versions, precisions, options, settings or photographs; the message names the first that
+  differs. Files are written under another name and renamed when complete: a link is replaced, not followed.
+  A process that is killed may leave a file PATH.tmp.*
 
 OUTLINES
   Photographs should be transparent where the object is not. One shows an outline where more than a hundredth
@@ -176,6 +180,10 @@ ssdgs.h DOES NOT
   (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
 
 CHANGES
+  0.2.5  Directional lights shine along `direction`, as spots do: set it to -position. Opacity fades near
+         near_plane and beside wide pictures, where Gaussians popped. Models that went through an editor
+         come back (ssdgs_model_adopt(), settings.placement); positions in files are relative to
+         settings.origin. What differs from a checkpoint's run is named, changed photographs too.
   0.2.4  Needles, thousands of pixels long, are drawn and trained as exactly as other Gaussians. For GPU
          stages: a record holds ux, uy, wy, no longer xx, xy, yy; gradients are summed in their terms.
   0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
@@ -184,10 +192,6 @@ CHANGES
   0.2.2  The scattering network is 128 wide, not 64: metal and plastic train better. The trainer's options
          densify_shadow and prune_weight are gone; they had come to be worth nothing. What a spot, range or
          focus misses no longer darkens what it blends with; ambient highlights are as bright as lamps'.
-  0.2.1  A highlight's colour is its energy, however narrow its lobe: glossy scenes train a little better.
-  0.2.0  Trains faster and better with half the Gaussians: shadows teach the surfaces that receive them.
-         For engines: placed models, many lights, levels of detail, pixel formats, stages on a GPU.
-         For real photographs: a room's light, several lamps, exposures; notes on what cannot be right.
   Models of older versions load, their checkpoints do not.
 
 CONTENTS, search for the tag
