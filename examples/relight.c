@@ -47,7 +47,7 @@ static const char *const help[] = {
     "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
     "                           DIR/reduced.ply",
     "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped",
-    "                           them",
+    "                           them; with these, and where the editor put it, it goes to DIR/whole.ply",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
     "  --isa NAME               scalar, sse2, avx2, avx512 or neon; the best that this machine has"};
 
@@ -211,9 +211,11 @@ static int check_outputs(job *j) {
             ok = check_output(j, path);
             free(path);
         }
-    for (int i = 0; i < (j->reduce ? 2 : 1) && ok; i++) {
-        char *path = output_path(j, NULL, i ? "reduced.ply" : "metrics.json");
-        ok = check_output(j, path);
+    static const char *const names[3] = {"metrics.json", "reduced.ply", "whole.ply"};
+    const int written[3] = {1, j->reduce > 0, j->given[NETWORKS] != NULL};
+    for (int i = 0; i < 3 && ok; i++) {
+        char *path = written[i] ? output_path(j, NULL, names[i]) : NULL;
+        ok = !written[i] || check_output(j, path);
         free(path);
     }
     if (!ok || !j->given[SHEET]) return ok;
@@ -606,6 +608,14 @@ static int load_frames(job *j) {
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
 }
 
+static int save_model(job *j, const char *name) {
+    char *path = output_path(j, NULL, name);
+    if (!path) return 0;
+    const int failed = ssdgs_model_save(j->model, path) && fail(ssdgs_error_message(j->context));
+    free(path);
+    return !failed;
+}
+
 static int relight(job *j) {
     score means[2];
     memset(means, 0, sizeof means);
@@ -628,13 +638,10 @@ static int relight(job *j) {
     if (olat_make_folder(j->out, error))
         return fail(error); /* so that paths can be told apart by what they are */
     if (!check_outputs(j) || !make_planes(j)) return 1;
+    if (j->given[NETWORKS] && !save_model(j, "whole.ply")) return 1;
     if (j->reduce) {
-        char *path = output_path(j, NULL, "reduced.ply");
-        if (!path) return 1;
-        result = ssdgs_model_reduce(j->model, j->reduce);
-        if (!result) result = ssdgs_model_save(j->model, path);
-        free(path);
-        if (result) return fail(ssdgs_error_message(j->context));
+        if (ssdgs_model_reduce(j->model, j->reduce)) return fail(ssdgs_error_message(j->context));
+        if (!save_model(j, "reduced.ply")) return 1;
     }
     for (int i = 0; i < j->data.count; i++) {
         const olat_frame *frame = &j->data.frames[i];

@@ -83,6 +83,9 @@ check "the model: $whole dB" awk -v a="$whole" 'BEGIN { exit !(a > 25) }'
 as_good "$whole" -m
 as_good "$whole" -r 0,0,90
 as_good "$whole" -r 30,40,50
+in_one_file() { "$build/relight" "$work/relit/whole.ply" "$work/set" --split test --background black --out "$work/one" >"$work/log" 2>&1; }
+check "the turned model in one file" in_one_file
+check "the same picture of it" cmp "$work/relit/r_000.png" "$work/one/r_000.png"
 as_good "$whole" -r 0,0,180
 as_good "$whole" -t 0.5,0,0
 as_good "$whole" -t 100,-200,300

@@ -163,6 +163,8 @@ LC_ALL=C sed '/^element ssdgs_settings 1$/,/^end_header$/{/^end_header$/!d;}' "$
 check "edited" says 0 "note: .*edited.ply: has no settings" "$build/relight" "$out/edited.ply" "$set" --out "$out/edited" --threads 1
 check "edited looks different" test "$(psnr "$out/edited")" != "$(psnr "$out/whole")"
 check "--networks" says 0 "are those of" "$build/relight" "$out/edited.ply" "$set" --out "$out/given" --threads 1 --networks "$model"
+check "in one file" says 0 "4 images" "$build/relight" "$out/given/whole.ply" "$set" --out "$out/one" --threads 1
+check "the same picture of it" cmp "$out/given/r_000.png" "$out/one/r_000.png"
 check "and is whole again" test "$(psnr "$out/given")" = "$(psnr "$out/whole")"
 
 # models with nothing to see
