@@ -1,6 +1,6 @@
 #!/bin/sh
-# usage: images.sh BUILD: how examples/olat.h reads images that other programs wrote, beside what these make of them; `make BUILD/pixels`
-# comes first. A program or profile that is missing is named, and what needs it left out. Closes with "N passed, N failed".
+# usage: images.sh BUILD: how examples/olat.h reads images that other programs wrote, beside what these make of them. A
+# program or profile that is missing is named, and what needs it left out. Closes with "N passed, N failed".
 set -u
 build=$1 work=$1/images passed=0 failed=0
 mkdir -p "$work"
@@ -79,10 +79,13 @@ if has oiiotool; then
     fi
 fi
 
-exr() { # exr FILE CHANNELS: it has the light that oiiotool finds in these, alpha divided out, within halves' rounding
+wanted() { # wanted FILE CHANNELS: in want.txt, the light that oiiotool finds in these
     rm -f "$work/want.exr"
-    oiiotool "$1" --ch "$2" --croptofull -d float -o "$work/want.exr" && "$build/pixels" "$1" >"$work/read.txt" || return 1
-    oiiotool --info --dumpdata "$work/want.exr" | sed -n 's/^ *Pixel (\([0-9]*\), \([0-9]*\)): /\1 \2 /p' >"$work/want.txt"
+    oiiotool "$1" --ch "$2" --croptofull -d float -o "$work/want.exr" &&
+        oiiotool --info --dumpdata "$work/want.exr" | sed -n 's/^ *Pixel (\([0-9]*\), \([0-9]*\)): /\1 \2 /p' >"$work/want.txt"
+}
+exr() { # exr FILE: it has the light that was wanted, alpha divided out, within halves' rounding
+    "$build/pixels" "$1" >"$work/read.txt" || return 1
     awk '
         FNR == NR { for (c = 3; c <= 6; c++) want[$1, $2, c] = $c; pixels++; next }
         $1 == "note:" || NF != 6 || $0 ~ /[a-z]/ { next }
@@ -100,43 +103,42 @@ exr() { # exr FILE CHANNELS: it has the light that oiiotool finds in these, alph
 }
 if has oiiotool && has exrmaketiled; then
     # spread: more than 2^14 halves in a block, of which PIZ then makes other differences
-    for size in 1x1 3x5 33x31 200x150 1030x40; do
-        for kind in smooth constant steps noise spread; do
-            case $kind in
-            smooth) pattern=fill:topleft=0.1,0.2,0.3,1:topright=2,0.1,0.9,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8 ;;
-            constant) pattern=constant:color=0.25,0.5,0.75,1 ;;
-            steps) pattern=checker:width=5:height=3:color1=0.1,0.2,0.3,1:color2=0.7,0.1,0.4,0.5 ;;
-            noise) pattern=noise:type=uniform:min=0.1:max=0.9:mono=0 ;;
-            spread) pattern=noise:type=uniform:min=0.9:max=2:mono=0 ;;
-            esac
-            case $size/$kind in 1030x40/spread | 33x31/* | 200x150/noise | 3x5/smooth | 1x1/constant) ;; *) continue ;; esac
-            for type in half float; do
-                set -- --pattern $pattern $size 3
-                [ $kind = spread ] && set -- "$@" --powc 15
-                oiiotool "$@" -d $type --compression none -o "$work/none.exr"
-                for packing in piz pxr24; do
-                    file=$work/$packing.exr
-                    rm -f "$file" "$work/tiles.exr"
-                    oiiotool "$work/none.exr" --compression $packing -o "$file"
-                    exr "$file" R,G,B,A=1
-                    count "OpenEXR: $packing $size $kind $type"
-                    exrmaketiled -m -t 32 24 -z $packing "$work/none.exr" "$work/tiles.exr" && exr "$work/tiles.exr" R,G,B,A=1
-                    count "OpenEXR: $packing tiles $size $kind $type"
-                done
+    for row in 1x1:constant 3x5:smooth 33x31:smooth 33x31:constant 33x31:steps 100x70:noise 1030x40:spread; do
+        size=${row%:*}
+        case ${row#*:} in
+        smooth) pattern=fill:topleft=0.1,0.2,0.3,1:topright=2,0.1,0.9,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8 ;;
+        constant) pattern=constant:color=0.25,0.5,0.75,1 ;;
+        steps) pattern=checker:width=5:height=3:color1=0.1,0.2,0.3,1:color2=0.7,0.1,0.4,0.5 ;;
+        noise) pattern=noise:type=uniform:min=0.1:max=0.9:mono=0 ;;
+        spread) pattern=noise:type=uniform:min=0.9:max=2:mono=0 ;;
+        esac
+        for type in half float; do
+            set -- --pattern $pattern $size 3
+            [ $size = 1030x40 ] && set -- "$@" --powc 15
+            rm -f "$work/none.exr" "$work/piz.exr" "$work/pxr24.exr"
+            oiiotool "$@" -d $type --compression none -o "$work/none.exr" --compression piz -o "$work/piz.exr" --compression pxr24 -o "$work/pxr24.exr" &&
+                wanted "$work/none.exr" R,G,B,A=1
+            count "oiiotool: $row $type"
+            for packing in piz pxr24; do
+                rm -f "$work/tiles.exr"
+                exr "$work/$packing.exr"
+                count "OpenEXR: $packing $row $type"
+                exrmaketiled -m -t 32 24 -z $packing "$work/none.exr" "$work/tiles.exr" && exr "$work/tiles.exr"
+                count "OpenEXR: $packing tiles $row $type"
             done
         done
     done
     smooth=fill:topleft=0.1,0.2,0.3,1:topright=0.5,0.1,0.2,0.5:bottomleft=0.7,0.01,4,1:bottomright=0.1,0.2,0.3,0.8
     oiiotool --pattern $smooth 50x40 4 --origin -7+9 --fullsize 45x50+0+0 -d half --compression piz -o "$work/windows.exr"
-    exr "$work/windows.exr" R,G,B,A && notes "$work/windows.exr" ""
+    wanted "$work/windows.exr" R,G,B,A && exr "$work/windows.exr" && notes "$work/windows.exr" ""
     count "OpenEXR: windows"
     oiiotool --pattern $smooth 50x40 4 --chnames id.R,id.G,id.B,id.A -o "$work/id.exr"
     oiiotool --pattern $smooth 50x40 4 "$work/id.exr" --chappend -d half -d id.R=uint -d id.G=uint --compression piz -o "$work/ids.exr"
-    exr "$work/ids.exr" R,G,B,A
+    wanted "$work/ids.exr" R,G,B,A && exr "$work/ids.exr"
     count "OpenEXR: whole numbers beside"
     oiiotool --pattern constant:color=0.5,0.5,0.5 50x40 3 --chnames N.R,N.G,N.B --pattern $smooth 50x40 4 --chnames b.R,b.G,b.B,b.A --chappend \
         -d half --compression piz -o "$work/layers.exr"
-    exr "$work/layers.exr" b.R,b.G,b.B,b.A && notes "$work/layers.exr" "of 2 layers or parts with R, G, B: b is taken"
+    wanted "$work/layers.exr" b.R,b.G,b.B,b.A && exr "$work/layers.exr" && notes "$work/layers.exr" "of 2 layers or parts with R, G, B: b is taken"
     count "OpenEXR: a normal pass before beauty"
     oiiotool --pattern constant:color=0.5 50x40 1 --chnames Z -d float -o "$work/depth.exr"
     oiiotool --pattern $smooth 50x40 4 -d half --compression piz -o "$work/rgba.exr"
@@ -152,8 +154,8 @@ if has oiiotool && has exrmaketiled; then
     count "OpenEXR: Orientation, pixelAspectRatio"
     if has exrmultiview; then
         oiiotool --pattern constant:color=0.1,0.2,0.3 50x40 3 -d half -o "$work/right.exr"
-        exrmultiview left "$work/rgba.exr" right "$work/right.exr" "$work/views.exr" && exr "$work/views.exr" R,G,B,A &&
-            notes "$work/views.exr" "the one without a name is taken"
+        exrmultiview left "$work/rgba.exr" right "$work/right.exr" "$work/views.exr" && wanted "$work/views.exr" R,G,B,A &&
+            exr "$work/views.exr" && notes "$work/views.exr" "the one without a name is taken"
         count "OpenEXR: views"
     fi
     if has exr2aces; then # the colours of wide gamut are bright ones of sRGB: what was there comes back
@@ -168,7 +170,7 @@ if has darktable-cli && has oiiotool; then
     oiiotool "$work/in.ppm" -d uint16 -o "$work/dark.png"
     rm -f "$work/dark.exr"
     darktable-cli "$work/dark.png" "$work/dark.exr" --icc-type LIN_REC709 --core --configdir "$work/darktable" >/dev/null 2>&1 &&
-        exr "$work/dark.exr" R,G,B,A=1
+        wanted "$work/dark.exr" R,G,B,A=1 && exr "$work/dark.exr"
     count "darktable: PIZ"
 fi
 if has blender && has oiiotool; then
@@ -186,7 +188,8 @@ for codec in 'PIZ', 'ZIP', 'PXR24':
 END
     blender -b --factory-startup -P "$work/layers.py" >"$work/blender.log" 2>&1
     for codec in PIZ ZIP PXR24; do
-        exr "$work/blender_$codec.exr" ViewLayer.Combined.R,ViewLayer.Combined.G,ViewLayer.Combined.B,ViewLayer.Combined.A &&
+        wanted "$work/blender_$codec.exr" ViewLayer.Combined.R,ViewLayer.Combined.G,ViewLayer.Combined.B,ViewLayer.Combined.A &&
+            exr "$work/blender_$codec.exr" &&
             notes "$work/blender_$codec.exr" "of 2 layers or parts with R, G, B: ViewLayer.Combined is taken"
         count "Blender: $codec"
     done
