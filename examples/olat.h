@@ -28,8 +28,9 @@
    ending is .png, or .exr where there is no such PNG.
 
    MASKS  Where a mask's alpha varies it is what is kept, of an indexed image with a palette of colours and
-   black as index 0 all but that, else what is white. Where no mask of the dataset has more than 0.6 of white,
-   the most that any has keeps all: so 0 and 1 of 255 do, and one dim mask among others stays dim.
+   black as index 0 all but that, else what is white. Where no mask of the dataset has a number of 16 or more,
+   as 0 1 2 of 255, the numbers are labels: all but 0 is kept. Else, where none has more than 0.6 of white,
+   the most that any has keeps all; one dim mask among others stays dim.
 
    ADAPTED  Coordinates far from 0 become relative to an origin, photographs that say they are not sRGB become
    so, masks become alpha. The dataset's notes say what was done.
@@ -572,6 +573,7 @@ typedef struct olat__found {
     int count;
     unsigned long broken; /* values that are not finite */
     double largest;       /* of the mask, of 1 */
+    unsigned number;      /* the same as stored */
     int waits, inverted;  /* the mask */
     int failed;
 } olat__found;
@@ -3073,8 +3075,9 @@ static int olat__apply_mask(olat_frame *frame, double white, olat__found *found,
     free(mask);
     uint64_t one = (uint64_t)top * top, smallest = one;
     found->largest = (double)largest / (double)one;
+    found->number = olat__is_light(format) ? top : largest / top;
     found->waits = !(white > 0) && found->largest <= 0.6;
-    if (white > 0) one = (uint64_t)(white * (double)one + 0.5);
+    if (white > 0) one = (uint64_t)fmax(white * (double)one + 0.5, 1);
     double border = 0, middle = 0, of_border = 0, of_middle = 0;
     for (size_t i = 0; i < pixels && !found->waits; i++) {
         const int x = (int)(i % (size_t)w), y = (int)(i / (size_t)w);
@@ -3152,7 +3155,8 @@ typedef struct olat__seen {
     olat__tally tallies[OLAT__TALLIES];
     int count, masks, inverted, more; /* more: what had no place in tallies */
     unsigned long broken;
-    double largest; /* of all masks, of 1 */
+    double largest;  /* of all masks, of 1 */
+    unsigned number; /* the same as stored */
 } olat__seen;
 
 static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
@@ -3172,6 +3176,7 @@ static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
     seen->inverted += found->inverted;
     seen->broken += found->broken;
     if (found->largest > seen->largest) seen->largest = found->largest;
+    if (found->number > seen->number) seen->number = found->number;
 }
 
 static int olat__read_one(const olat__reading *r, int i, char *error) {
@@ -3232,7 +3237,8 @@ static void olat__note_tally(olat_dataset *out, const olat__tally *tally, int ma
 }
 
 /* Reads all photographs and notes what is to be noted of them. A mask without anything bright is right where
-   others are brighter; where none is, all are scaled alike: so a dim one among soft masks stays dim. */
+   others are brighter; where none is, all are scaled alike: so a dim one among soft masks stays dim. What has
+   less than 16 numbers is no brightness: they are labels. */
 static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dataset *out) {
     const int most = reader ? 16 + 4 * ssdgs_context_threads(reader->context) : 1;
     olat__reading r;
@@ -3244,13 +3250,16 @@ static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dat
     if (!r.found || !r.waits) j->failed = olat__fail(j->error, "out of memory");
     for (int i = 0; i < out->count; i++) seen.masks += out->frames[i].mask != NULL;
     olat__read_all(j, reader, out, &r, &seen);
-    const int dim = seen.largest > 0 && seen.largest <= 0.6;
-    r.white = dim ? seen.largest : 1;
+    const int labels = seen.number > 0 && seen.number<16, dim = seen.largest> 0 && seen.largest <= 0.6;
+    r.white = labels ? 1e-12 : dim ? seen.largest : 1;
     if (seen.masks) olat__read_all(j, reader, out, &r, &seen);
     free(r.found);
     free(r.waits);
     if (seen.masks) olat__note(out, "masks of %d of the %d photographs are used", seen.masks, out->count);
-    if (seen.masks && dim)
+    if (labels)
+        olat__note(out, "no mask has a number above %u: these are taken as labels, and all but 0 is kept",
+                   seen.number);
+    else if (dim)
         olat__note(out,
                    "no mask is brighter than %.4g of 255: all are scaled, so that this keeps all and half of "
                    "it half",

@@ -2648,6 +2648,8 @@ static int mask_leaves(const char *frames, int at, const unsigned char *alpha, c
 #define SCALED(value) \
     "\nno mask is brighter than " value " of 255: all are scaled, so that this keeps all and half of it " \
     "half"
+#define LABELS(value) \
+    "\nno mask has a number above " value ": these are taken as labels, and all but 0 is kept"
 
 static void test_mask_kinds(void) {
     static const unsigned char photo[20] = {0, 9, 9, 9, 9, 9, 9, 9, 9, 9, 0, 9, 9, 9, 9, 9, 9, 9, 9, 9},
@@ -2691,11 +2693,23 @@ static void test_mask_kinds(void) {
                                by_words[6] = {0, 255, 255, 0, 255, 0}, by_bits[6] = {0, 255, 0, 255, 0, 255},
                                by_dim[6] = {0, 100, 40, 0, 0, 0};
     write_mask(FOLDER "/m.png", 8, 0, NULL, 0, ones, sizeof ones);
-    CHECK(mask_leaves(MASKED("m"), 0, by_ones, USED SCALED("1")));
+    CHECK(mask_leaves(MASKED("m"), 0, by_ones, USED LABELS("1")));
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, labels, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_label, USED LABELS("2")));
+    static const unsigned char fifteen[8] = {0, 0, 15, 1, 0, 2, 8, 0}, sixteen[8] = {0, 0, 16, 1, 0, 2, 8, 0},
+                               by_sixteen[6] = {0, 255, 16, 32, 128, 0},
+                               many[14] = {0, 0, 0, 0, 15, 0, 16, 0, 0, 0, 0, 8, 0, 0},
+                               by_many[6] = {0, 239, 255, 0, 128, 0};
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, fifteen, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_label, USED LABELS("15")));
+    write_mask(FOLDER "/m.png", 8, 0, NULL, 0, sixteen, 8);
+    CHECK(mask_leaves(MASKED("m"), 0, by_sixteen, USED SCALED("16")));
+    write_mask(FOLDER "/m.png", 16, 0, NULL, 0, many, sizeof many);
+    CHECK(mask_leaves(MASKED("m"), 0, by_many, USED SCALED("0.06226")));
     write_mask(FOLDER "/m.png", 8, 0, NULL, 0, half, sizeof half);
     CHECK(mask_leaves(MASKED("m"), 0, by_half, USED SCALED("100")));
     write_mask(FOLDER "/m.png", 16, 0, NULL, 0, words, sizeof words);
-    CHECK(mask_leaves(MASKED("m"), 0, by_words, USED SCALED("0.003891")));
+    CHECK(mask_leaves(MASKED("m"), 0, by_words, USED LABELS("1")));
     write_mask(FOLDER "/m.png", 1, 0, NULL, 0, bits, sizeof bits);
     CHECK(mask_leaves(MASKED("m"), 0, by_bits, USED));
     /* by the brightest of all masks, so that a dim one among others stays */
@@ -2709,6 +2723,9 @@ static void test_mask_kinds(void) {
     static const unsigned char scaled[6] = {0, 255, 102, 0, 0, 0};
     CHECK(mask_leaves(MASKED("dim") "," MASKED("m"), 0, scaled,
                       "masks of 2 of the 2 photographs are used" SCALED("100")));
+    write_mask(FOLDER "/dim.png", 8, 0, NULL, 0, labels, sizeof labels);
+    CHECK(mask_leaves(MASKED("m") "," MASKED("dim"), 1, by_label,
+                      "masks of 2 of the 2 photographs are used" LABELS("2")));
     /* all, nothing, and inverted */
     static const unsigned char nothing[8] = {0, 0, 0, 0, 0, 0, 0, 0},
                                all[8] = {0, 255, 255, 255, 0, 255, 255, 255},
