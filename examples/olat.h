@@ -2053,7 +2053,7 @@ static const char *olat__icc_space(const unsigned char *profile, size_t size, ol
             tag[k] = profile + at;
         }
     if (memcmp(profile + 20, "XYZ ", 4) != 0 || !tag[grey ? 6 : 5] || (!grey && (!tag[3] || !tag[4])))
-        return "of tables, without curves and a matrix";
+        return "of tables or for Lab, not of curves and a matrix";
     for (int c = 0; c < 3; c++) {
         const int k = grey ? 6 : c;
         if (!tag[k] || !olat__icc_curve(tag[k], length[k], space->code + c)) return "damaged";

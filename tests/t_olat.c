@@ -1622,9 +1622,10 @@ static void test_profiles(void) {
     static const struct {
         int colors;
         const char *note;
-    } bad[] = {{LUT, "an ICC profile that cannot be used (of tables, without curves and a matrix)"},
-               {NO_COLORS, "an ICC profile that cannot be used (of tables, without curves and a matrix)"},
-               {CMYK, "an ICC profile that cannot be used (of another kind of colours than RGB)"}};
+    } bad[] = {
+        {LUT, "an ICC profile that cannot be used (of tables or for Lab, not of curves and a matrix)"},
+        {NO_COLORS, "an ICC profile that cannot be used (of tables or for Lab, not of curves and a matrix)"},
+        {CMYK, "an ICC profile that cannot be used (of another kind of colours than RGB)"}};
     static const picture kinds[3] = {{9, 7, 6, 8, 0, 0}, {9, 7, 6, 16, 0, 0}, {9, 7, 3, 8, 0, 1}};
     static const unsigned char linear[4] = {0, 1, 0x86, 0xA0};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -1812,6 +1813,13 @@ static int photographed(const unsigned char *bytes, size_t size) {
 }
 
 /* Every byte of profiles and chunks changed and left out, behind sound checksums. */
+/* The same two in bytes, of which there are fewer to convert. */
+static void put_two_bytes(void) {
+    static const unsigned char raw[9] = {0, 156, 117, 78, 117, 255, 255, 255, 255};
+    put_header(2, 1, 8, 6, 0);
+    put_data(raw, sizeof raw);
+}
+
 static void test_profile_damage(void) {
     static const double v[7] = {2, 0.9, 0.05, 0.5, 0.35, 0.02, 0.03};
     static const unsigned char code[4] = {9, 16, 0, 1}, steps[5] = {1, 0x80, 0xFF, 0x55, 0x7F};
@@ -1824,16 +1832,16 @@ static void test_profile_damage(void) {
         for (size_t i = 0; i < size; i++) {
             for (int k = 0; k < 5; k++) {
                 profile[i] ^= steps[k];
-                put_two(), insert_profile();
+                put_two_bytes(), insert_profile();
                 wrong |= !photographed(file, file_size);
                 profile[i] ^= steps[k];
             }
             profile_size = i;
-            put_two(), insert_profile();
+            put_two_bytes(), insert_profile();
             wrong |= !photographed(file, file_size);
             profile_size = size;
         }
-        put_two(), insert_profile();
+        put_two_bytes(), insert_profile();
         const size_t length = file_size;
         for (size_t i = 0; i < length; i++) {
             for (int k = 0; k < 5; k++) {
@@ -1849,7 +1857,7 @@ static void test_profile_damage(void) {
             unsigned char changed[4];
             memcpy(changed, code, 4);
             changed[i] = (unsigned char)k;
-            put_two(), insert_chunk(33, "cICP", changed, 4, 0);
+            put_two_bytes(), insert_chunk(33, "cICP", changed, 4, 0);
             wrong |= !photographed(file, file_size);
         }
     CHECK(!wrong);
@@ -3637,6 +3645,8 @@ static void test_primaries(void) {
         memcpy(xy, srgb, sizeof xy);
         xy[i] += 5e-5;
         CHECK(olat__primaries(xy, m) == 1);
+        xy[i] += 1.5e-3; /* meant */
+        CHECK(olat__primaries(xy, m) == 2);
         xy[i] = 21474;
         CHECK(!olat__primaries(xy, m));
     }
@@ -3646,6 +3656,11 @@ static void test_primaries(void) {
     CHECK(!olat__primaries(xy, m));
     memcpy(xy, srgb, sizeof xy), xy[6] = 0.7, xy[7] = 0.25; /* white is no mixture of the three */
     CHECK(!olat__primaries(xy, m));
+    xy[6] = 0.45, xy[7] = 0.2;
+    CHECK(!olat__primaries(xy, m));
+    CHECK(olat__xyz(srgb, m) && olat__colorants(m, m) == 1 && olat__xyz(srgb, m));
+    m[0] += 30, m[1] -= 30; /* colorants that cancel */
+    CHECK(!olat__colorants(m, m));
 }
 
 int main(void) {
