@@ -1097,7 +1097,7 @@ typedef struct olat__exr {
     const unsigned char *bytes;
     size_t size, at; /* what is read next */
     const char *problem;
-    char text[240]; /* the problem's, where it has names */
+    char text[256]; /* the problem's, where it has names */
     int several;    /* parts: each block names its own */
     /* of a part, the one at hand or chosen */
     int part, found;                    /* found: bits of the attributes that are there */
@@ -1956,6 +1956,7 @@ static double olat__light(const olat__code *code, double v) {
     return light > 0 ? light < 1 ? light : 1 : 0;
 }
 
+/* In double: floats do not round to the right one of 16 bits. */
 static double olat__to_srgb(double light) {
     return light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055;
 }
@@ -2243,12 +2244,16 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
     olat__srgb_space(&srgb);
     int failed = olat__png_space(name, png, &space, found, error), linear = 1;
     if (!failed && (space.differs || olat__space_distance(&space, &srgb) > 0.002)) {
+        const int kind = space.code->kind;
         for (int c = 0; c < 3; c++) linear &= fabs(olat__light(space.code + c, 0.5) - 0.5) < 2e-3;
         olat__tell(found, 0, "%s (%s): %s",
                    linear       ? "linear"
                    : space.high ? "HDR"
                                 : "not sRGB",
-                   space.source, what[space.high ? 1 + space.code->kind - OLAT__TABLE : !space.differs]);
+                   space.source,
+                   what[kind == OLAT__HLG  ? 3
+                        : kind == OLAT__PQ ? 2
+                                           : !space.differs]);
         failed =
             olat__png_convert(png, &space, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
     }

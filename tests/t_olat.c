@@ -2662,7 +2662,7 @@ static int mask_leaves(const char *frames, int at, const unsigned char *alpha, c
 static void test_mask_kinds(void) {
     static const unsigned char photo[20] = {0, 9, 9, 9, 9, 9, 9, 9, 9, 9, 0, 9, 9, 9, 9, 9, 9, 9, 9, 9},
                                voc[9] = {0, 0, 0, 128, 0, 0, 0, 128, 0},
-                               greys[9] = {0, 0, 0, 9, 9, 9, 255, 255, 255},
+                               greys[9] = {0, 0, 0, 9, 8, 9, 255, 223, 255},
                                turned[9] = {255, 255, 255, 0, 0, 0, 128, 128, 128},
                                tinted[9] = {9, 0, 0, 128, 0, 0, 0, 200, 0},
                                labels[8] = {0, 0, 1, 2, 0, 2, 1, 0};
