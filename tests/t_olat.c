@@ -2770,6 +2770,24 @@ static void test_mask_kinds(void) {
     remove(FOLDER "/m.exr");
 }
 
+/* A word and 200 repeats of it: into 201 words, and no others. */
+static void test_piz_repeats(void) {
+    static const unsigned char coded[24] = {0,  0, 0, 0, 1, 0, 0, 0, 2,    0,    0,    0,
+                                            10, 0, 0, 0, 0, 0, 0, 0, 0x04, 0x10, 0x72, 0};
+    static olat__exr e;
+    static olat__piz piz;
+    static uint16_t words[300];
+    for (size_t count = 1; count < 300; count++) {
+        size_t written = 300;
+        memset(&e, 0, sizeof e);
+        e.piz = &piz;
+        memset(words, 255, sizeof words);
+        olat__piz_words(&e, coded, sizeof coded, words, count);
+        while (written > 0 && words[written - 1] == 0xFFFF) written--;
+        CHECK(written <= count && (count == 201 ? written == count && !e.problem : e.problem != NULL));
+    }
+}
+
 /* Which channels of which part are the picture; what is said of it. */
 static void test_exr_layers(void) {
     static const struct {
@@ -2906,6 +2924,7 @@ static void test_exr_layers(void) {
     change_exr();
     encode_parts(parts + 2, files[0].names, 2);
     change_exr();
+    test_piz_repeats();
     /* what only PIZ can have wrong */
     encode_exr(exrs + 12);
     size_t table = 16;
