@@ -22,6 +22,7 @@ const rows = (splats, more = []) => floats(splats.flatMap(s => [...names, ...mor
 const write = (file, header, ...data) => fs.writeFileSync(file, Buffer.concat([Buffer.from(`ply\nformat binary_little_endian 1.0\n${header}end_header\n`), ...data]));
 const read = file => { // the rows of a PLY of nothing but floats
     const bytes = fs.readFileSync(file), at = bytes.indexOf('end_header\n') + 11, header = bytes.toString('latin1', 0, at);
+    if (!header.includes('format binary_little_endian 1.0')) throw 'it wrote another format';
     const found = [...header.matchAll(/property float (\w+)/g)].map(m => m[1]);
     return {header, splats: Array.from({length: +header.match(/element vertex (\d+)/)[1]}, (_, i) =>
         Object.fromEntries(found.map((n, c) => [n, bytes.readFloatLE(at + 4 * (found.length * i + c))])))};

@@ -20,6 +20,7 @@ const splat = {x: 1, y: 2, z: 3, f_dc_0: 0.5, f_dc_1: 0.25, f_dc_2: 0.125, opaci
 const floats = values => Buffer.from(new Float32Array(values).buffer);
 const read = file => { // the rows of a PLY of nothing but floats
     const bytes = fs.readFileSync(file), at = bytes.indexOf('end_header\n') + 11, header = bytes.toString('latin1', 0, at);
+    if (!header.includes('format binary_little_endian 1.0')) throw 'it wrote another format';
     const found = [...header.matchAll(/property float (\w+)/g)].map(m => m[1]);
     return {header, splats: Array.from({length: +header.match(/element vertex (\d+)/)[1]}, (_, i) =>
         Object.fromEntries(found.map((n, c) => [n, bytes.readFloatLE(at + 4 * (found.length * i + c))])))};
