@@ -2657,6 +2657,15 @@ static void ssdgs__quaternion_matrix(const double q[4], double r[9]) {
         }
 }
 
+/* q, then p. */
+static void ssdgs__quaternion_product(const double p[4], const double q[4], double to[4]) {
+    to[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];
+    for (int k = 1; k < 4; k++) {
+        const int a = k % 3 + 1, b = (k + 1) % 3 + 1;
+        to[k] = p[0] * q[k] + p[k] * q[0] + p[a] * q[b] - p[b] * q[a];
+    }
+}
+
 /* Where a placed model is drawn, (3,4) as ssdgs_object.to_world. */
 static void ssdgs__placement_matrix(const ssdgs_settings *s, ssdgs_real m[12]) {
     double turn[3], q[4], r[9];
@@ -3300,7 +3309,7 @@ static int ssdgs__similarity_of(const ssdgs__pair_of_places *pairs, int n, doubl
    there is none. */
 static double ssdgs__similarity_fit(ssdgs__pair_of_places *pairs, int n, double side, ssdgs__similarity *s) {
     for (int turn = 0; turn < 12; turn++) {
-        if (!ssdgs__similarity_of(pairs, turn ? (n + 1) / 2 : n, side, s)) return 1e300;
+        if (!ssdgs__similarity_of(pairs, turn ? n / 2 + 1 : n, side, s)) return 1e300;
         for (int i = 0; i < n; i++) {
             double at[3];
             ssdgs__similarity_at(s, pairs[i].from, at);
@@ -3315,13 +3324,18 @@ static double ssdgs__similarity_fit(ssdgs__pair_of_places *pairs, int n, double 
 /* What no editor of splats changes of a Gaussian: the properties that are ours alone. */
 enum { SSDGS__OWN = SSDGS_DIFFUSE, SSDGS__OWN_COUNT = SSDGS_CHANNELS - SSDGS_DIFFUSE };
 
+/* As files have it. */
+static uint32_t ssdgs__own_bits(const ssdgs_model *model, size_t i, size_t c) {
+    const float value = (float)model->gaussians[c * model->capacity + i];
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
 static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
     uint64_t hash = 1;
     for (size_t c = SSDGS__OWN; c < SSDGS_CHANNELS; c++) {
-        uint32_t bits;
-        const float value = (float)model->gaussians[c * model->capacity + i];
-        memcpy(&bits, &value, sizeof bits);
-        hash = (hash ^ bits) * UINT64_C(0x9E3779B97F4A7C15);
+        hash = (hash ^ ssdgs__own_bits(model, i, c)) * UINT64_C(0x9E3779B97F4A7C15);
         hash ^= hash >> 29;
     }
     return hash << 32 | (uint32_t)i;
@@ -3329,9 +3343,7 @@ static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
 
 static int ssdgs__own_same(const ssdgs_model *a, size_t i, const ssdgs_model *b, size_t j) {
     size_t c = SSDGS__OWN;
-    while (c < SSDGS_CHANNELS && !memcmp(a->gaussians + c * a->capacity + i,
-                                         b->gaussians + c * b->capacity + j, sizeof *a->gaussians))
-        c++;
+    while (c < SSDGS_CHANNELS && ssdgs__own_bits(a, i, c) == ssdgs__own_bits(b, j, c)) c++;
     return c == SSDGS_CHANNELS;
 }
 
@@ -3371,12 +3383,8 @@ static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *o
     for (size_t k = 0; k < 3 && j >= 0 && off * fabs(s->scale) < 2 * tolerance; k++)
         g[(SSDGS_POSITION + k) * stride] = o[(SSDGS_POSITION + k) * from];
     for (size_t k = 0; k < 4; k++) q[k] = (double)g[(SSDGS_ROTATION + k) * stride];
-    const double *w = s->q; /* the product of its conjugate and q */
-    back[0] = w[0] * q[0] + w[1] * q[1] + w[2] * q[2] + w[3] * q[3];
-    for (int k = 1; k < 4; k++) {
-        const int a = k % 3 + 1, b = (k + 1) % 3 + 1;
-        back[k] = w[0] * q[k] - w[k] * q[0] - w[a] * q[b] + w[b] * q[a];
-    }
+    const double inverse[4] = {s->q[0], -s->q[1], -s->q[2], -s->q[3]};
+    ssdgs__quaternion_product(inverse, q, back);
     int same = j >= 0;
     for (size_t k = 0; k < 4 && j >= 0; k++) {
         const double own = (double)o[(SSDGS_ROTATION + k) * from];
@@ -3397,6 +3405,46 @@ static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *o
 
 static const ssdgs__similarity ssdgs__unmoved = {{1, 0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1, {0, 0, 0}};
 
+/* Places what stands by the settings after what an editor did to it. Of positions beside the origin that the
+   file lost, and in the world, it is what moves the model less. 0: no setting is as large. */
+static int ssdgs__place_after(ssdgs_settings *settings, const ssdgs__similarity *s, const double apart[3],
+                              int lost, double tolerance) {
+    double move2 = 0, other2 = 0, turn = 0, move[3], placed[3], q[4];
+    for (int k = 0; k < 3; k++) {
+        move2 += s->move[k] * s->move[k];
+        other2 += (s->move[k] + apart[k]) * (s->move[k] + apart[k]);
+        turn += s->q[1 + k] * s->q[1 + k];
+    }
+    const int in_world = !lost || other2 < move2;
+    if (2 * atan2(sqrt(turn), fabs(s->q[0])) < 1e-6 && fabs(s->scale - 1) < 1e-6 &&
+        (in_world ? other2 : move2) < tolerance * tolerance)
+        return 1;
+    ssdgs__similarity before;
+    for (int k = 0; k < 3; k++) { /* without what rounding left */
+        placed[k] = (double)settings->placement.turn[k];
+        before.move[k] = (double)settings->placement.move[k];
+        move[k] = s->move[k] + (in_world ? apart[k] : 0);
+        move[k] = fabs(move[k]) < 1e-2 * tolerance ? 0 : move[k];
+    }
+    ssdgs__turn_quaternion(placed, before.q);
+    ssdgs__quaternion_matrix(before.q, before.r);
+    before.scale = (double)settings->placement.scale;
+    ssdgs__similarity_at(&before, move, placed);
+    ssdgs__quaternion_product(before.q, s->q, q);
+    const double sine = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), side = q[0] < 0 ? -1 : 1,
+                 angle = 2 * atan2(sine, fabs(q[0])), scale = before.scale * s->scale;
+    if (!(fabs(scale) < 1e9 && fabs(scale) > 1.001e-9)) return 0;
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(placed[k]) < 1e9)) return 0;
+    for (int k = 0; k < 3; k++) {
+        const double turned = sine > 0 ? side * angle * q[1 + k] / sine : 0;
+        settings->placement.turn[k] = (ssdgs_real)(fabs(turned) < 1e-6 ? 0 : turned);
+        settings->placement.move[k] = (ssdgs_real)placed[k];
+    }
+    settings->placement.scale = (ssdgs_real)(fabs(fabs(scale) - 1) < 1e-6 ? (scale < 0 ? -1 : 1) : scale);
+    return 1;
+}
+
 /* Gives the model the original's settings, finds what has become of the original's Gaussians, and brings the
    model back to their place. */
 static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *original) {
@@ -3414,8 +3462,10 @@ static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *orig
                                                               MOST * sizeof(ssdgs__pair_of_places) +
                                                               (count + 1) * sizeof(int));
     if (!keys) return SSDGS_ERR_MEMORY;
+    const ssdgs_settings before = model->settings;
     model->settings = original->settings;
-    if (!model->version) ssdgs__gaussians_update(model, original->version);
+    if (lost) ssdgs__gaussians_update(model, original->version);
+    else model->settings.placement = before.placement;
     ssdgs__pair_of_places *pairs = (ssdgs__pair_of_places *)(keys + known + 1);
     int *match = (int *)(pairs + MOST), n = 0;
     size_t shared = 0, still = 0, taken = 0;
@@ -3428,19 +3478,20 @@ static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *orig
     double largest = 0, spread = 0, mean[3] = {0, 0, 0};
     for (size_t i = 0; i < count; i++) {
         if (match[i] < 0) continue;
-        int same = 1;
-        double place[3];
+        int same = 1, sound = 1;
+        double from[3], place[3];
         for (size_t k = 0; k < 3; k++) {
             place[k] = (double)model->gaussians[(SSDGS_POSITION + k) * model->capacity + i];
-            const double from =
+            from[k] =
                 (double)original->gaussians[(SSDGS_POSITION + k) * original->capacity + (size_t)match[i]];
-            same = same && !(place[k] < from) && !(place[k] > from);
+            same = same && !(place[k] < from[k]) && !(place[k] > from[k]);
+            sound = sound && fabs(place[k]) < 1e15 && fabs(from[k]) < 1e15; /* finite, too */
         }
         still += (size_t)same;
-        if (taken++ * MOST / shared < (size_t)n || n == MOST) continue; /* some of all tell enough */
+        /* some of all tell enough */
+        if (!sound || (uint64_t)taken++ * MOST / shared < (uint64_t)n || n == MOST) continue;
         for (size_t k = 0; k < 3; k++) {
-            pairs[n].from[k] =
-                (double)original->gaussians[(SSDGS_POSITION + k) * original->capacity + (size_t)match[i]];
+            pairs[n].from[k] = from[k];
             pairs[n].to[k] = place[k];
             mean[k] += place[k];
             largest = fabs(place[k]) > largest ? fabs(place[k]) : largest;
@@ -3453,16 +3504,17 @@ static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *orig
     /* floats are exact to 6e-8 of themselves, what editors compute with them to some more */
     const double tolerance = 1e-4 * sqrt(spread) + 1e-6 * largest;
     ssdgs__similarity s = ssdgs__unmoved, mirrored;
-    int fits = 2 * still > shared && (lost || together);
+    int fits = !count || (2 * still > shared && (lost || together));
     const int stays = fits;
     const char *problem = NULL;
-    if (!stays && (shared < 4 || 2 * shared < count))
+    if (!stays && (n < 4 || 2 * shared < count))
         problem =
             "too few of its Gaussians are the original's to tell whether an editor has turned, scaled or "
             "moved it";
     else if (!stays) {
         fits = ssdgs__similarity_fit(pairs, n, 1, &s) < tolerance;
         if (!fits && (fits = ssdgs__similarity_fit(pairs, n, -1, &mirrored) < tolerance) != 0) s = mirrored;
+        if (fits) fits = ssdgs__place_after(&model->settings, &s, apart, lost, tolerance);
         if (!fits)
             problem = "no rotation, scale and move brings the original's Gaussians to where they are: has an "
                       "editor stretched it, or joined several?";
@@ -3475,26 +3527,6 @@ static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *orig
     for (size_t i = 0; i < count && !stays; i++)
         ssdgs__bring_back(model, i, original, match[i], &s, tolerance);
     ssdgs__release(context, keys);
-    if (stays || !fits) return SSDGS_OK;
-    /* of positions beside the origin that the file lost, and in the world, what moves the model less */
-    double move2 = 0, other2 = 0, turn = 0;
-    for (int k = 0; k < 3; k++) {
-        move2 += s.move[k] * s.move[k];
-        other2 += (s.move[k] + apart[k]) * (s.move[k] + apart[k]);
-        turn += s.q[1 + k] * s.q[1 + k];
-    }
-    const int in_world = !lost || other2 < move2;
-    const double side = s.q[0] < 0 ? -1 : 1, angle = 2 * atan2(sqrt(turn), side * s.q[0]);
-    if (angle < 1e-6 && fabs(s.scale - 1) < 1e-6 && (in_world ? other2 : move2) < tolerance * tolerance)
-        return SSDGS_OK;
-    for (int k = 0; k < 3; k++) { /* without what rounding left */
-        const double turned = turn > 0 ? side * angle * s.q[1 + k] / sqrt(turn) : 0,
-                     move = s.move[k] + (in_world ? apart[k] : 0);
-        model->settings.placement.turn[k] = (ssdgs_real)(fabs(turned) < 1e-6 ? 0 : turned);
-        model->settings.placement.move[k] = (ssdgs_real)(fabs(move) < 1e-2 * tolerance ? 0 : move);
-    }
-    const double scale = fabs(fabs(s.scale) - 1) < 1e-6 ? (s.scale < 0 ? -1 : 1) : s.scale;
-    model->settings.placement.scale = (ssdgs_real)scale;
     return SSDGS_OK;
 }
 

@@ -850,9 +850,10 @@ static double picture_of(ssdgs_model *model, const edit *e, int terms, ssdgs_rea
    turns, scales and moves, in floats. */
 static void edit_model(ssdgs_model *model, const edit *e) {
     ssdgs_model_view v = ssdgs_model_arrays(model);
+    const size_t n = (size_t)model->count;
     double q[4];
     quaternion_of(e, q);
-    for (size_t i = 0; i < DRAWN; i++) {
+    for (size_t i = 0; i < n; i++) {
         ssdgs_real *g = v.gaussians + i;
         double x[3], to[3], p[4], length = 0;
         for (size_t c = 0; c < 3; c++) x[c] = (double)g[c * v.stride];
@@ -876,14 +877,97 @@ static void edit_model(ssdgs_model *model, const edit *e) {
             g[(SSDGS_MATERIAL + c) * v.stride] = uniform(-1, 1);
     }
     for (size_t c = 0; c < SSDGS_CHANNELS; c++) /* backwards, without the last third */
-        for (size_t i = 0; i < DRAWN / 2; i++) {
+        for (size_t i = 0; i < n / 2; i++) {
             ssdgs_real *plane = v.gaussians + c * v.stride, kept = plane[i];
-            plane[i] = plane[DRAWN - 1 - i];
-            plane[DRAWN - 1 - i] = kept;
+            plane[i] = plane[n - 1 - i];
+            plane[n - 1 - i] = kept;
         }
-    model->count = DRAWN - DRAWN / 3;
+    model->count -= model->count / 3;
     model->version = 0; /* as one that lost its settings */
     model->settings = ssdgs_settings_published();
+}
+
+/* One that is placed keeps its place when it adopts again, and one edited again is moved by both. */
+static void check_again(ssdgs_context *other, ssdgs_model *model, const ssdgs_model *original,
+                        const edit *first) {
+    static const edit second = {{0, 0.6, 0.8}, 40, 0.5, {0.2, -0.7, 0.4}, 0};
+    const ssdgs_settings placed = *ssdgs_model_settings(model);
+    bytes before = saved(model), after;
+    CHECK(!ssdgs_model_adopt(model, original));
+    after = saved(model);
+    CHECK(before.size == after.size && !memcmp(before.data, after.data, after.size));
+    free(after.data);
+    for (int way = 0; way < 4;
+         way++) { /* lost its settings, and adopts from a placed one; has them. Edited? */
+        const int lost = way < 2;
+        ssdgs_model *from = NULL, *again = NULL;
+        CHECK(!ssdgs_model_load_memory(other, before.data, before.size, &from, NULL));
+        CHECK(!ssdgs_model_load_memory(other, before.data, before.size, &again, NULL));
+        const int version = again->version, edited = way % 2;
+        if (edited) edit_model(again, &second);
+        again->settings = lost ? ssdgs_settings_published() : placed;
+        again->version = lost ? 0 : version;
+        CHECK(!ssdgs_model_adopt(again, lost ? from : original));
+        const ssdgs_object object = ssdgs_object_default(again);
+        CHECK(edited || !memcmp(&again->settings, &placed, sizeof placed));
+        const double x[3] = {0.3, -0.2, 0.5};
+        double half[3], to[3];
+        moved_place(&second, x, half);
+        moved_place(first, edited ? half : x, to);
+        for (int c = 0; c < 3; c++) {
+            const ssdgs_real *m = object.to_world + 4 * c;
+            const double there =
+                (double)m[0] * x[0] + (double)m[1] * x[1] + (double)m[2] * x[2] + (double)m[3];
+            if (!CHECK(fabs(there - to[c]) < 1e-5 * (fabs(first->scale) + fabs(to[c]))))
+                printf("    again %d, %d: %g, not %g\n", way, c, there, to[c]);
+        }
+        ssdgs_model_destroy(from);
+        ssdgs_model_destroy(again);
+    }
+    free(before.data);
+}
+
+/* What tells little, or nothing, or cannot be told. */
+static void test_few_placed(void) {
+    static const edit turned = {{0.6, 0, -0.8}, 70, 2, {1, 0, -3}, 0};
+    static const double bad[4] = {NAN, INFINITY, -1e30, 1e16};
+    for (int k = 0; k < 16; k++) {
+        ssdgs_model *original = drawn_model(), *model = NULL;
+        ssdgs_context *other = NULL;
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.logger.write = hear;
+        if (k < 6) original->count = k; /* so many are left: of 6 four */
+        if (k == 5) original->count = 6;
+        bytes file = saved(original);
+        CHECK(!ssdgs_context_create(&desc, &other) &&
+              !ssdgs_model_load_memory(other, file.data, file.size, &model, NULL));
+        free(file.data);
+        edit e = turned;
+        if (k == 14) e.scale = 2e9;
+        if (k == 15) e.move[1] = 2e9;
+        edit_model(model, &e);
+        /* a place that is none, of either */
+        ssdgs_model *const one = k & 1 ? original : model;
+        if (k >= 6 && k < 14) one->gaussians[one->capacity * 2 + 150] = (ssdgs_real)bad[(k - 6) / 2];
+        told[0] = 0;
+        CHECK(!ssdgs_model_adopt(model, original) &&
+              model->settings.scattering.width == original->settings.scattering.width);
+        const int placed = k > 4 && k < 14;
+        if (!CHECK(ssdgs__is_placed(&model->settings) == placed &&
+                   (strstr(told, "stands where") != NULL) == placed &&
+                   (strstr(told, "too few of its") != NULL) == (k > 0 && k < 5) &&
+                   (strstr(told, "no rotation, scale and move") != NULL) == (k > 13)))
+            printf("    case %d: %s\n", k, told);
+        CHECK(!placed || fabs((double)model->settings.placement.scale - 2) < 1e-5);
+        file = saved(model);
+        ssdgs_model_destroy(model);
+        CHECK(!ssdgs_model_load_memory(other, file.data, file.size, &model, NULL));
+        free(file.data);
+        ssdgs_model_destroy(model);
+        ssdgs_model_destroy(original);
+        ssdgs_context_destroy(other);
+    }
 }
 
 static void test_placed(void) {
@@ -973,6 +1057,7 @@ static void test_placed(void) {
                       !memcmp(&again->settings.placement, &placed.placement, sizeof placed.placement));
                 ssdgs_model_destroy(again);
                 free(file.data);
+                check_again(other, model, original, e);
             }
         } else {
             CHECK(strstr(told, e->wanted == 4
@@ -1539,6 +1624,7 @@ int main(void) {
     test_versions();
     test_origin();
     test_placed();
+    test_few_placed();
     test_numbers();
     test_order();
     TEST_ROW("80", "hostile headers, damaged bodies", (test_hostile(), test_damage()));
