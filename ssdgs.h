@@ -13747,7 +13747,7 @@ typedef struct F(rim) {
 SSDGS__FI void F(rim_of)(const ssdgs__projection *k, F(rim) * rim) {
     for (int i = 0; i < 2; i++) {
         const R focal = i ? k->fy : k->fx, centre = i ? k->cy : k->cx,
-                most = (R)1e15; /* squares are finite */
+                most = (R)1e9; /* products of two squares are finite */
         const R low = -centre / focal, high = ((R)(i ? k->height : k->width) - centre) / focal;
         rim->low[i] = VSET(low > -SSDGS__STEEP ? -SSDGS__STEEP : low > -most ? low : -most);
         rim->high[i] = VSET(high < SSDGS__STEEP ? SSDGS__STEEP : high < most ? high : most);

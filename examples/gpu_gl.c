@@ -1174,7 +1174,7 @@ void main() {
     if (orthographic == 0u) {
         vec3 axis = scale * inverse_z * (view[2].xyz * r);
         vec2 low = -vec2(cx, cy) / vec2(fx, fy), high = (vec2(width, height) - vec2(cx, cy)) / vec2(fx, fy);
-        vec2 edge = clamp(slope, max(min(low, -1.0), -1e15), min(max(high, 1.0), 1e15));
+        vec2 edge = clamp(slope, max(min(low, -1.0), -1e9), min(max(high, 1.0), 1e9));
         vec2 ratio = (1 + edge * edge) / (1 + slope * slope);
         float beside = ratio.x * ratio.y * ratio.x * ratio.y;
         float deep = clamp((dot(axis, axis) - 0.02) / 0.04, 0.0, 1.0);
