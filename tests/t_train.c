@@ -220,12 +220,12 @@ static void test_members(ssdgs_trainer *trainer, const char *path) {
             strcat(names, wanted + 1);
             different++;
         }
-    CHECK(made == (int)sizeof(ssdgs_real) * 8 && different == 81);
+    CHECK(made == (int)sizeof(ssdgs_real) * 8 && different == 88);
     if (!CHECK(strstr(names, " seed schedule ") &&
                strstr(names, " bounds_min[0] bounds_min[1] bounds_min[2] bounds_max[0] ") &&
                strstr(names, " rates.camera.end rates.light.start rates.light.end terms ") &&
                strstr(names, " scattering.layers scattering.width shadow.layers ") &&
-               strstr(names, " origin[2] medium.")))
+               strstr(names, " origin[2] placement.turn[0] ") && strstr(names, " placement.move[2] medium.")))
         printf("    %s\n", names);
     /* both values, and a seed of more bits than a double has */
     options->seed += (uint64_t)1 << 60;
