@@ -930,7 +930,7 @@ static void check_again(ssdgs_context *other, ssdgs_model *model, const ssdgs_mo
 /* What tells little, or nothing, or cannot be told. */
 static void test_few_placed(void) {
     static const edit turned = {{0.6, 0, -0.8}, 70, 2, {1, 0, -3}, 0};
-    static const double bad[4] = {NAN, INFINITY, -1e30, 1e16};
+    const double bad[4] = {(double)NAN, (double)INFINITY, -1e30, 1e16};
     for (int k = 0; k < 18; k++) {
         ssdgs_model *original = drawn_model(), *model = NULL;
         ssdgs_context *other = NULL;
