@@ -41,7 +41,7 @@ icc=/usr/share/color/icc # of icc-profiles-free and libgs-common
 srgb=
 for profile in ghostscript/srgb.icc sRGB.icc; do [ -n "$srgb" ] || [ ! -f "$icc/$profile" ] || srgb=$icc/$profile; done
 [ -n "$srgb" ] || echo "sRGB.icc is missing in $icc: profiles not tested"
-if has convert && [ -n "$srgb" ]; then
+if has identify && [ -n "$srgb" ]; then # of ImageMagick
     for row in "sRGB.icc:" "ghostscript/srgb.icc:" "compatibleWithAdobeRGB1998.icc:not sRGB (ICC profile)" "ghostscript/a98.icc:not sRGB" \
         "LStar-RGB.icc:not sRGB" "ghostscript/rommrgb.icc:colours that sRGB does not hold" "ghostscript/esrgb.icc:not sRGB" \
         "ghostscript/scrgb.icc:is linear (ICC profile): converted to the sRGB curve"; do
