@@ -562,7 +562,9 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 enum { OLAT__NAMED = 1, OLAT__OF_MASK = 2, OLAT__REMARKS = 8 };
 #define OLAT__OUTSIDE \
     "of colours that sRGB does not hold, in more than 0.1 %% of the pixels: these are clamped"
-#define OLAT__TURNED "to be turned or mirrored for viewing (%s %d): read as stored, and poses must be of that"
+#define OLAT__TURNED \
+    "to be turned or mirrored for viewing (%s %d): read as stored, so cameras must be those of the stored " \
+    "picture"
 typedef struct olat__remark {
     int flags; /* OLAT__NAMED: the files' names belong to it; OLAT__OF_MASK: it is about masks */
     char text[240];
@@ -1795,9 +1797,10 @@ static void olat__exr_mend(olat__exr *e, size_t pixels, olat__found *found) {
     if (space == 2) olat__tell(found, 0, "of other primaries (chromaticities): converted to sRGB's");
     if (outside > pixels / 1000) olat__tell(found, OLAT__NAMED, OLAT__OUTSIDE);
     if (100 * lit > pixels && 4 * lit > clear)
-        olat__tell(found, OLAT__NAMED,
-                   "lit where alpha is 0, so this looks straight: OpenEXR's colours are light times alpha; "
-                   "multiply them, for instance with: oiiotool in.exr --premult -o out.exr");
+        olat__tell(
+            found, OLAT__NAMED,
+            "bright where alpha is 0, as if alpha were straight: OpenEXR's colours are light times alpha; "
+            "multiply them, for instance with: oiiotool in.exr --premult -o out.exr");
 }
 
 /* What is to be told of a photograph that could be read. */
@@ -1809,13 +1812,13 @@ static void olat__exr_tell(const olat__exr *e, olat__found *found) {
                                    : 0,
               part = e->name.size > 60 ? 60 : (int)e->name.size;
     if (layers > 1)
-        olat__tell(found, OLAT__NAMED, "of %d layers or parts with %s: %.*s%s%.*s%s is taken", layers,
+        olat__tell(found, OLAT__NAMED, "made of %d layers or parts with %s: %.*s%s%.*s%s is taken", layers,
                    e->letters & 7 ? "R, G, B" : "Y", part, e->name.text, part && layer ? "." : "", layer,
                    e->channels[e->chosen].name, part || layer ? "" : "the one without a name");
     if (!(fabs((double)e->aspect - 1) < 0.01))
         olat__tell(found, OLAT__NAMED,
-                   "of pixels that are not square (pixelAspectRatio %g): read as stored, and fl_x and fl_y "
-                   "must be of that",
+                   "of pixels that are not square (pixelAspectRatio %g): read as stored, so fl_x and fl_y "
+                   "must be those of the stored picture",
                    (double)e->aspect);
     if (e->turned_by > 1 && e->turned_by < 9)
         olat__tell(found, OLAT__NAMED, OLAT__TURNED, "OpenEXR's Orientation", e->turned_by);
@@ -2264,8 +2267,8 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
         if (x > 0 && y > 0 && fabs(x / y - 1) > 0.01)
             olat__tell(
                 found, OLAT__NAMED,
-                "of pixels that are not square (pHYs %g x %g): read as stored, and fl_x and fl_y must be "
-                "of that",
+                "of pixels that are not square (pHYs %g x %g): read as stored, so fl_x and fl_y must be "
+                "those of the stored picture",
                 x, y);
     }
     return failed;

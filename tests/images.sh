@@ -138,7 +138,7 @@ if has oiiotool && has exrmaketiled; then
     count "OpenEXR: whole numbers beside"
     oiiotool --pattern constant:color=0.5,0.5,0.5 50x40 3 --chnames N.R,N.G,N.B --pattern $smooth 50x40 4 --chnames b.R,b.G,b.B,b.A --chappend \
         -d half --compression piz -o "$work/layers.exr"
-    wanted "$work/layers.exr" b.R,b.G,b.B,b.A && exr "$work/layers.exr" && notes "$work/layers.exr" "of 2 layers or parts with R, G, B: b is taken"
+    wanted "$work/layers.exr" b.R,b.G,b.B,b.A && exr "$work/layers.exr" && notes "$work/layers.exr" "made of 2 layers or parts with R, G, B: b is taken"
     count "OpenEXR: a normal pass before beauty"
     oiiotool --pattern constant:color=0.5 50x40 1 --chnames Z -d float -o "$work/depth.exr"
     oiiotool --pattern $smooth 50x40 4 -d half --compression piz -o "$work/rgba.exr"
@@ -147,7 +147,7 @@ if has oiiotool && has exrmaketiled; then
     "$build/pixels" "$work/rgba.exr" >"$work/a.txt" && "$build/pixels" "$work/parts.exr" | cmp -s - "$work/a.txt"
     count "OpenEXR: parts, depth before light"
     oiiotool --pattern $smooth 50x40 4 --unpremult --mulc 1,1,1,0 -d half -o "$work/straight.exr"
-    notes "$work/straight.exr" "lit where alpha is 0"
+    notes "$work/straight.exr" "bright where alpha is 0"
     count "OpenEXR: straight alpha"
     oiiotool --pattern $smooth 50x40 4 --attrib Orientation 6 --attrib PixelAspectRatio 2.0 -d half -o "$work/turned.exr"
     notes "$work/turned.exr" "(OpenEXR's Orientation 6)" && notes "$work/turned.exr" "(pixelAspectRatio 2)"
@@ -190,7 +190,7 @@ END
     for codec in PIZ ZIP PXR24; do
         wanted "$work/blender_$codec.exr" ViewLayer.Combined.R,ViewLayer.Combined.G,ViewLayer.Combined.B,ViewLayer.Combined.A &&
             exr "$work/blender_$codec.exr" &&
-            notes "$work/blender_$codec.exr" "of 2 layers or parts with R, G, B: ViewLayer.Combined is taken"
+            notes "$work/blender_$codec.exr" "made of 2 layers or parts with R, G, B: ViewLayer.Combined is taken"
         count "Blender: $codec"
     done
 fi

@@ -1778,8 +1778,8 @@ static void test_marks(void) {
             encode(&rgba), insert_chunk(behind ? file_size - 12 : 33, "eXIf", exif[i], 26, 0);
             CHECK(photo_tells(
                 &rgba, 0,
-                i ? "is to be turned or mirrored for viewing (eXIf orientation 3): read as stored, and "
-                    "poses must be of that: " FOLDER "/g.png"
+                i ? "is to be turned or mirrored for viewing (eXIf orientation 3): read as stored, so "
+                    "cameras must be those of the stored picture: " FOLDER "/g.png"
                   : "viewing (eXIf orientation 6): read as stored"));
         }
     for (size_t size = 1; size < 26; size++) {
@@ -2416,7 +2416,7 @@ static int exr_straight(const exr *e) {
 
 /* Whether the notes are this, and what is said of straight alpha where that is so. */
 static int exr_noted(const exr *e, const char *note) {
-    const char *straight = strstr(set.notes, "1 of the 1 photographs is lit where alpha is 0");
+    const char *straight = strstr(set.notes, "1 of the 1 photographs is bright where alpha is 0");
     const size_t length = straight ? (size_t)(straight - set.notes) : strlen(set.notes);
     const int good = (straight != NULL) == exr_straight(e) &&
                      (!*note ? !length : strstr(set.notes, note) != NULL) &&
@@ -2800,22 +2800,22 @@ static void test_exr_layers(void) {
         {{"V.AO.B", "V.AO.G", "V.AO.R", "V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R", NULL},
          {1, 1, 1, 1, 1, 1, 1},
          "V.Combined.",
-         "is of 2 layers or parts with R, G, B: V.Combined is taken: build/t_olat_files/e.exr",
+         "is made of 2 layers or parts with R, G, B: V.Combined is taken: build/t_olat_files/e.exr",
          NULL},
         {{"B", "Combined.B", "Combined.G", "Combined.R", "G", "R", NULL},
          {1, 1, 1, 1, 1, 1},
          "Combined.",
-         "is of 2 layers or parts with R, G, B: Combined is taken",
+         "is made of 2 layers or parts with R, G, B: Combined is taken",
          NULL},
         {{"A.A", "A.B", "A.G", "A.R", "B", "G", "R", NULL},
          {1, 1, 1, 1, 1, 1, 1},
          "",
-         "is of 2 layers or parts with R, G, B: the one without a name is taken",
+         "is made of 2 layers or parts with R, G, B: the one without a name is taken",
          NULL},
         {{"N.B", "N.G", "N.R", "z.A", "z.B", "z.G", "z.R", NULL},
          {1, 1, 1, 1, 1, 1, 1},
          "z.",
-         "of 2 layers or parts with R, G, B: z is taken",
+         "made of 2 layers or parts with R, G, B: z is taken",
          NULL},
         {{"N.A", "N.B", "N.G", "N.R", "v.Beauty.B", "v.Beauty.G", "v.Beauty.R", NULL},
          {1, 1, 1, 1, 1, 1, 1},
@@ -2890,17 +2890,18 @@ static void test_exr_layers(void) {
         const char *names[3];
         int count, taken; /* taken: which of them; -1: refused with the note */
         const char *note;
-    } files[] = {{{0, 2}, {"depth", "rgba"}, 2, 1, ""},
-                 {{2, 0}, {"rgba", "depth"}, 2, 0, ""},
-                 {{1, 3}, {"first", "second"}, 2, 0, "of 2 layers or parts with R, G, B: first is taken"},
-                 {{1, 2}, {"normal", "other"}, 2, 1, "R, G, B: other is taken"},
-                 {{2, 3}, {"pass", "v.Combined"}, 2, 1, "R, G, B: v.Combined is taken"},
-                 {{2, 1}, {"pass", "RGBA"}, 2, 1, "R, G, B: RGBA is taken"},
-                 {{2, 0, 3}, {"deep", "depth", "rgb"}, 3, 2, ""},
-                 {{4, 0, 1}, {"grey", "depth", "rgb"}, 3, 2, ""},
-                 {{4, 0}, {"grey", "depth"}, 2, -1, "B44 compression cannot be read"},
-                 {{2, 0}, {"deep", "depth"}, 2, -1, "deep pixels cannot be read: flatten them"},
-                 {{0, 0}, {"depth", "more"}, 2, -1, "channels are missing: R, G, B; it has Z, Z:"}};
+    } files[] = {
+        {{0, 2}, {"depth", "rgba"}, 2, 1, ""},
+        {{2, 0}, {"rgba", "depth"}, 2, 0, ""},
+        {{1, 3}, {"first", "second"}, 2, 0, "made of 2 layers or parts with R, G, B: first is taken"},
+        {{1, 2}, {"normal", "other"}, 2, 1, "R, G, B: other is taken"},
+        {{2, 3}, {"pass", "v.Combined"}, 2, 1, "R, G, B: v.Combined is taken"},
+        {{2, 1}, {"pass", "RGBA"}, 2, 1, "R, G, B: RGBA is taken"},
+        {{2, 0, 3}, {"deep", "depth", "rgb"}, 3, 2, ""},
+        {{4, 0, 1}, {"grey", "depth", "rgb"}, 3, 2, ""},
+        {{4, 0}, {"grey", "depth"}, 2, -1, "B44 compression cannot be read"},
+        {{2, 0}, {"deep", "depth"}, 2, -1, "deep pixels cannot be read: flatten them"},
+        {{0, 0}, {"depth", "more"}, 2, -1, "channels are missing: R, G, B; it has Z, Z:"}};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         exr chosen[3];
         for (int k = 0; k < files[i].count; k++) chosen[k] = parts[files[i].parts[k]];
