@@ -2730,10 +2730,12 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__RANGE(origin[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     SSDGS__RANGE(origin[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     SSDGS__RANGE(origin[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    for (int i = 0; i < 3; i++) {
-        SSDGS__RANGE(placement.turn[i], -7, 7);
-        SSDGS__RANGE(placement.move[i], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    }
+    SSDGS__RANGE(placement.turn[0], -7, 7);
+    SSDGS__RANGE(placement.turn[1], -7, 7);
+    SSDGS__RANGE(placement.turn[2], -7, 7);
+    SSDGS__RANGE(placement.move[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    SSDGS__RANGE(placement.move[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    SSDGS__RANGE(placement.move[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
     SSDGS__RANGE(placement.scale, (ssdgs_real)-1e9, (ssdgs_real)1e9);
     if (s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: placement.scale = %g is too small",

@@ -211,7 +211,7 @@ check "relit near" says 0 "4 images" "$build/relight" "$out/near.ply" "$set" --o
 check "as good as at 0: $(psnr "$out/moved_relit") and $(psnr "$out/near_relit") dB" near "$(psnr "$out/moved_relit")" "$(psnr "$out/near_relit")" 0.3
 check "its refined lights are there" awk '/"pl_pos"/ { n++; gsub(/[^-0-9.e+ ]/, " "); if ($1 < 4999990 || $1 > 5000010 || $3 < 5999990) bad = 1 }
     END { exit bad || !n }' "$out/moved.ply.refined.json"
-check "its Gaussians are doubles" grep -aq "property double x" "$out/moved.ply"
+check "its Gaussians are floats" grep -aq "property float x" "$out/moved.ply"
 
 # the level: models that are given or made, frames that differ, nothing written where something is wrong
 engine() { "$build/engine" --frames 2 --size 96 54 --out "$out/level_" "$@"; }

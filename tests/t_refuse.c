@@ -49,7 +49,14 @@ static const field settings_fields[] = {
     R(centre[2], -1e30, 1e30),
     R(origin[0], -1e9, 1e9),
     R(origin[1], -1e9, 1e9),
-    R(origin[2], -1e9, 1e9)
+    R(origin[2], -1e9, 1e9),
+    R(placement.turn[0], -7, 7),
+    R(placement.turn[1], -7, 7),
+    R(placement.turn[2], -7, 7),
+    R(placement.move[0], -1e9, 1e9),
+    R(placement.move[1], -1e9, 1e9),
+    R(placement.move[2], -1e9, 1e9),
+    R(placement.scale, -1e9, 1e9)
 #undef I
 #undef R
 };
@@ -234,6 +241,13 @@ static const preset settings_presets[] = {/* default, published: all of them */
                                           R(origin[0], 0, 0),
                                           R(origin[1], 0, 0),
                                           R(origin[2], 0, 0),
+                                          R(placement.turn[0], 0, 0),
+                                          R(placement.turn[1], 0, 0),
+                                          R(placement.turn[2], 0, 0),
+                                          R(placement.scale, 1, 1),
+                                          R(placement.move[0], 0, 0),
+                                          R(placement.move[1], 0, 0),
+                                          R(placement.move[2], 0, 0),
                                           R(medium.scattering[0], 0, 0),
                                           R(medium.scattering[1], 0, 0),
                                           R(medium.scattering[2], 0, 0),
