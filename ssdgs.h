@@ -181,8 +181,8 @@ ssdgs.h DOES NOT
 
 CHANGES
   0.2.5  Directional lights shine along `direction`, as spots do: set it to -position. Opacity fades near
-         near_plane and beside wide pictures, where Gaussians popped. Models that went through an editor
-         come back (ssdgs_model_adopt(), settings.placement); positions in files are relative to
+         near_plane and beside wide pictures, where Gaussians popped, in PROJECT of GPU stages too. Models
+         that went through an editor come back (ssdgs_model_adopt(), settings.placement); positions in files are relative to
          settings.origin. What differs from a checkpoint's run is named, changed photographs too.
   0.2.4  Needles, thousands of pixels long, are drawn and trained as exactly as other Gaussians. For GPU
          stages: a record holds ux, uy, wy, no longer xx, xy, yy; gradients are summed in their terms.
@@ -436,8 +436,9 @@ SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3],
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor.
    What networks see does not turn: the Gaussians that both have, in any order, tell how the editor has
    turned, scaled and moved the model; it comes back to the original's place, and settings.placement says
-   where it is drawn. Notes tell that, or that no such place fits. ERR_ARGUMENT: one is baked, or a trainer
-   has the model. ERR_MEMORY. */
+   where it is drawn: after the place that it had before, or that the original has. Notes tell that, or that
+   no such place fits. ERR_ARGUMENT: one is baked, or a trainer has the model. ERR_MEMORY: nothing has
+   changed. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
