@@ -182,8 +182,9 @@ ssdgs.h DOES NOT
 CHANGES
   0.2.5  Directional lights shine along `direction`, as spots do: set it to -position. Opacity fades near
          near_plane and beside wide pictures, where Gaussians popped, in PROJECT of GPU stages too. Models
-         that went through an editor come back (ssdgs_model_adopt(), settings.placement); positions in files are relative to
-         settings.origin. What differs from a checkpoint's run is named, changed photographs too.
+         that went through an editor come back (ssdgs_model_adopt(), settings.placement); positions in files
+         are relative to settings.origin. What differs from a checkpoint's run is named, changed photographs
+         too.
   0.2.4  Needles, thousands of pixels long, are drawn and trained as exactly as other Gaussians. For GPU
          stages: a record holds ux, uy, wy, no longer xx, xy, yy; gradients are summed in their terms.
   0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
