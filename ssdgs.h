@@ -374,11 +374,11 @@ typedef struct ssdgs_settings {
     ssdgs_real light_scale;    /* factor from the dataset's intensities to the model's */
     ssdgs_real ambient[3];     /* RGB, 0 or more: even light that the photographs have besides their lights.
                                   Training and evaluation add it; renders do where options.ambient[0] is it */
-    ssdgs_real origin[3];      /* world: where the model's 0 lies; only programs use it, see CONVENTIONS */
+    ssdgs_real origin[3]; /* world: where the model's 0 lies. The library only stores it, see CONVENTIONS */
     struct {
         ssdgs_real turn[3], scale, move[3];
-    } placement; /* where an editor of splats has put the model, see ssdgs_model_adopt(): it is drawn at scale
-                    x turned point + move. turn: axis times radians. scale: 1; below 0 it mirrors, too */
+    } placement; /* where an editor of splats has put the model, see ssdgs_model_adopt(): its point p is drawn
+                    at scale x (p turned) + move. turn: axis x radians; scale: 1, below 0 it mirrors, too */
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
     } medium; /* of models made in code, where scattering.layers is 0 and transport 1: light travels in it by
@@ -435,11 +435,11 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
    0 0 0 where it has none. ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]);
 /* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor.
-   What networks see does not turn: the Gaussians that both have, in any order, tell how the editor has
-   turned, scaled and moved the model; it comes back to the original's place, and settings.placement says
-   where it is drawn: after the place that it had before, or that the original has. Notes tell that, or that
-   no such place fits. ERR_ARGUMENT: one is baked, or a trainer has the model. ERR_MEMORY: nothing has
-   changed. */
+   Networks know the model only where it was trained. So the Gaussians that both have, in any order, tell how
+   the editor has turned, scaled and moved it; the model's own come back to the original's places, and what
+   the editor did becomes part of settings.placement, with which the model is drawn. Notes tell that, or that
+   no rotation, scale and move fits. ERR_ARGUMENT: one is baked, or a trainer has the model. ERR_MEMORY:
+   nothing has changed. */
 SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
@@ -470,7 +470,7 @@ typedef struct ssdgs_camera {  /* a pinhole */
     int width, height;         /* px */
     ssdgs_real fx, fy, cx, cy; /* px; pixel centres at +0.5 */
     ssdgs_real view[12];       /* (3,4) row-major, world to camera: x right, y down, z forward */
-    ssdgs_real near_plane;     /* nearer is not drawn, and what lies within twice of it is faint; 0 = 0.02
+    ssdgs_real near_plane;     /* nearer is not drawn; what is nearer than twice as far is faint. 0 = 0.02
                                   length units (published: 0.01) */
 } ssdgs_camera;
 
@@ -598,8 +598,8 @@ typedef struct ssdgs_object {
                                   stays as it is. Geometric lobes take roughness whole. Read in the call.
                                   NULL: all do; NULL */
 } ssdgs_object;
-SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model); /* as it was trained, where
-                                                                    settings.placement says */
+/* A model as it was trained, where its settings.placement puts it. */
+SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model);
 
 /* A scene holds no objects: it keeps what its last frame found. Views of one frame share the lights' maps on
    one scene, which is best while lights or objects move; while they rest a scene for each view is faster. To
@@ -782,9 +782,9 @@ typedef int (*ssdgs_progress)(void *user, const ssdgs_train_stats *stats);
 
 /* Trains model on photos; the photo structs are copied. A model of 0 Gaussians starts from random points and
    gets light_scale, centre, length_unit and new networks; one that has Gaussians goes on (with
-   SSDGS_SCHEDULE_JOINT with all terms), and where settings.placement is set loses it. options NULL =
-   default. Once something else has moved the model's
-   Gaussians (ssdgs_model_sort(), another trainer) it neither steps, saves nor loads. */
+   SSDGS_SCHEDULE_JOINT with all terms) where it was trained: a settings.placement is dropped, with a note.
+   options NULL = default. Once something else has moved the model's Gaussians (ssdgs_model_sort(), another
+   trainer) it neither steps, saves nor loads. */
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out);
 SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer); /* NULL is fine */
@@ -902,9 +902,9 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    PROJECT  Raw scales and opacities are clamped to +-20. A Gaussian is drawn where its opacity reaches
    options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant between 0 and
    1e37, and its box reaches a pixel's centre. What is not finite is not drawn. In perspective its opacity is
-   first multiplied by min(1, z / near_plane - 1) (1 - d (1 - b^2)), with d = (variance along z / z^2 - 0.02)
-   / 0.04, within 0 .. 1, and b the product, for x and y, of (1 + e^2) / (1 + s^2): s = x / z, and e is s
-   within the picture's borders and -1 .. 1.
+   first multiplied by min(1, z / near_plane - 1) (1 - d (1 - b^2)). d is (variance along z / z^2 - 0.02) /
+   0.04, clamped to 0 .. 1. b is the product, for x and y, of (1 + e^2) / (1 + s^2): s is x / z, and e is s
+   clamped to the picture's borders, or to -1 .. 1 where these are narrower.
 
    SORT  By the depth's bits as whole numbers, ties by index.
 
@@ -1393,10 +1393,10 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__LOBE 11         /* rows: Q (6), normal (3), F0, how soft its shadow is */
 #define SSDGS__HIGHLIGHT_SUMS \
     (15 + 3 * SSDGS_ASG_COUNT) /* light, eye, rays x camera rays (9), log s with logit t, raw a */
-/* A Gaussian beside the picture that reaches far back along z would by its affine projection cover the
-   picture. So its opacity fades with its slopes x / z and y / z, from the picture's border on, or from this
-   slope where that is further: parts of pictures of 90 degrees agree. Whole where the variance along z is
-   below the second number times depth^2, all of it from the third on. */
+/* A Gaussian beside the picture that is deep, that reaches far along z, would by its affine projection cover
+   the picture. So its opacity fades with its slopes x / z and y / z: from the picture's border on, but not
+   below slopes of STEEP, so that parts of pictures of 90 degrees agree. It is not deep where its variance
+   along z is below BACK x z^2, and wholly so from FAR_BACK x z^2 on. */
 #define SSDGS__STEEP 1
 #define SSDGS__BACK 0.02
 #define SSDGS__FAR_BACK 0.06
@@ -3254,8 +3254,9 @@ static int ssdgs__off_compare(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* The similarity nearest to n pairs, sides +1 or, mirrored, -1 (Horn 1987: the rotation is the main
-   eigenvector of a symmetric 4 x 4 matrix); 0 where they tell none: all on a line, say. */
+/* The similarity nearest to n pairs; side: 1, or -1 for one that mirrors. Its quaternion is the eigenvector
+   of the largest eigenvalue of a symmetric 4 x 4 matrix (Horn 1987). 0 where the pairs tell none: all lie on
+   a line, say. */
 static int ssdgs__similarity_of(const ssdgs__pair_of_places *pairs, int n, double side,
                                 ssdgs__similarity *s) {
     double mean[2][3] = {{0, 0, 0}, {0, 0, 0}}, c[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, m[16], trace = 0;
@@ -3325,10 +3326,8 @@ static double ssdgs__similarity_fit(ssdgs__pair_of_places *pairs, int n, double 
     return sqrt(pairs[n / 2].off);
 }
 
-/* What no editor of splats changes of a Gaussian: the properties that are ours alone. */
-enum { SSDGS__OWN = SSDGS_DIFFUSE, SSDGS__OWN_COUNT = SSDGS_CHANNELS - SSDGS_DIFFUSE };
-
-/* As files have it. */
+/* What no editor of splats changes of a Gaussian are the properties that are ours alone: from SSDGS_DIFFUSE
+   on. One of them as files have it. */
 static uint32_t ssdgs__own_bits(const ssdgs_model *model, size_t i, size_t c) {
     const float value = (float)model->gaussians[c * model->capacity + i];
     uint32_t bits;
@@ -3338,7 +3337,7 @@ static uint32_t ssdgs__own_bits(const ssdgs_model *model, size_t i, size_t c) {
 
 static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
     uint64_t hash = 1;
-    for (size_t c = SSDGS__OWN; c < SSDGS_CHANNELS; c++) {
+    for (size_t c = SSDGS_DIFFUSE; c < SSDGS_CHANNELS; c++) {
         hash = (hash ^ ssdgs__own_bits(model, i, c)) * UINT64_C(0x9E3779B97F4A7C15);
         hash ^= hash >> 29;
     }
@@ -3346,12 +3345,12 @@ static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
 }
 
 static int ssdgs__own_same(const ssdgs_model *a, size_t i, const ssdgs_model *b, size_t j) {
-    size_t c = SSDGS__OWN;
+    size_t c = SSDGS_DIFFUSE;
     while (c < SSDGS_CHANNELS && ssdgs__own_bits(a, i, c) == ssdgs__own_bits(b, j, c)) c++;
     return c == SSDGS_CHANNELS;
 }
 
-/* The original's Gaussian that is Gaussian i; -1: none, or several. keys: sorted ones of the original. */
+/* Which of the original's Gaussians Gaussian i is; -1: none, or several. keys: the original's, sorted. */
 static int ssdgs__own_match(const ssdgs_model *model, size_t i, const ssdgs_model *original,
                             const uint64_t *keys) {
     const uint64_t key = ssdgs__own_key(model, i) >> 32;
@@ -3370,8 +3369,9 @@ static int ssdgs__own_match(const ssdgs_model *model, size_t i, const ssdgs_mode
     return found;
 }
 
-/* Brings Gaussian i back: what the original's, j, has become by the similarity, or was left as it is, becomes
-   the original's to the bit; anything else has been edited, and is turned back. j -1: not in the original. */
+/* Brings Gaussian i back. A place, rotation or size that is what the similarity makes of the original's, j,
+   or that the editor left as it was, becomes the original's to the bit; any other has been edited, and is
+   turned back. j -1: it is not in the original. */
 static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *original, int j,
                               const ssdgs__similarity *s, double tolerance) {
     ssdgs_real *g = model->gaussians + i;
@@ -3409,8 +3409,9 @@ static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *o
 
 static const ssdgs__similarity ssdgs__unmoved = {{1, 0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1, {0, 0, 0}};
 
-/* Places what stands by the settings after what an editor did to it. Of positions beside the origin that the
-   file lost, and in the world, it is what moves the model less. 0: no setting is as large. */
+/* Puts what an editor did, s, in front of the settings' placement. A file that lost its origin had positions
+   relative to it or in the world: that is taken which moves the model less. 0: the settings' ranges do not
+   hold the result. */
 static int ssdgs__place_after(ssdgs_settings *settings, const ssdgs__similarity *s, const double apart[3],
                               int lost, double tolerance) {
     double move2 = 0, other2 = 0, turn = 0, move[3], placed[3], q[4];
@@ -11567,13 +11568,7 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
     if (!shown) return SSDGS_ERR_MEMORY;
     int *refused = shown + photos;
     unsigned char *side = (unsigned char *)(refused + photos);
-    for (int i = 0; i < photos; i++) {
-        if (trainer->transparent[i] != 2) continue;
-        const ssdgs__silhouette s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
-        outlined++;
-        beside += s.outside > 0.1 * s.shown;
-    }
-    if (2 * beside > outlined) outlined = 0;
+    for (int i = 0; i < photos; i++) outlined += trainer->transparent[i] == 2;
     for (int place = 0; place < places && outlined >= 8; place++) {
         double u[3];
         ssdgs_real x[3];
@@ -11593,12 +11588,18 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
             refused[i] += side[i] == 2;
         }
     }
-    for (int i = photos - 1; i >= 0; i--) {
-        if (shown[i] < few || 3 * refused[i] <= shown[i]) continue;
-        trainer->transparent[i] = 1;
-        first = i;
-        wrong++;
+    for (int i = 0; i < photos; i++) {
+        refused[i] = shown[i] >= few && 3 * refused[i] > shown[i];
+        wrong += refused[i];
     }
+    for (int i = 0; i < photos && wrong; i++) {
+        if (trainer->transparent[i] != 2) continue;
+        const ssdgs__silhouette s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
+        beside += s.outside > 0.1 * s.shown;
+    }
+    if (2 * beside > outlined) wrong = 0;
+    for (int i = photos - 1; i >= 0 && wrong; i--)
+        if (refused[i]) trainer->transparent[i] = 1, first = i;
     if (wrong)
         ssdgs__note(
             trainer->context,
