@@ -96,7 +96,7 @@ test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.htm
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry
 	sh tests/gltf.sh $(BUILD)
 
-test-editors: $(BUILD)/relight ## models that went through an editor of splats, splat-transform; needs node, npm and its registry
+test-editors: $(BUILD)/relight $(BUILD)/export ## models that went through an editor of splats, splat-transform; needs node, npm and its registry
 	sh tests/editors.sh $(BUILD)
 
 test-images: $(BUILD)/pixels ## images that other programs wrote, beside what these make of them; leaves out what is missing

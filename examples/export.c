@@ -25,6 +25,8 @@ typedef struct exporter {
     ssdgs_context *context;
     ssdgs_model *model;
     ssdgs_light light;
+    ssdgs_object object; /* where the model stands: an editor may have moved it .. */
+    float turn[4];       /* .. and turned it, a quaternion */
     float middle[3], radius;
     int keep; /* 1: the dataset's places and axes */
     int count;
@@ -88,25 +90,27 @@ static ssdgs_camera camera_at(const exporter *e, int i, int many, int side) {
     return ssdgs_camera_look_at(eye, e->middle, up, 0.7f, side, side);
 }
 
-/* Puts a splat and its normal where the model stands, which an editor may have moved: settings.placement. */
+/* Turns a quaternion by another. */
+static void turn_by(const float p[4], float q[4]) {
+    const float was[4] = {q[0], q[1], q[2], q[3]};
+    q[0] = p[0] * was[0] - p[1] * was[1] - p[2] * was[2] - p[3] * was[3];
+    for (int c = 1; c < 4; c++) {
+        const int a = c % 3 + 1, b = (c + 1) % 3 + 1;
+        q[c] = p[0] * was[c] + p[c] * was[0] + p[a] * was[b] - p[b] * was[a];
+    }
+}
+
+/* Puts a splat and its normal where the model stands. */
 static void put_in_place(const exporter *e, splat *s, float normal[3]) {
-    const ssdgs_settings *settings = ssdgs_model_settings(e->model);
-    const ssdgs_object object = ssdgs_object_default(e->model);
-    const float *turn = settings->placement.turn, *m = object.to_world,
-                size = fabsf(settings->placement.scale);
-    const float angle = sqrtf(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
-    const float along = angle > 0 ? sinf(angle / 2) / angle : 0;
-    const float p[4] = {cosf(angle / 2), along * turn[0], along * turn[1], along * turn[2]};
-    const splat own = *s;
-    const float *q = own.rotation, n[3] = {normal[0], normal[1], normal[2]};
-    s->rotation[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];
+    const float x[3] = {s->position[0], s->position[1], s->position[2]},
+                n[3] = {normal[0], normal[1], normal[2]};
+    const float size = fabsf(ssdgs_model_settings(e->model)->placement.scale);
+    turn_by(e->turn, s->rotation);
     for (int c = 0; c < 3; c++) {
-        const int a = (c + 1) % 3, b = (c + 2) % 3;
-        s->rotation[1 + c] = p[0] * q[1 + c] + p[1 + c] * q[0] + p[1 + a] * q[1 + b] - p[1 + b] * q[1 + a];
+        const float *m = e->object.to_world + 4 * c;
+        s->position[c] = m[0] * x[0] + m[1] * x[1] + m[2] * x[2] + m[3];
+        normal[c] = (m[0] * n[0] + m[1] * n[1] + m[2] * n[2]) / size;
         s->scale[c] *= size;
-        s->position[c] = m[4 * c] * own.position[0] + m[4 * c + 1] * own.position[1] +
-                         m[4 * c + 2] * own.position[2] + m[4 * c + 3];
-        normal[c] = (m[4 * c] * n[0] + m[4 * c + 1] * n[1] + m[4 * c + 2] * n[2]) / size;
     }
 }
 
@@ -152,15 +156,14 @@ static int is_turned(const exporter *e, int file) { return file != GLB && !e->ke
 
 /* A splat as a file has it: seen from the model's middle. */
 static splat placed(const exporter *e, const splat *s, int file) {
-    const float *q = s->rotation, half = 0.70710678f;
+    static const float quarter[4] = {0.70710678f, 0.70710678f, 0, 0}; /* a turn about x */
     splat p = *s;
     for (int c = 0; c < 3 && !e->keep; c++) p.position[c] -= e->middle[c];
-    if (is_turned(e, file)) { /* a quarter turn about x */
-        const float y = p.position[1], turned[4] = {half * (q[0] - q[1]), half * (q[1] + q[0]),
-                                                    half * (q[2] - q[3]), half * (q[3] + q[2])};
+    if (is_turned(e, file)) {
+        const float y = p.position[1];
         p.position[1] = -p.position[2];
         p.position[2] = y;
-        memcpy(p.rotation, turned, sizeof turned);
+        turn_by(quarter, p.rotation);
     }
     return p;
 }
@@ -460,8 +463,12 @@ static ssdgs_result look(exporter *e, const double *from, char *error) {
     const ssdgs_settings *settings = ssdgs_model_settings(e->model);
     float low[3], high[3], distance2 = 0;
     const float direction[3] = {-0.5f, -0.7f, 0.5f};
-    const ssdgs_object placed = ssdgs_object_default(e->model);
-    const ssdgs_result result = olat_bounds(&placed, low, high);
+    const float *turn = settings->placement.turn,
+                angle = sqrtf(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+    e->object = ssdgs_object_default(e->model);
+    e->turn[0] = cosf(angle / 2);
+    for (int c = 0; c < 3; c++) e->turn[1 + c] = angle > 0 ? sinf(angle / 2) * turn[c] / angle : 0;
+    const ssdgs_result result = olat_bounds(&e->object, low, high);
     for (int c = 0; c < 3 && !result; c++) {
         e->middle[c] = (low[c] + high[c]) / 2;
         e->radius = fmaxf(e->radius, (high[c] - low[c]) / 2);

@@ -86,6 +86,9 @@ as_good "$whole" -r 30,40,50
 in_one_file() { "$build/relight" "$work/relit/whole.ply" "$work/set" --split test --background black --out "$work/one" >"$work/log" 2>&1; }
 check "the turned model in one file" in_one_file
 check "the same picture of it" cmp "$work/relit/r_000.png" "$work/one/r_000.png"
+exported() { "$build/export" "$1" "$work/exported" >"$work/log" 2>&1 && sed -n 's/^.*exported.ply: .* \([0-9.]*\) dB without its highlights$/\1/p' "$work/log"; }
+check "exported as it stands: $(exported "$work/relit/whole.ply") and $(exported "$model") dB" \
+    awk -v a="$(exported "$work/relit/whole.ply")" -v b="$(exported "$model")" 'BEGIN { exit !(a > 35 && a > b - 2) }'
 as_good "$whole" -r 0,0,180
 as_good "$whole" -t 0.5,0,0
 as_good "$whole" -t 100,-200,300
