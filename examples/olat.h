@@ -3258,7 +3258,8 @@ static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dat
     if (!r.found || !r.waits) j->failed = olat__fail(j->error, "out of memory");
     for (int i = 0; i < out->count; i++) seen.masks += out->frames[i].mask != NULL;
     olat__read_all(j, reader, out, &r, &seen);
-    const int labels = seen.number > 0 && seen.number<16, dim = seen.largest> 0 && seen.largest <= 0.6;
+    const int dim = seen.largest > 0 && seen.largest <= 0.6;
+    const int labels = seen.number > 0 && seen.number <= 15;
     r.white = labels ? 1e-12 : dim ? seen.largest : 1;
     if (seen.masks) olat__read_all(j, reader, out, &r, &seen);
     free(r.found);

@@ -638,9 +638,9 @@ static int train(job *j) {
     j->photos = olat_photos(&j->train_set);
     if (j->train_set.count < 40 && j->options.iterations > 300 * j->train_set.count)
         fprintf(stderr,
-                "train: note: %d iterations learn %d photographs by heart, while other views and lights gain "
-                "nothing: "
-                "try --iterations %d, or take more photographs\n",
+                "train: note: %d iterations are many for %d photographs: these may be learnt by heart while "
+                "other "
+                "views and lights gain nothing. Try --iterations %d, or take more photographs\n",
                 j->options.iterations, j->train_set.count, 100 * j->train_set.count);
     if (!j->photos || judge_capture(&j->train_set, &j->options, &j->desc.logger))
         return fail("out of memory");

@@ -153,6 +153,9 @@ cp "$set/$(sed -n 's|.*"file_path": "\./\(.*\)",|\1.png|p' "$set/transforms_trai
 check "with a photograph changed" says 1 "photograph 2 has other pixels than in its run: .*(photograph 2 is $set/\(\./\)\?$file)" train --checkpoint-every 30 --resume
 cp "$out/kept.png" "$set/$file"
 check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
+check "many iterations" says 1 "note: 3601 iterations are many for 12 photographs: .* Try --iterations 1200" train -o "$out/none.ply" --iterations 3601 --resume
+check "not too many" says 1 "none.ply.ckpt: cannot be opened" train -o "$out/none.ply" --iterations 3600 --resume
+check "which are not told" lacks "iterations are many"
 echo "somebody's notes" >"$out/notes.ply.ckpt"
 check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1
 check "it stays" grep -q somebody "$out/notes.ply.ckpt"
