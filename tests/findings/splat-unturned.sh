@@ -4,28 +4,11 @@
 # turns such a splat by 0.8 degrees. @sparkjsdev/spark 2.2.0 does not normalise 0.992, takes its arc cosine, and turns it by 14 degrees
 # around z. gsplat 1.2.9 keeps (0.992, 0, 0, 0). The bytes are so few that one would guess all readers agree, and that no turn is no turn in
 # each.
-set -eu
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-trap 'exit 2' HUP INT TERM
-for need in node npm; do command -v $need >/dev/null || { echo "apt-get install $need is needed"; exit 2; }; done
-echo "node $(node --version); @playcanvas/splat-transform@3.7.0 @sparkjsdev/spark@2.2.0 three@0.187.0 gsplat@1.2.9"
-npm install --silent --no-audit --no-fund --ignore-scripts --prefix "$work" @playcanvas/splat-transform@3.7.0 @sparkjsdev/spark@2.2.0 three@0.187.0 gsplat@1.2.9 >"$work/log" 2>&1 || { cat "$work/log"; echo "npm has none of these"; exit 2; }
-cd "$work"
-cat >see.mjs <<'END'
-import { spawnSync } from 'node:child_process';
+. "$(dirname "$0")/lib.sh"
+packages @playcanvas/splat-transform@3.7.0 @sparkjsdev/spark@2.2.0 three@0.187.0 gsplat@1.2.9
+node --input-type=module - <<'END'
 import fs from 'node:fs';
-const names = 'x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3'.split(' ');
-const splat = {x: 1, y: 2, z: 3, f_dc_0: 0.5, f_dc_1: 0.25, f_dc_2: 0.125, opacity: 1, scale_0: -3, scale_1: -4, scale_2: -5, rot_0: 1, rot_1: 0, rot_2: 0, rot_3: 0};
-const floats = values => Buffer.from(new Float32Array(values).buffer);
-const read = file => { // the rows of a PLY of nothing but floats
-    const bytes = fs.readFileSync(file), at = bytes.indexOf('end_header\n') + 11, header = bytes.toString('latin1', 0, at);
-    if (!header.includes('format binary_little_endian 1.0')) throw 'it wrote another format';
-    const found = [...header.matchAll(/property float (\w+)/g)].map(m => m[1]);
-    return {header, splats: Array.from({length: +header.match(/element vertex (\d+)/)[1]}, (_, i) =>
-        Object.fromEntries(found.map((n, c) => [n, bytes.readFloatLE(at + 4 * (found.length * i + c))])))};
-};
-const tool = (...words) => spawnSync('node_modules/.bin/splat-transform', ['-q', '-w', ...words], {encoding: 'utf8'});
+import { floats, read, transform } from './files.mjs';
 // spark reads in a Worker: node has none of that name, so its code runs here
 globalThis.window ??= globalThis;
 globalThis.document ??= {createElement: () => ({}), createElementNS: () => ({style: {}})};
@@ -42,8 +25,8 @@ globalThis.Worker = class {
 setTimeout(() => { console.log('spark does not answer'); process.exit(2); }, 30000);
 const bytes = Buffer.concat([floats([1, 2, 3, 0.1, 0.2, 0.3]), Buffer.from([255, 128, 0, 255, 255, 128, 128, 128])]);
 fs.writeFileSync('in.splat', bytes);
-if (tool('in.splat', 'out.ply').status) throw 'it failed';
-const s = read('out.ply').splats[0], seen = {'splat-transform': [s.rot_0, s.rot_1, s.rot_2, s.rot_3]}; // w x y z
+transform('in.splat', 'out.ply');
+const [s] = read('out.ply'), seen = {'splat-transform': [s.rot_0, s.rot_1, s.rot_2, s.rot_3]}; // w x y z
 const spark = await import('@sparkjsdev/spark'), splats = new spark.ExtSplats({fileBytes: new Uint8Array(bytes), fileType: spark.SplatFileType.SPLAT});
 await splats.initialized;
 splats.forEachSplat((i, center, scales, q) => seen.spark = [q.w, q.x, q.y, q.z]);
@@ -53,4 +36,3 @@ for (const n in seen) console.log(n, seen[n], 'turned by', turn(seen[n]).toFixed
 const near = (a, b) => Math.abs(a - b) < 0.1;
 process.exit(near(turn(seen['splat-transform']), 0.78) && near(turn(seen.spark), 14.33) && seen.gsplat[0] === 127 / 128 && turn(seen.gsplat) === 0 ? 0 : 1);
 END
-node see.mjs
