@@ -941,7 +941,8 @@ static void test_few_placed(void) {
         if (k == 5) original->count = 6;
         for (int i = 0; i < 2 * DRAWN && k == 16; i++) /* on a line: which way round it is turned */
             original->gaussians[(size_t)(1 + i % 2) * original->capacity + (size_t)(i / 2)] = 0;
-        for (size_t c = SSDGS__OWN; c < SSDGS_CHANNELS && k == 17; c++) /* most are alike: which is which? */
+        for (size_t c = SSDGS_DIFFUSE; c < SSDGS_CHANNELS && k == 17;
+             c++) /* most are alike: which is which? */
             for (int i = 0; i < DRAWN * 5 / 6; i++)
                 original->gaussians[c * original->capacity + (size_t)i] = 0;
         bytes file = saved(original);
