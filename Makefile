@@ -131,8 +131,8 @@ test-c99: ## tests with -std=c99
 test-matrix: ## tests with every compiler and machine at hand (hours); others are named
 	sh tests/matrix.sh $(BUILD)
 
-hashes: $(BUILD)/hashes $(BUILD)/hashes_64 ## bits of training and renders: the same before and after code is moved
-	@$(BUILD)/hashes; $(BUILD)/hashes_64
+hashes: $(BUILD)/hashes $(BUILD)/hashes_64 ## bits of training, frames and files: the same before and after code is moved
+	@$(BUILD)/hashes $(BUILD); $(BUILD)/hashes_64 $(BUILD)
 
 size: ## what including ssdgs.h costs: seconds of compiling and bytes of code
 	bash tests/size.sh $(BUILD)
