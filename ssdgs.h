@@ -149,7 +149,7 @@ SCENES, as engines have them: examples/engine.c is one
   lights behind it in the array are: let lights that flicker be last. Lights without shadow have no map.
   Lights and ambient light are multiplied by each model's own settings.light_scale. Where models differ in
   it, tints make up for it.
-  options.ambient is light from all around; ssdgs_environment() makes lights of an environment map.
+  options.ambient is light from all around; examples/sky.h makes lights of an environment map.
   An object says how rough, bright and translucent its model is here. In models made in code
   settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: a ball of
   wax has 28 dB beside path tracing, 22 lit from the side; balls of metal of roughness 0.15, 0.3 and 0.6
@@ -158,7 +158,7 @@ SCENES, as engines have them: examples/engine.c is one
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with the
-  number of Gaussians: ssdgs_model_reduce() makes levels of detail, for what is far away or must be quick.
+  number of Gaussians: examples/reduce.h makes levels of detail, for what is far away or must be quick.
   Left out without changing a bit: what no pixel blends, neurons that are 0 for 64 neighbours, terms nobody
   asked for, and what the last frame found.
 
@@ -201,7 +201,7 @@ CONTENTS, search for the tag
   >>project >>shadow >>transport     splats and tiles; visibility from the lights; dipole transport
   >>shade >>composite >>render       colour of the Gaussians seen; blending, highlights; stages in order
   >>scene >>loss >>ply               placed models; loss and metrics; model files
-  >>trainer >>density >>reduce       one photograph and Adam; clone, split, prune; merge: levels of detail
+  >>trainer >>density                one photograph and Adam; clone, split, prune
   >>steps >>checkpoint               the trainer's public functions; a run's whole state
   >>kernels >>vmath >>*_kernel       vector macros, elementary functions, the kernels */
 
@@ -640,18 +640,6 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
 
-/* An environment map, (height,width,3) linear radiance, as lights. Its first row lies around the z axis, its
-   first column at the x axis, from where columns go towards y: to_world (3,3), row-major, turns it, a
-   rotation or reflection; NULL = as it is. lights (light_count) become directional ones, each for a part of
-   the sky; ambient may be options.ambient or NULL. With both, ambient takes of each pixel what is below twice
-   the sky's mean, the lights take the rest. Beside 256 lights, pictures of two trained models had 32 and 25
-   dB with ambient alone, 33 and 27 under 4 lights, 40 and 34 under 16, 48 and 40 under 64; 34 and 27 under 2
-   lights with ambient. Takes two seconds for 2048 x 1024 pixels and 64 lights. ERR_ARGUMENT,
-   ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_real *pixels, int width,
-                                         int height, const ssdgs_real *to_world, ssdgs_light *lights,
-                                         int light_count, ssdgs_real ambient[9][3]);
-
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 /* Clamps, encodes by transfer and rounds (count) values to bytes, at most one level off. */
@@ -798,12 +786,6 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
 /* Camera and light of photograph `index` as refined so far. */
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
                                              ssdgs_light *light);
-
-/* Makes a level of detail: merges neighbours, those least missed first, until `count` Gaussians are left.
-   Needs no photographs. Indices change. A second for 30,000; save the result. Where the model has fewer it
-   stays. With photographs 1,000 more iterations win back what was lost (examples/train.c, --refit).
-   ERR_ARGUMENT: count < 1, or a trainer has the model. ERR_MEMORY. */
-SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count);
 
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
@@ -8036,7 +8018,7 @@ SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *came
 
 /* ==== >>scene  placed models in one frame, shadows asked for and given ==== */
 
-/* Frames of ssdgs_object, what comes of ambient light to each Gaussian, and lights of environment maps.
+/* Frames of ssdgs_object, and what comes of ambient light to each Gaussian.
    Placing objects is in >>frame, their maps in >>shadow. */
 
 SSDGS__SMALL_BEGIN
@@ -8266,201 +8248,6 @@ static ssdgs_result ssdgs__expose(ssdgs_placed *o) {
     const ssdgs_result result = ssdgs__expose_model(model, model->exposure_room, model->exposure);
     if (!result) model->exposure_revision = model->revision;
     return result;
-}
-
-/* A part of an environment map: columns and rows, its light, and that times its directions. */
-typedef struct ssdgs__sky {
-    int left, top, right, bottom;
-    double light, along[3], spread; /* spread: how much its directions differ, weighed by their light */
-} ssdgs__sky;
-
-typedef struct ssdgs__environment {
-    const ssdgs_real *pixels;
-    int width, height;
-    double ceiling; /* luminance up to it is ambient's; 0: none */
-} ssdgs__environment;
-
-static double ssdgs__luminance(const ssdgs_real *rgb) {
-    return 0.2126 * (double)rgb[0] + 0.7152 * (double)rgb[1] + 0.0722 * (double)rgb[2];
-}
-
-/* A pixel's direction; returns how much of the sphere it is. */
-static double ssdgs__sky_pixel(const ssdgs__environment *e, int x, int y, double direction[3]) {
-    const double pi = 3.14159265358979323846, top = cos(pi * y / e->height),
-                 bottom = cos(pi * (y + 1) / e->height);
-    const double z = 0.5 * (top + bottom), across = sqrt(1 - z * z), turn = 2 * pi * (x + 0.5) / e->width;
-    direction[0] = across * cos(turn);
-    direction[1] = across * sin(turn);
-    direction[2] = z;
-    return 2 * pi / e->width * (top - bottom);
-}
-
-/* What of a pixel's light is not ambient's. */
-static double ssdgs__sky_share(const ssdgs__environment *e, const ssdgs_real *rgb) {
-    const double luminance = ssdgs__luminance(rgb);
-    return e->ceiling > 0 ? luminance > e->ceiling ? 1 - e->ceiling / luminance : 0 : 1;
-}
-
-static void ssdgs__sky_sums(ssdgs__sky *sky) {
-    const double along2 =
-        sky->along[0] * sky->along[0] + sky->along[1] * sky->along[1] + sky->along[2] * sky->along[2];
-    sky->spread = sky->light > 0 ? sky->light - along2 / sky->light : 0;
-}
-
-/* Adds the pixels of a box to a part. */
-static void ssdgs__sky_add(const ssdgs__environment *e, ssdgs__sky *sky, int left, int top, int right,
-                           int bottom) {
-    for (int y = top; y < bottom; y++)
-        for (int x = left; x < right; x++) {
-            double direction[3];
-            const ssdgs_real *rgb = e->pixels + 3 * ((size_t)y * (size_t)e->width + (size_t)x);
-            const double light =
-                ssdgs__sky_pixel(e, x, y, direction) * ssdgs__luminance(rgb) * ssdgs__sky_share(e, rgb);
-            sky->light += light;
-            for (int c = 0; c < 3; c++) sky->along[c] += light * direction[c];
-        }
-    ssdgs__sky_sums(sky);
-}
-
-/* Cuts a part in two where the directions of each half differ least. 0: it is one pixel, or dark. */
-static int ssdgs__sky_cut(const ssdgs__environment *e, ssdgs__sky *sky, ssdgs__sky *other) {
-    ssdgs__sky best[2] = {*sky, *sky};
-    double least = sky->spread;
-    int found = 0;
-    for (int axis = 0; axis < 2; axis++) {
-        ssdgs__sky part[2] = {*sky, *sky};
-        part[0].light = part[0].along[0] = part[0].along[1] = part[0].along[2] = 0;
-        const int begin = axis ? sky->top : sky->left, end = axis ? sky->bottom : sky->right;
-        for (int at = begin; at + 1 < end; at++) {
-            if (axis) ssdgs__sky_add(e, part, sky->left, at, sky->right, at + 1);
-            else ssdgs__sky_add(e, part, at, sky->top, at + 1, sky->bottom);
-            part[1].light = sky->light - part[0].light;
-            for (int c = 0; c < 3; c++) part[1].along[c] = sky->along[c] - part[0].along[c];
-            ssdgs__sky_sums(part + 1);
-            if (!(part[0].spread + part[1].spread < least)) continue;
-            least = part[0].spread + part[1].spread;
-            found = 1;
-            best[0] = part[0];
-            best[1] = part[1];
-            if (axis) best[0].bottom = best[1].top = at + 1;
-            else best[0].right = best[1].left = at + 1;
-        }
-    }
-    if (!found) return 0;
-    *sky = best[0];
-    *other = best[1];
-    return 1;
-}
-
-/* A part as a directional light. */
-static ssdgs_light ssdgs__sky_light(const ssdgs__environment *e, const ssdgs__sky *sky,
-                                    const ssdgs_real *to_world) {
-    ssdgs_light light;
-    double sum[3] = {0, 0, 0}, length2 = 0;
-    memset(&light, 0, sizeof light);
-    light.kind = SSDGS_LIGHT_DIRECTIONAL;
-    for (int y = sky->top; y < sky->bottom; y++)
-        for (int x = sky->left; x < sky->right; x++) {
-            double direction[3];
-            const ssdgs_real *rgb = e->pixels + 3 * ((size_t)y * (size_t)e->width + (size_t)x);
-            const double share = ssdgs__sky_pixel(e, x, y, direction) * ssdgs__sky_share(e, rgb);
-            for (int c = 0; c < 3; c++) sum[c] += share * (double)rgb[c];
-        }
-    for (int c = 0; c < 3; c++) length2 += sky->along[c] * sky->along[c];
-    for (int c = 0; c < 3; c++) {
-        double to = 0;
-        for (int i = 0; i < 3; i++)
-            to += (length2 > 0 ? sky->along[i] / sqrt(length2) : (double)(i == 2)) *
-                  (double)(to_world ? to_world[3 * c + i] : (ssdgs_real)(c == i));
-        light.direction[c] = (ssdgs_real)-to;
-        light.intensity[c] = (ssdgs_real)sum[c];
-    }
-    return light;
-}
-
-/* Irradiance in nine terms: Ramamoorthi and Hanrahan 2001. */
-static void ssdgs__sky_ambient(const ssdgs__environment *e, const ssdgs_real *to_world,
-                               ssdgs_real ambient[9][3]) {
-    static const double factor[9] = {0.25, 0.5, 0.5, 0.5, 0.9375, 0.9375, 0.078125, 0.9375, 0.234375};
-    double sums[9][3];
-    memset(sums, 0, sizeof sums);
-    for (int y = 0; y < e->height; y++)
-        for (int x = 0; x < e->width; x++) {
-            double d[3], w[3];
-            const ssdgs_real *rgb = e->pixels + 3 * ((size_t)y * (size_t)e->width + (size_t)x);
-            const double share =
-                ssdgs__sky_pixel(e, x, y, d) * (e->ceiling > 0 ? 1 - ssdgs__sky_share(e, rgb) : 1);
-            for (int c = 0; c < 3; c++)
-                w[c] = to_world ? (double)to_world[3 * c] * d[0] + (double)to_world[3 * c + 1] * d[1] +
-                                      (double)to_world[3 * c + 2] * d[2]
-                                : d[c];
-            const double term[9] = {1,
-                                    w[1],
-                                    w[2],
-                                    w[0],
-                                    w[0] * w[1],
-                                    w[1] * w[2],
-                                    3 * w[2] * w[2] - 1,
-                                    w[0] * w[2],
-                                    w[0] * w[0] - w[1] * w[1]};
-            for (int i = 0; i < 27; i++)
-                sums[i / 3][i % 3] += share * factor[i / 3] * term[i / 3] * (double)rgb[i % 3];
-        }
-    for (int i = 0; i < 27; i++) ambient[i / 3][i % 3] = (ssdgs_real)sums[i / 3][i % 3];
-}
-
-static ssdgs_result ssdgs__environment_split(ssdgs_context *context, ssdgs__environment *e,
-                                             const ssdgs_real *to_world, ssdgs_light *lights, int light_count,
-                                             ssdgs_real (*ambient)[3]) {
-    double mean = 0, direction[3];
-    const size_t pixels = (size_t)e->width * (size_t)e->height;
-    for (size_t i = 0; i < 3 * pixels; i++)
-        if (!(e->pixels[i] >= 0) || !ssdgs__finite(e->pixels[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "environment: value %z is negative or not finite",
-                               i);
-    for (int i = 0; ambient && light_count && i < (int)pixels; i++)
-        mean += ssdgs__sky_pixel(e, i % e->width, i / e->width, direction) *
-                ssdgs__luminance(e->pixels + 3 * (size_t)i) / 12.566370614359172;
-    e->ceiling = 2 * mean;
-    if (ambient) ssdgs__sky_ambient(e, to_world, ambient);
-    if (!light_count) return SSDGS_OK;
-    ssdgs__sky *parts = (ssdgs__sky *)ssdgs__allocate(context, (size_t)light_count * sizeof *parts);
-    if (!parts) return SSDGS_ERR_MEMORY;
-    parts->right = e->width;
-    parts->bottom = e->height;
-    ssdgs__sky_add(e, parts, 0, 0, e->width, e->height);
-    for (int count = 1, widest = 0; count < light_count; count++, widest = 0) {
-        for (int i = 1; i < count; i++)
-            if (parts[i].spread > parts[widest].spread) widest = i;
-        if (!ssdgs__sky_cut(e, parts + widest, parts + count)) break;
-    }
-    for (int i = 0; i < light_count; i++) lights[i] = ssdgs__sky_light(e, parts + i, to_world);
-    ssdgs__release(context, parts);
-    return SSDGS_OK;
-}
-
-SSDGS_API ssdgs_result ssdgs_environment(ssdgs_context *context, const ssdgs_real *pixels, int width,
-                                         int height, const ssdgs_real *to_world, ssdgs_light *lights,
-                                         int light_count, ssdgs_real ambient[9][3]) {
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_environment");
-    if (result) return result;
-    ssdgs__environment e;
-    memset(&e, 0, sizeof e);
-    e.pixels = pixels;
-    e.width = width;
-    e.height = height;
-    if (!pixels) result = ssdgs__null(context, "ssdgs_environment", "pixels");
-    else if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "environment: %d x %d pixels", width, height);
-    else if (light_count < 0 || light_count > 65536 || (light_count && !lights))
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                             light_count < 0 || light_count > 65536
-                                 ? "environment: %d lights, not 0 to 65536"
-                                 : "environment: %d lights, but the array is NULL",
-                             light_count);
-    else result = ssdgs__environment_split(context, &e, to_world, lights, light_count, ambient);
-    return ssdgs__leave(context, result);
 }
 
 static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
@@ -11161,290 +10948,6 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
         sums[trainer->stride + g] += 1;
         sums[2 * trainer->stride + g] += d[6];
     }
-}
-
-/* ==== >>reduce  fewer Gaussians: levels of detail ==== */
-
-/* Reads a model's Gaussians and how much of each is seen from around. Merges neighbours, those first that are
-   least missed. Public: ssdgs_model_reduce(). */
-
-#define SSDGS__REDUCE_LEAF 16      /* neighbours among which partners are found, at most */
-#define SSDGS__REDUCE_VIEWS 8      /* directions that tell what is seen */
-#define SSDGS__REDUCE_STEP 8       /* a round removes one Gaussian of so many at most; then new partners */
-#define SSDGS__REDUCE_UNSEEN 1e-3  /* a hidden Gaussian counts as if this share of it were seen */
-#define SSDGS__REDUCE_OPAQUE 0.999 /* no merged Gaussian has more opacity */
-#define SSDGS__REDUCE_NEVER (ssdgs_real)1e30 /* the cost of a pair with values that are not finite */
-
-/* What merging reads of a Gaussian. */
-typedef struct ssdgs__blob {
-    double position[3], covariance[9], log_determinant; /* world; of the covariance */
-    double seen, share;         /* of its opacity x area: what is seen from around, on average */
-    double normal[3], color[9]; /* c_d, c_s, c_sss */
-} ssdgs__blob;
-
-typedef struct ssdgs__pair {
-    ssdgs_real cost;
-    uint32_t kept, gone; /* the first becomes both */
-} ssdgs__pair;
-
-typedef struct ssdgs__reduce_job {
-    const ssdgs_model *model;
-    const ssdgs_real *seen;
-    int offset;         /* of the leaves */
-    ssdgs__pair *pairs; /* (leaves, SSDGS__REDUCE_LEAF / 2) unused ones cost more than any other */
-} ssdgs__reduce_job;
-
-/* About proportional to an ellipsoid's surface, so to the mean area of its shadows. */
-static double ssdgs__blob_area(const double scale[3]) {
-    return scale[0] * scale[1] + scale[1] * scale[2] + scale[2] * scale[0];
-}
-
-static void ssdgs__blob_load(const ssdgs_model *model, size_t index, double seen, ssdgs__blob *b) {
-    ssdgs_gaussian g;
-    ssdgs__gaussian_load(&g, 0, model->gaussians + index, model->capacity); /* c_s, not its lobe's height */
-    ssdgs_real q[4], r[9];
-    ssdgs__rotation_scalar(g.rotation, q, r);
-    double scale[3];
-    b->log_determinant = 0;
-    for (int c = 0; c < 3; c++) {
-        b->position[c] = (double)g.position[c];
-        b->normal[c] = (double)g.normal[c];
-        b->color[c] = (double)g.diffuse[c];
-        b->color[3 + c] = (double)g.specular[c];
-        b->color[6 + c] = (double)g.scattering[c];
-        scale[c] = (double)g.scale[c];
-        b->log_determinant += 2 * log(scale[c]);
-    }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double sum = 0;
-            for (int c = 0; c < 3; c++)
-                sum += (double)r[3 * i + c] * (double)r[3 * j + c] * scale[c] * scale[c];
-            b->covariance[3 * i + j] = sum;
-        }
-    const double mass = (double)g.opacity * ssdgs__blob_area(scale);
-    b->share = SSDGS__REDUCE_UNSEEN + (mass > 0 ? seen / mass : 0);
-    b->seen = b->share * mass;
-}
-
-/* The cost of merging two: how far apart they are in place and shape (the Bhattacharyya distance, but shapes
-   count half), normal and colour, times the lesser one's seen amount. */
-static double ssdgs__merge_cost(const ssdgs__blob *a, const ssdgs__blob *b) {
-    double s[9], d[3], adjugate[9], away = 0, other = 0;
-    for (int i = 0; i < 9; i++) s[i] = a->covariance[i] + b->covariance[i];
-    for (int i = 0; i < 3; i++) {
-        const int i1 = 3 * ((i + 1) % 3), i2 = 3 * ((i + 2) % 3);
-        d[i] = a->position[i] - b->position[i];
-        other += (a->normal[i] - b->normal[i]) * (a->normal[i] - b->normal[i]);
-        for (int j = 0; j < 3; j++) {
-            const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            adjugate[3 * i + j] = s[i1 + j1] * s[i2 + j2] - s[i1 + j2] * s[i2 + j1];
-        }
-    }
-    for (int i = 0; i < 9; i++) other += (a->color[i] - b->color[i]) * (a->color[i] - b->color[i]);
-    const double determinant = s[0] * adjugate[0] + s[1] * adjugate[1] + s[2] * adjugate[2];
-    for (int i = 0; i < 9; i++) away += d[i / 3] * adjugate[i] * d[i % 3] / determinant;
-    const double shape = log(determinant / 8) - 0.5 * (a->log_determinant + b->log_determinant);
-    return (3 * (away + shape) + other) * a->seen * b->seen / (a->seen + b->seen);
-}
-
-static int ssdgs__pair_compare(const void *a, const void *b) {
-    const ssdgs__pair *x = (const ssdgs__pair *)a, *y = (const ssdgs__pair *)b;
-    if (x->cost < y->cost || y->cost < x->cost) return x->cost < y->cost ? -1 : 1;
-    return x->kept < y->kept ? -1 : x->kept > y->kept;
-}
-
-/* Pairs off the Gaussians of a leaf, the cheapest pair first. */
-static void ssdgs__pair_task(void *data, int leaf) {
-    const ssdgs__reduce_job *job = (const ssdgs__reduce_job *)data;
-    const int from = leaf * SSDGS__REDUCE_LEAF - job->offset, begin = from > 0 ? from : 0;
-    const int end =
-        from + SSDGS__REDUCE_LEAF < job->model->count ? from + SSDGS__REDUCE_LEAF : job->model->count;
-    ssdgs__blob blob[SSDGS__REDUCE_LEAF];
-    ssdgs__pair all[SSDGS__REDUCE_LEAF * (SSDGS__REDUCE_LEAF - 1) / 2],
-        *out = job->pairs + leaf * (SSDGS__REDUCE_LEAF / 2);
-    size_t n = 0;
-    unsigned taken = 0;
-    for (int i = begin; i < end; i++)
-        ssdgs__blob_load(job->model, (size_t)i, (double)job->seen[i], blob + (i - begin));
-    for (int i = begin; i < end; i++)
-        for (int j = i + 1; j < end; j++) {
-            const double cost = ssdgs__merge_cost(blob + (i - begin), blob + (j - begin));
-            all[n].cost = cost < (double)SSDGS__REDUCE_NEVER ? (ssdgs_real)cost : SSDGS__REDUCE_NEVER;
-            all[n].kept = (uint32_t)i;
-            all[n++].gone = (uint32_t)j;
-        }
-    qsort(all, n, sizeof *all, ssdgs__pair_compare);
-    for (size_t i = 0; i < n; i++) {
-        const unsigned both = 1u << ((int)all[i].kept - begin) | 1u << ((int)all[i].gone - begin);
-        if (!(taken & both)) *out++ = all[i];
-        taken |= taken & both ? 0 : both;
-    }
-    for (; out < job->pairs + (leaf + 1) * (SSDGS__REDUCE_LEAF / 2); out++)
-        out->cost = 2 * SSDGS__REDUCE_NEVER;
-}
-
-/* The axes of a covariance as a quaternion, their standard deviations (Jacobi's method). */
-static void ssdgs__blob_axes(double s[9], double q[4], double scale[3]) {
-    q[0] = 1;
-    q[1] = q[2] = q[3] = 0;
-    for (int turn = 0; turn < 24; turn++) {
-        const int k = turn % 3, i = (k + 1) % 3, j = (k + 2) % 3;
-        const double apart = s[4 * i] - s[4 * j], both = s[3 * i + j];
-        const double angle = (apart < 0 ? -0.5 : 0.5) * atan2(2 * both, fabs(apart));
-        const double c = cos(angle), d = sin(angle), h = cos(angle / 2), p = sin(angle / 2);
-        for (int l = 0; l < 3; l++) { /* columns, then rows */
-            const double x = s[3 * l + i], y = s[3 * l + j];
-            s[3 * l + i] = c * x + d * y;
-            s[3 * l + j] = c * y - d * x;
-        }
-        for (int l = 0; l < 3; l++) {
-            const double x = s[3 * i + l], y = s[3 * j + l];
-            s[3 * i + l] = c * x + d * y;
-            s[3 * j + l] = c * y - d * x;
-        }
-        const double w = q[0], a = q[1 + i], b = q[1 + j], z = q[1 + k]; /* q (h, p around axis k) */
-        q[0] = h * w - p * z;
-        q[1 + i] = h * a + p * b;
-        q[1 + j] = h * b - p * a;
-        q[1 + k] = h * z + p * w;
-    }
-    for (int c = 0; c < 3; c++) scale[c] = sqrt(s[4 * c] > 1e-30 ? s[4 * c] : 1e-30);
-}
-
-/* Gaussian `kept` becomes the mean of both, weighted by what is seen of each. Its opacity is such that, where
-   their mean share of it is seen, it shows as much as both did. */
-static void ssdgs__merge(ssdgs_model *model, const ssdgs__pair *pair, ssdgs_real *seen) {
-    const size_t stride = model->capacity;
-    ssdgs_real *kept = model->gaussians + pair->kept, *gone = model->gaussians + pair->gone;
-    ssdgs__blob a, b;
-    ssdgs__blob_load(model, pair->kept, (double)seen[pair->kept], &a);
-    ssdgs__blob_load(model, pair->gone, (double)seen[pair->gone], &b);
-    const double sum = a.seen + b.seen, w = sum > 0 ? a.seen / sum : 0.5;
-    const double share = w * a.share + (1 - w) * b.share;
-    double s[9], q[4], scale[3], raw[SSDGS_CHANNELS], along = 0, length[2] = {0, 0};
-    for (int i = 0; i < 9; i++)
-        s[i] =
-            w * a.covariance[i] + (1 - w) * b.covariance[i] +
-            w * (1 - w) * (a.position[i / 3] - b.position[i / 3]) * (a.position[i % 3] - b.position[i % 3]);
-    ssdgs__blob_axes(s, q, scale);
-    for (size_t c = SSDGS_FRAME; c < SSDGS_FRAME + 4; c++) {
-        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
-        along += x * y;
-        length[0] += x * x;
-        length[1] += y * y;
-    }
-    const double turn = (along < 0 ? -1 : 1) * sqrt(length[0] / (length[1] > 0 ? length[1] : 1));
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
-        const double x = (double)kept[c * stride], y = (double)gone[c * stride];
-        raw[c] = w * x + (1 - w) * (c >= SSDGS_FRAME && c < SSDGS_FRAME + 4 ? turn * y : y);
-    }
-    for (int c = 0; c < 3; c++) {
-        raw[SSDGS_POSITION + c] = w * a.position[c] + (1 - w) * b.position[c];
-        raw[SSDGS_LOG_SCALE + c] = log(scale[c]);
-    }
-    for (int c = 0; c < 4; c++) raw[SSDGS_ROTATION + c] = q[c];
-    for (int c = 0; c < 9; c++)
-        raw[SSDGS_DIFFUSE + c] = ssdgs__softplus_inverse(w * a.color[c] + (1 - w) * b.color[c]);
-    const double opacity = sum / share / ssdgs__blob_area(scale);
-    raw[SSDGS_OPACITY] = ssdgs__logit(opacity < SSDGS__REDUCE_OPAQUE ? opacity : SSDGS__REDUCE_OPAQUE);
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) kept[c * stride] = (ssdgs_real)raw[c];
-    seen[pair->kept] += seen[pair->gone];
-}
-
-/* How much of each Gaussian is seen from around: what parallel lights shed on it, on average. */
-static ssdgs_result ssdgs__seen_around(ssdgs_model *model, ssdgs_real *seen, ssdgs_real *flux) {
-    const ssdgs_camera camera = ssdgs__no_camera();
-    const ssdgs_render_options options = ssdgs_render_options_exact();
-    const size_t n = (size_t)model->count;
-    for (int view = 0; view < SSDGS__REDUCE_VIEWS; view++) { /* on a spiral around the sphere */
-        const double z = 1 - (2 * view + 1.0) / SSDGS__REDUCE_VIEWS, r = sqrt(1 - z * z), turn = 2.39996323;
-        const ssdgs_light light = {
-            SSDGS_LIGHT_DIRECTIONAL,
-            {0, 0, 0},
-            {1, 1, 1},
-            {(ssdgs_real)(-r * cos(turn * view)), (ssdgs_real)(-r * sin(turn * view)), (ssdgs_real)-z},
-            {0, 0},
-            0,
-            0,
-            0};
-        ssdgs_frame frame;
-        ssdgs_result result = ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 0);
-        frame.flux = flux;
-        for (int stage = SSDGS_STAGE_PROJECT; stage <= SSDGS_STAGE_WALK && !result; stage++)
-            result = ssdgs_stage_cpu(&frame, (ssdgs_stage)stage);
-        if (result) return result;
-        for (size_t i = 0; i < n; i++) seen[i] += flux[i] / SSDGS__REDUCE_VIEWS;
-    }
-    return SSDGS_OK;
-}
-
-/* Keeps the Gaussians listed in `keys` in their order, which ssdgs__split makes compact. */
-static void ssdgs__reduce_keep(ssdgs_model *model, uint64_t *keys, size_t count, ssdgs_real *seen,
-                               ssdgs_real *scratch) {
-    ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
-    ssdgs__arrange(model->gaussians, model->capacity, keys, count, scratch);
-    for (size_t i = 0; i < count; i++) scratch[i] = seen[(uint32_t)keys[i]];
-    memcpy(seen, scratch, count * sizeof *seen);
-    model->count = (int)count;
-}
-
-static ssdgs_result ssdgs__model_reduce(ssdgs_model *model, int count) {
-    ssdgs_context *context = model->context;
-    const size_t n = (size_t)model->count, leaves = n / SSDGS__REDUCE_LEAF + 2;
-    if (count < 1) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: %d Gaussians", count);
-    if (model->references > 1)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "ssdgs_model_reduce: a trainer has the model");
-    if (count >= model->count) return SSDGS_OK;
-    /* pairs; keys; seen; scratch, at first one light's flux; gone */
-    ssdgs__pair *pairs = (ssdgs__pair *)ssdgs__allocate(
-        context, leaves * (SSDGS__REDUCE_LEAF / 2) * sizeof *pairs +
-                     n * (sizeof(uint64_t) + 2 * sizeof(ssdgs_real) + 1) + SSDGS__BLOCK);
-    if (!pairs) return SSDGS_ERR_MEMORY;
-    uint64_t *keys = (uint64_t *)(void *)(pairs + leaves * (SSDGS__REDUCE_LEAF / 2));
-    ssdgs_real *seen = (ssdgs_real *)(void *)(keys + n), *scratch = seen + n;
-    unsigned char *gone = (unsigned char *)(scratch + n);
-    const ssdgs_settings settings = model->settings;
-    model->settings.baked = 0; /* for the lights that tell what is seen */
-    model->settings.terms |= SSDGS_SHADOW_TERM;
-    model->settings.asg = SSDGS_ASG_GEOMETRIC;
-    ssdgs__model_changed(model); /* what frames have kept is of other settings */
-    ssdgs_result result = ssdgs__seen_around(model, seen, scratch);
-    model->settings = settings;
-    ssdgs__model_changed(model);
-    if (!result) {
-        size_t left = 0;
-        for (size_t i = 0; i < n; i++) { /* less those that no frame draws */
-            size_t c;
-            for (c = 0; c < SSDGS_DIFFUSE && ssdgs__finite(model->gaussians[c * model->capacity + i]); c++) {}
-            if (c == SSDGS_DIFFUSE) keys[left++] = i;
-        }
-        ssdgs__reduce_keep(model, keys, left, seen, scratch);
-    }
-    for (int round = 0; model->count > count && !result; round++) {
-        ssdgs__reduce_job job = {model, seen, round % 2 * SSDGS__REDUCE_LEAF / 2, pairs};
-        const int now = model->count, tasks = (now + job.offset - 1) / SSDGS__REDUCE_LEAF + 1;
-        const int most = now / SSDGS__REDUCE_STEP + 1, merges = now - count < most ? now - count : most;
-        ssdgs__parallel(context, tasks, ssdgs__pair_task, &job);
-        qsort(pairs, (size_t)tasks * (SSDGS__REDUCE_LEAF / 2), sizeof *pairs, ssdgs__pair_compare);
-        memset(gone, 0, (size_t)now);
-        for (int i = 0; i < merges && pairs[i].cost <= SSDGS__REDUCE_NEVER; i++) {
-            ssdgs__merge(model, pairs + i, seen);
-            gone[pairs[i].gone] = 1;
-        }
-        size_t left = 0;
-        for (int i = 0; i < now; i++)
-            if (!gone[i]) keys[left++] = (uint64_t)i;
-        ssdgs__reduce_keep(model, keys, left, seen, scratch);
-    }
-    ssdgs__release(context, pairs);
-    return result;
-}
-
-SSDGS_API ssdgs_result ssdgs_model_reduce(ssdgs_model *model, int count) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_reduce");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_reduce(model, count));
 }
 
 /* ==== >>steps  the trainer's public functions ==== */

@@ -5,6 +5,7 @@
 #include "../ssdgs.h"
 #include "gpu_gl.c"
 #include "olat.h"
+#include "reduce.h"
 #ifndef _WIN32
 #include <sys/time.h>
 #endif
@@ -398,7 +399,7 @@ static void open_session(const bench *b, session *s, int isa, int threads, int h
 /* The session's model becomes a level of detail with a share of its Gaussians. */
 static void reduce_session(session *s, double share) {
     const int count = (int)(share * s->model->count);
-    if (share < 1) check(s->context, ssdgs_model_reduce(s->model, count > 1 ? count : 1));
+    if (share < 1) check(s->context, reduce_model(s->context, &s->model, count > 1 ? count : 1));
 }
 
 static void close_session(session *s) {

@@ -3,6 +3,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include "reduce.h"
 #include <ctype.h>
 
 #define PI 3.14159265358979323846
@@ -640,7 +641,8 @@ static int relight(job *j) {
     if (!check_outputs(j) || !make_planes(j)) return 1;
     if (j->given[NETWORKS] && !save_model(j, "whole.ply")) return 1;
     if (j->reduce) {
-        if (ssdgs_model_reduce(j->model, j->reduce)) return fail(ssdgs_error_message(j->context));
+        const ssdgs_result result = reduce_model(j->context, &j->model, j->reduce);
+        if (result) return fail(ssdgs_result_string(result));
         if (!save_model(j, "reduced.ply")) return 1;
     }
     for (int i = 0; i < j->data.count; i++) {

@@ -7,6 +7,7 @@
 #include "../ssdgs.h"
 #include "olat.h"
 #include "judge.h"
+#include "reduce.h"
 #include "picture.h"
 #include "view.h"
 #include <errno.h>
@@ -614,9 +615,11 @@ static int train(job *j) {
     if (result) return fail(ssdgs_result_string(result));
     double origin[3] = {0, 0, 0};
     if (j->given[REFIT]) {
-        if (ssdgs_model_load(j->context, j->given[REFIT], &j->model, NULL) ||
-            (j->options.max_gaussians && ssdgs_model_reduce(j->model, j->options.max_gaussians)))
+        if (ssdgs_model_load(j->context, j->given[REFIT], &j->model, NULL))
             return fail(ssdgs_error_message(j->context));
+        result = j->options.max_gaussians ? reduce_model(j->context, &j->model, j->options.max_gaussians)
+                                          : SSDGS_OK;
+        if (result) return fail(ssdgs_result_string(result));
         for (int i = 0; i < 3; i++) origin[i] = (double)ssdgs_model_settings(j->model)->origin[i];
     }
     const olat_reader reader = {j->context, on_terminal() ? tell_reading : NULL, &start};

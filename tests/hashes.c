@@ -3,6 +3,8 @@
    is a folder to write into, the second, if any, names the one instruction set to try. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "../examples/reduce.h"
+#include "../examples/sky.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -258,7 +260,7 @@ static ssdgs_result place(ssdgs_model *model) {
     ssdgs_result result = make_wax(model, &wax);
     if (!result) result = ssdgs_scene_create(context, &scene);
     for (int i = 0; i < 96; i++) sky[i] = (ssdgs_real)(i % 17 ? 0.1 : 2);
-    if (!result) result = ssdgs_environment(context, sky, 8, 4, NULL, lights + 4, 3, options.ambient);
+    if (!result && sky_lights(sky, 8, 4, NULL, lights + 4, 3, options.ambient)) result = SSDGS_ERR_ARGUMENT;
     for (int i = 4; i < 7; i++) {
         see(lights[i].direction, sizeof lights[i].direction);
         see(lights[i].intensity, sizeof lights[i].intensity);
@@ -342,7 +344,7 @@ static ssdgs_result reduce(ssdgs_model *model) {
     ssdgs_model *copy = NULL;
     ssdgs_result result = ssdgs_model_save(model, path[1]);
     if (!result) result = ssdgs_model_load(context, path[1], &copy, NULL);
-    if (!result) result = ssdgs_model_reduce(copy, ssdgs_model_count(copy) / 2);
+    if (!result) result = reduce_model(context, &copy, ssdgs_model_count(copy) / 2);
     if (!result) see_model(copy);
     ssdgs_model_destroy(copy);
     return result;

@@ -1,6 +1,6 @@
 #!/bin/sh
 # usage: [CC=cc] sh tests/mutants.sh BUILD [first] [last]: do the tests notice wrong gradients? Each line of tests/mutants.txt changes
-# a copy of ssdgs.h in one place; a mutant is caught where one of its section's tests fails. A line that fits nothing or does not
+# a copy of ssdgs.h, or of the header named by "header: ", in one place; a mutant is caught where one of its section's tests fails. A line that fits nothing or does not
 # compile is an error. Exits 0 when all are caught, after about three hours on one core.
 set -u
 list=tests/mutants.txt header=ssdgs.h first=${2:-1} last=${3:-99999} number=0 caught=0 total=0 errors=0
@@ -10,10 +10,11 @@ export SSDGS_GOLDEN MUTANT
 
 cc=${CC:-cc} quick=$(command -v tcc || echo "$cc -O0") # where compiling takes longer than running
 cp tests/t_*.c tests/scene.h "$work/tests"
+mkdir -p "$work/examples" && cp examples/*.[ch] "$work/examples"
 # the first failed check ends a program
 sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests/test.h"
 
-# apply: $header with $MUTANT, "function: old ==> new" or "function#2: old ==> new" for the second place, as the copy's ssdgs.h.
+# apply: $header with $MUTANT, "function: old ==> new" or "function#2: old ==> new" for the second place, as the copy's.
 # A function, by its name without F(), ends where a line begins with }. A space in old stands for any white space, line ends
 # included, and between an operator or a parenthesis and what follows there may be some: however the lines are broken, it fits.
 apply() {
@@ -36,7 +37,7 @@ apply() {
         !inside && $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
         inside && arrow { body = body $0 "\n" } !(inside && arrow)
         /^}/ || /^[A-Za-z].*[;}]$/ { if (inside && arrow) mutate(body); body = ""; inside = 0 }
-        END { exit !(arrow && old != new && (wanted ? places >= wanted : places == 1)) }' "$header" >"$work/ssdgs.h"
+        END { exit !(arrow && old != new && (wanted ? places >= wanted : places == 1)) }' "$header" >"$work/$header"
 }
 
 # runs NAME: builds a test of the copy, those named _64 in double, and runs it; 2 when it does not compile. Ten minutes of CPU
@@ -68,6 +69,7 @@ while IFS= read -r MUTANT; do
     case $MUTANT in
         '#'* | '') continue ;;
         'tests: '*) tests=${MUTANT#tests: }; continue ;;
+        'header: '*) cp "$header" "$work/$header"; header=${MUTANT#header: }; continue ;;
     esac
     number=$((number + 1))
     by=error

@@ -127,7 +127,6 @@ static void call_everything(void) {
     memcpy(&copy, &photo, sizeof copy);
     IGNORED(ssdgs_context_trim, context);
     REFUSED(ssdgs_context_run, context, 1, count_task, &done);
-    REFUSED(ssdgs_environment, context, color, 4, 4, NULL, &copy.light, 1, NULL);
     REFUSED(ssdgs_camera_from_matrices, context, matrix, matrix, 0, 4, 4, &copy.camera);
     REFUSED(ssdgs_compare, context, color, color, 4, 4, &metrics);
     REFUSED(ssdgs_checkpoint_iteration, context, FILE_NAME, &iteration);
@@ -142,7 +141,6 @@ static void call_everything(void) {
     REFUSED(ssdgs_gaussian_mirror, model, rough, &gaussian);
     REFUSED(ssdgs_model_bounds, model, low, high);
     REFUSED(ssdgs_model_sort, model);
-    REFUSED(ssdgs_model_reduce, model, 1);
     REFUSED(ssdgs_model_adopt, model, guest);
     REFUSED(ssdgs_model_move, model, home);
     REFUSED(ssdgs_model_adopt, guest, model);
@@ -616,8 +614,6 @@ static void test_null(void) {
     NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
           "ssdgs_checkpoint_iteration: iteration is NULL");
     NAMES(ssdgs_model_adopt(all.model, all.model), "ssdgs_model_adopt: a trainer has the model");
-    NAMES(ssdgs_model_reduce(all.model, 1), "ssdgs_model_reduce: a trainer has the model");
-    NAMES(ssdgs_model_reduce(all.model, 0), "ssdgs_model_reduce: 0 Gaussians");
     CHECK(!other);
     CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) &&
           ssdgs_model_adopt(NULL, all.model) && ssdgs_model_save(NULL, FILE_NAME) &&

@@ -397,7 +397,6 @@ static ssdgs_result do_create(void) {
 static ssdgs_result do_load(void) { return ssdgs_model_load(context, start_path, &made, NULL); }
 static ssdgs_result do_save(void) { return ssdgs_model_save(model, file_path); }
 static ssdgs_result do_sort(void) { return ssdgs_model_sort(model); }
-static ssdgs_result do_reduce(void) { return ssdgs_model_reduce(model, 20); }
 static ssdgs_result do_frame(void) { return frame(1); }
 static ssdgs_result do_scene(void) {
     ssdgs_object objects[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
@@ -408,15 +407,6 @@ static ssdgs_result do_scene(void) {
     objects[1].to_world[3] = (ssdgs_real)0.4;
     objects[1].roughness = 2;
     return ssdgs_scene_render(scene, objects, 2, &photos[0].camera, &photos[1].light, 1, NULL, &image, NULL);
-}
-static ssdgs_result do_environment(void) { /* of a picture */
-    ssdgs_light lights[3];
-    ssdgs_real ambient[9][3];
-    const ssdgs_result result = ssdgs_environment(context, pair[0], SIDE, SIDE, NULL, lights, 3, ambient);
-    if (result) return result;
-    memcpy(planes[0], lights, sizeof lights);
-    memcpy(planes[1], ambient, sizeof ambient);
-    return SSDGS_OK;
 }
 static ssdgs_result do_bounds(void) { return ssdgs_model_bounds(model, planes[0], planes[0] + 3); }
 static ssdgs_result do_iteration(void) {
@@ -476,11 +466,9 @@ static const operation operations[] = {{"model_create", with_context, do_create,
                                        {"model_load_memory", with_context, do_load_memory, 0},
                                        {"model_save", with_model, do_save, 0},
                                        {"model_sort", with_model, do_sort, 0},
-                                       {"model_reduce", with_model, do_reduce, 1},
                                        {"render", with_model, do_frame, 1},
                                        {"render more", with_frame, do_frame, 1},
                                        {"scene_render", with_scene, do_scene, 1},
-                                       {"environment", with_context, do_environment, 0},
                                        {"model_bounds", with_model, do_bounds, 1},
                                        {"checkpoint_iteration", with_context, do_iteration, 0},
                                        {"compare", with_frame, do_compare, 0},

@@ -2,6 +2,7 @@
    an environment map. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "../examples/sky.h"
 #include "scene.h"
 
 static double exactly(double floats) { return real64 ? 1e-11 : floats; }
@@ -556,7 +557,7 @@ static void test_environment_sums(void) {
         for (int both = 0; both < 2; both++) {
             double sum[3] = {0, 0, 0};
             if (!count && !both) continue;
-            CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, count, both ? ambient : NULL));
+            CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, count, both ? ambient : NULL));
             for (int c = 0; c < 3; c++) {
                 for (int i = 0; i < count; i++) sum[c] += (double)lights[i].intensity[c];
                 if (both) sum[c] += 4 * (double)ambient[0][c]; /* its mean times the sphere, over pi */
@@ -581,12 +582,12 @@ static void test_environment_sums(void) {
                 if (!pass) mean += light * size / (4 * pi);
                 else left += (double)rgb[0] * size * (light > 2 * mean ? 2 * mean / light : 1);
             }
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 4, ambient));
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, 4, ambient));
     CHECK(fabs(4 * (double)ambient[0][0] / left - 1) < (real64 ? 1e-12 : 1e-5) && left < 0.9 * total[0]);
     /* two spots are two lights */
     memset(sky, 0, sizeof sky);
     sky[3 * (8 * WIDE + 20)] = sky[3 * (21 * WIDE + 23)] = 5;
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 2, NULL));
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, 2, NULL));
     for (int i = 0; i < 2; i++) {
         double to[2][3], off[2] = {0, 0};
         texel(20, 8, to[0]);
@@ -598,7 +599,7 @@ static void test_environment_sums(void) {
     /* of three, the two that are close share one */
     memset(sky, 0, sizeof sky);
     sky[3 * (15 * WIDE + 10)] = sky[3 * (16 * WIDE + 12)] = sky[3 * (15 * WIDE + 50)] = 5;
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 2, NULL));
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, 2, NULL));
     texel(50, 15, direction);
     double closest = 9;
     for (int i = 0; i < 2; i++) {
@@ -620,7 +621,7 @@ static void test_environment_sums(void) {
                 for (int c = 0; c < 3; c++)
                     sky[3 * (y * WIDE + x) + c] = (ssdgs_real)(even(terms, turn ? w : direction) * (1 + c));
             }
-        CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, turn ? turned : NULL, NULL, 0, ambient));
+        CHECK(!sky_lights(sky, WIDE, HIGH, turn ? turned : NULL, NULL, 0, ambient));
         for (int i = 0; i < 27; i++)
             CHECK(fabs((double)ambient[i / 3][i % 3] - factor[i / 3] * terms[i / 3] * (1 + i % 3)) < 0.03);
     }
@@ -631,7 +632,7 @@ static void test_environment_sums(void) {
     for (int turn = 0; turn < 2; turn++) {
         const ssdgs_real turned[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
         const double w[3] = {direction[2], direction[0], direction[1]};
-        CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, turn ? turned : NULL, lights, 3, NULL));
+        CHECK(!sky_lights(sky, WIDE, HIGH, turn ? turned : NULL, lights, 3, NULL));
         const double *to = turn ? w : direction;
         for (int c = 0; c < 3; c++)
             CHECK(fabs((double)lights[0].direction[c] + to[c]) < 1e-6); /* where it is */
@@ -645,7 +646,7 @@ static void test_environment_sums(void) {
 static double environment_psnr(const ssdgs_object *object, const ssdgs_camera *camera, int count, int both) {
     static ssdgs_light lights[256];
     ssdgs_render_options options = ssdgs_render_options_exact();
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, count, both ? options.ambient : NULL));
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, count, both ? options.ambient : NULL));
     together(object, 1, camera, lights, count, &options, shot + 1);
     double error2 = 0, white = 0;
     for (int c = 0; c < 3 * PIXELS; c++) white = fmax(white, (double)shot[0].value[c]);
@@ -664,7 +665,7 @@ static void test_environment_pictures(ssdgs_model *model) {
     static ssdgs_light lights[256];
     double last = 0;
     paint_sky();
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 256, NULL));
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, 256, NULL));
     together(&object, 1, &camera, lights, 256, &exact, shot);
     for (int count = 1; count <= 64; count *= 4) {
         const double dB = environment_psnr(&object, &camera, count, 0);
@@ -682,19 +683,24 @@ static void test_environment_pictures(ssdgs_model *model) {
 static void test_refused(void) {
     static ssdgs_light lights[2];
     ssdgs_real ambient[9][3];
-    CHECK(ssdgs_environment(NULL, sky, WIDE, HIGH, NULL, lights, 2, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(ssdgs_environment(context, NULL, WIDE, HIGH, NULL, lights, 2, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(strstr(ssdgs_error_message(context), "pixels") != NULL);
-    CHECK(ssdgs_environment(context, sky, 0, HIGH, NULL, lights, 2, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(strstr(ssdgs_error_message(context), "0 x 32") != NULL);
-    CHECK(ssdgs_environment(context, sky, WIDE, HIGH, NULL, NULL, 2, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, -1, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(strstr(ssdgs_error_message(context), "-1 lights") != NULL);
-    sky[40] = (ssdgs_real)-1;
-    CHECK(ssdgs_environment(context, sky, WIDE, HIGH, NULL, NULL, 0, ambient) == SSDGS_ERR_ARGUMENT);
-    CHECK(strstr(ssdgs_error_message(context), "value 40") != NULL);
+    const char *wrong = sky_lights(NULL, WIDE, HIGH, NULL, lights, 2, NULL);
+    CHECK(wrong && strstr(wrong, "no pixels"));
+    wrong = sky_lights(sky, 0, HIGH, NULL, lights, 2, NULL);
+    CHECK(wrong && strstr(wrong, "no pixels"));
+    wrong = sky_lights(sky, WIDE, 32769, NULL, lights, 2, NULL);
+    CHECK(wrong && strstr(wrong, "32768 a side"));
+    wrong = sky_lights(sky, WIDE, HIGH, NULL, NULL, 2, NULL);
+    CHECK(wrong && strstr(wrong, "there must be an array"));
+    wrong = sky_lights(sky, WIDE, HIGH, NULL, lights, -1, NULL);
+    CHECK(wrong && strstr(wrong, "0 to 65536 lights"));
+    for (int bad = 0; bad < 3; bad++) {
+        sky[40] = bad == 2 ? (ssdgs_real)NAN : bad ? (ssdgs_real)INFINITY : (ssdgs_real)-1;
+        memset(ambient, 0, sizeof ambient);
+        wrong = sky_lights(sky, WIDE, HIGH, NULL, NULL, 0, ambient);
+        CHECK(wrong && strstr(wrong, "negative or not finite") && !(ambient[0][0] > 0));
+    }
     memset(sky, 0, sizeof sky);
-    CHECK(!ssdgs_environment(context, sky, WIDE, HIGH, NULL, lights, 2, ambient)); /* night */
+    CHECK(!sky_lights(sky, WIDE, HIGH, NULL, lights, 2, ambient)); /* night */
     CHECK(!(ambient[0][0] > 0) && !(lights[0].intensity[0] > 0));
 }
 

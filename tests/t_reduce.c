@@ -2,6 +2,7 @@
    like the whole. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "../examples/reduce.h"
 #include "test.h"
 
 enum { SIDE = 96, PIXELS = SIDE * SIDE };
@@ -83,7 +84,7 @@ static void test_moments(void) {
     }
     moments(model, 600, before);
     for (int count = 599; count > 100; count -= 149) {
-        CHECK(!ssdgs_model_reduce(model, count));
+        CHECK(!reduce_model(context, &model, count));
         CHECK(ssdgs_model_arrays(model).count == count);
         moments(model, count, after);
         CHECK_NEAR(after, before, 10, 0.01 * before[0], 0.01, "mass, place and spread stay");
@@ -111,7 +112,7 @@ static void test_twins(void) {
         for (size_t c = 0; c < 4; c++) /* as much of a rotation as before */
             v.gaussians[(SSDGS_FRAME + c) * v.stride + (size_t)i] *= -3;
     }
-    CHECK(!ssdgs_model_reduce(model, N));
+    CHECK(!reduce_model(context, &model, N));
     for (int i = 0; i < N; i++) {
         double worst = 0;
         ssdgs_gaussian got;
@@ -169,7 +170,7 @@ static void test_hidden(int baked) {
         g.opacity = (ssdgs_real)0.99;
         set(model, i, &g);
     }
-    CHECK(!ssdgs_model_reduce(model, SHELL + INSIDE / 4));
+    CHECK(!reduce_model(context, &model, SHELL + INSIDE / 4));
     for (int i = 0; i < SHELL + INSIDE / 4; i++) {
         ssdgs_gaussian g;
         CHECK(!ssdgs_model_get(model, i, &g));
@@ -242,7 +243,7 @@ static void test_looks(void) {
         double power = 0;
         picture(model, whole);
         picture(half, fewer);
-        CHECK(!ssdgs_model_reduce(model, 2000) && ssdgs_model_arrays(model).count == 2000);
+        CHECK(!reduce_model(context, &model, 2000) && ssdgs_model_arrays(model).count == 2000);
         picture(model, reduced);
         for (int k = 0; k < 3 * PIXELS; k++) power += (double)whole[k] * (double)whole[k];
         const double left = error_of(whole, reduced) / power, dropped = error_of(whole, fewer) / power;
@@ -263,12 +264,12 @@ static void test_edges(void) {
         models[i] = striped(contexts[i], 1500, 1, SSDGS_ALL_TERMS);
         const ssdgs_model_view v = ssdgs_model_arrays(models[i]);
         const ssdgs_settings before = *ssdgs_model_settings(models[i]);
-        CHECK(ssdgs_model_reduce(models[i], 0) == SSDGS_ERR_ARGUMENT);
-        CHECK(!ssdgs_model_reduce(models[i], 1500) && ssdgs_model_arrays(models[i]).count == 1500);
+        CHECK(reduce_model(contexts[i], &models[i], 0) == SSDGS_ERR_ARGUMENT);
+        CHECK(!reduce_model(contexts[i], &models[i], 1500) && ssdgs_model_arrays(models[i]).count == 1500);
         v.gaussians[7] = NAN;                            /* never drawn: it goes */
         v.gaussians[SSDGS_DIFFUSE * v.stride + 9] = NAN; /* drawn black */
         for (size_t k = 20; k < 40; k++) v.gaussians[SSDGS_OPACITY * v.stride + k] = -60; /* nothing of it */
-        CHECK(!ssdgs_model_reduce(models[i], 700) && ssdgs_model_arrays(models[i]).count == 700);
+        CHECK(!reduce_model(contexts[i], &models[i], 700) && ssdgs_model_arrays(models[i]).count == 700);
         CHECK(!memcmp(&before, ssdgs_model_settings(models[i]), sizeof before));
     }
     int bad = 0;
@@ -279,14 +280,14 @@ static void test_edges(void) {
     }
     CHECK(bad == 1); /* the black one, which comes last */
     for (int i = 0; i < 2; i++) {
-        CHECK(!ssdgs_model_reduce(models[i], 1) && ssdgs_model_arrays(models[i]).count == 1);
+        CHECK(!reduce_model(contexts[i], &models[i], 1) && ssdgs_model_arrays(models[i]).count == 1);
         ssdgs_model_destroy(models[i]);
     }
     ssdgs_model *same = new_model(contexts[0], NULL, 100); /* all in one place, and opaque */
     ssdgs_gaussian g = ssdgs_gaussian_default();
     g.opacity = 1;
     for (int i = 0; i < 100; i++) set(same, i, &g);
-    CHECK(!ssdgs_model_reduce(same, 3) && ssdgs_model_arrays(same).count == 3);
+    CHECK(!reduce_model(contexts[0], &same, 3) && ssdgs_model_arrays(same).count == 3);
     CHECK(!ssdgs_model_get(same, 2, &g) && g.opacity > (ssdgs_real)0.99);
     ssdgs_model_destroy(same);
     for (int i = 0; i < 2; i++) ssdgs_context_destroy(contexts[i]);
@@ -307,7 +308,7 @@ static void test_after_frame(void) {
             set(models[i], k, &g);
         }
         if (i) {
-            const double z = 1 - 1.0 / SSDGS__REDUCE_VIEWS;
+            const double z = 1 - 1.0 / REDUCE__VIEWS;
             const ssdgs_real eye[3] = {0, -3, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
             const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.5, SIDE, SIDE);
             ssdgs_light light;
@@ -321,7 +322,7 @@ static void test_after_frame(void) {
             image.color = color;
             CHECK(!ssdgs_render_ex(models[i], &camera, &light, 1, &options, &image, NULL));
         }
-        CHECK(!ssdgs_model_reduce(models[i], 100));
+        CHECK(!reduce_model(context, &models[i], 100));
     }
     const ssdgs_model_view a = ssdgs_model_arrays(models[0]), b = ssdgs_model_arrays(models[1]);
     for (size_t c = 0; c < SSDGS_CHANNELS; c++)

@@ -533,7 +533,6 @@ static void test_missing(void) {
     MISSING(ssdgs_model_load(context, "build/none", NULL, NULL));
     CHECK(!made);
     MISSING(ssdgs_model_sort(NULL));
-    MISSING(ssdgs_model_reduce(NULL, 1));
     MISSING(ssdgs_model_save(NULL, "build/none"));
     MISSING(ssdgs_model_save(model, NULL));
     MISSING(ssdgs_render(NULL, &camera, &light, 1, &image));

@@ -5,6 +5,8 @@
 #define SSDGS_IMPLEMENTATION
 #include "../../ssdgs.h"
 #include "../../examples/olat.h"
+#include "../../examples/reduce.h"
+#include "../../examples/sky.h"
 
 #define HOLDS(condition) ((condition) ? (void)0 : broken(__LINE__, #condition))
 
@@ -434,16 +436,15 @@ static void draw_sky(input *in, ssdgs_context *context, picture *p) {
     for (int i = 0; i < 8 * 4 * 3; i++) pixels[i] = i < 5 ? draw_size(in, 1, 2) : pixels[i * i % 11 % 5];
     draw_rotation(in, turn);
     ssdgs_real(*ambient)[3] = flags & 2 ? p->options.ambient : NULL;
-    if (!done(context, ssdgs_environment(context, pixels, width, height, flags & 1 ? turn : NULL, p->lights,
-                                         count, ambient)))
-        return;
+    if (sky_lights(pixels, width, height, flags & 1 ? turn : NULL, p->lights, count, ambient)) return;
     p->light_count = count;
     if (in->tame)
         HOLDS(!ssdgs__lights_check(context, p->lights, count) && all_finite(p->options.ambient[0], 27));
 }
 
 /* A Gaussian is set, and read back; Gaussians are merged, sorted, and their box taken. */
-static void edit_model(input *in, ssdgs_model *model) {
+static void edit_model(input *in, ssdgs_model **given) {
+    ssdgs_model *model = *given;
     ssdgs_context *context = model->context;
     const int flags = draw(in), index = draw_below(in, 10), before = model->count;
     ssdgs_gaussian g = ssdgs_gaussian_default(), back;
@@ -464,8 +465,9 @@ static void edit_model(input *in, ssdgs_model *model) {
     }
     if (flags & 4) {
         const int most = draw_below(in, 10), finite = model_finite(model);
-        if (done(context, ssdgs_model_reduce(model, most)))
-            HOLDS(before <= most ? model->count == before : model->count <= most);
+        if (done(context, reduce_model(context, given, most)))
+            HOLDS(before <= most ? (*given)->count == before : (*given)->count <= most);
+        model = *given;
         if (finite) HOLDS(model_finite(model));
     }
     if (flags & 8) HOLDS(done(context, ssdgs_model_sort(model)));
@@ -506,7 +508,7 @@ static void fuzz_scene(const unsigned char *data, size_t size) {
         for (int i = 0; i < p.object_count; i++) p.objects[i] = draw_object(&in, models);
         if (flags & 2) draw_matrices(&in, context, &p.camera);
         if (flags & 4) draw_sky(&in, context, &p);
-        if (flags & 8) edit_model(&in, models[flags & 1]);
+        if (flags & 8) edit_model(&in, models + (flags & 1));
         p.passes = draw(&in);
         ssdgs_occluder occluder = {occlude, &p, 0};
         occluder.revision = (uint64_t)p.passes;
