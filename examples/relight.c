@@ -3,6 +3,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include "flip.h"
 #include <ctype.h>
 
 #define PI 3.14159265358979323846
