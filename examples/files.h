@@ -54,6 +54,7 @@
 #define OLAT__MAKE_FOLDER(path) mkdir(path, 0777)
 #endif
 
+/* OLAT__API: a function that a program need not call. */
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define OLAT__API static __attribute__((unused))
 #define OLAT__PRINTF(text, values) __attribute__((format(printf, text, values)))
@@ -101,14 +102,14 @@ static const char *olat__tail(const char *path) {
     return length > 160 ? path + (length - 160) : path;
 }
 
-static int olat__same_letters(const char *text, const char *lower, size_t length) {
+OLAT__API int olat__same_letters(const char *text, const char *lower, size_t length) {
     size_t i = 0;
     while (i < length && (text[i] >= 'A' && text[i] <= 'Z' ? text[i] + 32 : text[i]) == lower[i]) i++;
     return i == length;
 }
 
 /* Reads a regular file whole and appends a NUL. */
-static int olat__read_file(const char *path, unsigned char **data, size_t *size, char *error) {
+OLAT__API int olat__read_file(const char *path, unsigned char **data, size_t *size, char *error) {
     const char *problem = NULL;
     size_t done = 0, total = 0;
     int file = open(path, OLAT__READ_FLAGS);
@@ -133,7 +134,7 @@ static int olat__read_file(const char *path, unsigned char **data, size_t *size,
 }
 
 /* Writes a file under a temporary name and renames it, so that path never holds half a file. */
-static int olat__write_file(const char *path, const unsigned char *data, size_t size, char *error) {
+OLAT__API int olat__write_file(const char *path, const unsigned char *data, size_t size, char *error) {
     size_t done = 0, room = strlen(path) + 40;
     int file = -1, reason = 0;
     struct stat info;

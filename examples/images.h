@@ -1675,7 +1675,7 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
 /* ==== what the numbers of photographs stand for ==== */
 
 /* Whether numbers are light, not stored values. */
-static int olat__is_light(ssdgs_pixels format) {
+OLAT__API int olat__is_light(ssdgs_pixels format) {
     return format == SSDGS_PIXELS_RGBA16F || format == SSDGS_PIXELS_RGBA32F;
 }
 
@@ -1685,7 +1685,7 @@ static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) 
 }
 
 /* Of any, bytes and words from 0 to 1. */
-static ssdgs_real olat__number(const void *pixels, ssdgs_pixels format, size_t i) {
+OLAT__API ssdgs_real olat__number(const void *pixels, ssdgs_pixels format, size_t i) {
     const ssdgs_real unit =
         format == SSDGS_PIXELS_RGBA16 ? (ssdgs_real)(1.0 / 65535) : (ssdgs_real)(1.0 / 255);
     if (format == SSDGS_PIXELS_RGBA32F) return (ssdgs_real)((const float *)pixels)[i];
@@ -2054,8 +2054,8 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
 }
 
 /* Reads a PNG or OpenEXR, as a photograph or as a mask. */
-static int olat__image_file(const char *path, int is_mask, int *width, int *height, ssdgs_pixels *format,
-                            void **pixels, olat__found *found, char *error) {
+OLAT__API int olat__image_file(const char *path, int is_mask, int *width, int *height, ssdgs_pixels *format,
+                               void **pixels, olat__found *found, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
     const int told = found->count;

@@ -292,7 +292,7 @@ static const char *olat__json_values(olat__json *j) {
 }
 
 /* Parses j->text .. j->end, NUL-terminated; j->failed tells. */
-static void olat__json_parse(olat__json *j) {
+OLAT__API void olat__json_parse(olat__json *j) {
     const unsigned char *text = (const unsigned char *)j->text;
     j->line = 1;
     j->at = j->text +
@@ -340,24 +340,24 @@ static int olat__numbers(olat__json *j, const olat__node *node, int count, doubl
 }
 
 /* The same for the member `key`; 0 if it is absent. */
-static int olat__get(olat__json *j, const olat__node *object, const char *key, int count, double *out) {
+OLAT__API int olat__get(olat__json *j, const olat__node *object, const char *key, int count, double *out) {
     const olat__node *node = olat__find(j, object, key);
     return node && olat__numbers(j, node, count, out);
 }
 
 /* Is the string that word, given in small letters? */
-static int olat__is_word(const olat__node *node, const char *word) {
+OLAT__API int olat__is_word(const olat__node *node, const char *word) {
     return node->text_length == strlen(word) && olat__same_letters(node->text, word, node->text_length);
 }
 
 /* Is there anything in it but 0, false, null and empty texts? */
-static int olat__nonzero(const olat__json *j, const olat__node *node) {
+OLAT__API int olat__nonzero(const olat__json *j, const olat__node *node) {
     int found = node->type == OLAT__TRUE || node->text_length > 0 || fabs(node->number) > 0;
     for (int i = node->child; i && !found; i = j->nodes[i].next) found = olat__nonzero(j, &j->nodes[i]);
     return found;
 }
 
-static void olat__json_close(olat__json *j) {
+OLAT__API void olat__json_close(olat__json *j) {
     free(j->nodes);
     free(j->text);
     free(j->path);
@@ -371,7 +371,7 @@ typedef struct olat__writer {
     size_t size, room;
 } olat__writer;
 
-static void olat__writer_start(olat__writer *w) {
+OLAT__API void olat__writer_start(olat__writer *w) {
     w->size = 0;
     w->room = 256;
     w->text = (char *)malloc(w->room);
@@ -390,7 +390,7 @@ static void olat__write(olat__writer *w, const char *text) {
 }
 
 /* Puts the text where it belongs, and frees it. */
-static int olat__writer_end(olat__writer *w, const char *path, char *error) {
+OLAT__API int olat__writer_end(olat__writer *w, const char *path, char *error) {
     const int failed = w->text ? olat__write_file(path, (const unsigned char *)w->text, w->size, error)
                                : olat__fail(error, "%s: out of memory", olat__tail(path));
     free(w->text);
@@ -398,7 +398,7 @@ static int olat__writer_end(olat__writer *w, const char *path, char *error) {
 }
 
 /* A JSON string, with its quotes. */
-static void olat__write_string(olat__writer *w, const char *text) {
+OLAT__API void olat__write_string(olat__writer *w, const char *text) {
     olat__write(w, "\"");
     char escape[8];
     for (; *text; text++) {
@@ -410,8 +410,8 @@ static void olat__write_string(olat__writer *w, const char *text) {
 }
 
 /* The numbers, with so many digits and a point in every locale, between two texts. */
-static void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count, int digits,
-                                const char *after) {
+OLAT__API void olat__write_numbers(olat__writer *w, const char *before, const double *v, int count,
+                                   int digits, const char *after) {
     olat__write(w, before);
     for (int i = 0; i < count; i++) {
         char text[64];
