@@ -96,6 +96,15 @@ OLAT__PRINTF(2, 3) static int olat__fail(char *error, const char *format, ...) {
     return 1;
 }
 
+/* Appends to a text in so much room, up to its end. */
+OLAT__PRINTF(3, 4) OLAT__API void olat__append(char *text, size_t room, const char *format, ...) {
+    const size_t used = strlen(text);
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text + used, room - used, format, list);
+    va_end(list);
+}
+
 /* The end of a path, which tells more than its beginning where room is short. */
 static const char *olat__tail(const char *path) {
     size_t length = strlen(path);

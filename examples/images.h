@@ -1199,10 +1199,8 @@ static void olat__exr_parts(olat__exr *e) {
         deep |= e->deep;
         colours += e->colours;
         greys += e->greys;
-        for (int i = 0; i < e->channel_count; i++) {
-            const size_t used = strlen(channels);
-            snprintf(channels + used, sizeof channels - used, "%s%s", used ? ", " : "", e->channels[i].name);
-        }
+        for (int i = 0; i < e->channel_count; i++)
+            olat__append(channels, sizeof channels, "%s%s", *channels ? ", " : "", e->channels[i].name);
         if (!part || e->rank < best.rank) {
             best = *e;
             before = blocks;
@@ -1215,11 +1213,9 @@ static void olat__exr_parts(olat__exr *e) {
                          "--flatten -o out.exr");
     if (!e->problem && best.rank == OLAT__EXR_NONE) {
         char missing[16] = "";
-        for (int c = 0; c < 3; c++) {
-            const size_t used = strlen(missing);
+        for (int c = 0; c < 3; c++)
             if (!(most >> c & 1))
-                snprintf(missing + used, sizeof missing - used, "%s%c", used ? ", " : "", "RGB"[c]);
-        }
+                olat__append(missing, sizeof missing, "%s%c", *missing ? ", " : "", "RGB"[c]);
         snprintf(e->text, sizeof e->text,
                  "channels are missing: %s; it has %s%s: light must be named R, G, B, or Y", missing,
                  *channels ? channels : "none", strlen(channels) + 1 == sizeof channels ? " ..." : "");
@@ -1778,8 +1774,7 @@ static const char *olat__gama_space(const olat__png *png, olat__space *space) {
     for (int i = 0; chrm && i < 8; i++) xy[(i + 6) % 8] = olat__be32(chrm + 4 * i) / 1e5;
     const int primaries = chrm ? olat__primaries(xy, matrix) : 1;
     if (primaries == 2) {
-        const size_t used = strlen(space->source);
-        snprintf(space->source + used, sizeof space->source - used, "%scHRM", used ? ", " : "");
+        olat__append(space->source, sizeof space->source, "%scHRM", *space->source ? ", " : "");
         memcpy(space->matrix, matrix, sizeof matrix);
         space->differs = 1;
     }

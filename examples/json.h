@@ -62,7 +62,6 @@ typedef struct olat__json {
 OLAT__PRINTF(3, 4)
 static int olat__json_fail(olat__json *j, const olat__node *node, const char *format, ...) {
     char keys[160] = "";
-    size_t used = 0;
     int depth = 0;
     if (j->failed) return 0;
     va_list list;
@@ -72,15 +71,14 @@ static int olat__json_fail(olat__json *j, const olat__node *node, const char *fo
     va_end(list);
     const olat__node *chain[OLAT__MAX_DEPTH + 1];
     for (const olat__node *n = node; n->parent >= 0; n = &j->nodes[n->parent]) chain[depth++] = n;
-    while (depth-- > 0 && used < sizeof keys) {
+    while (depth-- > 0) {
         const olat__node *n = chain[depth];
         if (j->nodes[n->parent].type == OLAT__OBJECT)
-            snprintf(keys + used, sizeof keys - used, "%s%.60s", used ? "." : "", n->key);
-        else snprintf(keys + used, sizeof keys - used, "[%d]", n->index);
-        used = strlen(keys);
+            olat__append(keys, sizeof keys, "%s%.60s", *keys ? "." : "", n->key);
+        else olat__append(keys, sizeof keys, "[%d]", n->index);
     }
     j->failed = olat__fail(j->error, "%s: line %d: %s%s%s", olat__tail(j->path), node->line, keys,
-                           used ? ": " : "", what);
+                           *keys ? ": " : "", what);
     return 0;
 }
 

@@ -707,9 +707,9 @@ static void olat__note_tally(olat_dataset *out, const olat__tally *tally, int ma
     for (int i = 0; i < 3 && i < tally->count && (tally->remark.flags & OLAT__NAMED); i++) {
         const olat_frame *frame = out->frames + tally->first[i];
         const char *name = of_mask ? frame->mask : frame->file;
-        const size_t length = strlen(name), used = strlen(names);
-        snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : ": ",
-                 name + (length > 60 ? length - 60 : 0));
+        const size_t length = strlen(name);
+        olat__append(names, sizeof names, "%s%s", *names ? ", " : ": ",
+                     name + (length > 60 ? length - 60 : 0));
     }
     olat__note(out, "%d of the %d %s %s %s%s%s", tally->count, of_mask ? masks : out->count,
                of_mask ? "masks" : "photographs", tally->count == 1 ? "is" : "are", tally->remark.text, names,
