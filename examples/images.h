@@ -341,6 +341,9 @@ static size_t olat__deflate(const unsigned char *in, size_t size, unsigned char 
 enum { OLAT__NAMED = 1, OLAT__OF_MASK = 2, OLAT__REMARKS = 8 };
 #define OLAT__OUTSIDE \
     "of colours that sRGB does not hold, in more than 0.1 %% of the pixels: these are clamped"
+#define OLAT__OBLONG(kind) \
+    "of pixels that are not square (" kind "): read as stored, so fl_x and fl_y must be those of the " \
+    "stored picture"
 #define OLAT__TURNED \
     "to be turned or mirrored for viewing (%s %d): read as stored, so cameras must be those of the stored " \
     "picture"
@@ -1591,10 +1594,7 @@ static void olat__exr_tell(const olat__exr *e, olat__found *found) {
                    e->letters & 7 ? "R, G, B" : "Y", part, e->name.text, part && layer ? "." : "", layer,
                    e->channels[e->chosen].name, part || layer ? "" : "the one without a name");
     if (!(fabs((double)e->aspect - 1) < 0.01))
-        olat__tell(found, OLAT__NAMED,
-                   "of pixels that are not square (pixelAspectRatio %g): read as stored, so fl_x and fl_y "
-                   "must be those of the stored picture",
-                   (double)e->aspect);
+        olat__tell(found, OLAT__NAMED, OLAT__OBLONG("pixelAspectRatio %g"), (double)e->aspect);
     if (e->turned_by > 1 && e->turned_by < 9)
         olat__tell(found, OLAT__NAMED, OLAT__TURNED, "OpenEXR's Orientation", e->turned_by);
 }
@@ -2039,11 +2039,7 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
     if (phys) {
         const double x = olat__be32(phys), y = olat__be32(phys + 4);
         if (x > 0 && y > 0 && fabs(x / y - 1) > 0.01)
-            olat__tell(
-                found, OLAT__NAMED,
-                "of pixels that are not square (pHYs %g x %g): read as stored, so fl_x and fl_y must be "
-                "those of the stored picture",
-                x, y);
+            olat__tell(found, OLAT__NAMED, OLAT__OBLONG("pHYs %g x %g"), x, y);
     }
     return failed;
 }
