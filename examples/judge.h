@@ -362,15 +362,14 @@ OLAT__PRINTF(2, 3) static void judge__say(const judge *k, const char *format, ..
     k->logger->write(k->logger->user, SSDGS_OK, text);
 }
 
+static int judge__ascending(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 /* The values' share-quantile; sorts them. 0 of none. */
 static double judge__quantile(double *values, int count, double share) {
-    for (int gap = count / 2; gap > 0; gap /= 2)
-        for (int i = gap; i < count; i++) {
-            const double v = values[i];
-            int j = i;
-            for (; j >= gap && values[j - gap] > v; j -= gap) values[j] = values[j - gap];
-            values[j] = v;
-        }
+    qsort(values, (size_t)count, sizeof *values, judge__ascending);
     return count ? values[(int)(share * (count - 1))] : 0;
 }
 
