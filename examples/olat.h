@@ -592,16 +592,6 @@ static int olat__apply_mask(olat_frame *frame, double white, olat__found *found,
 
 /* ---- photographs and frames ---- */
 
-/* The frame's photograph as training takes it. */
-static int olat__read_photo(olat_frame *frame, olat__found *found, char *error) {
-    ssdgs_camera *camera = &frame->camera;
-    memset(found, 0, sizeof *found);
-    frame->has_image = 1;
-    return olat__image_file(frame->file, 0, &camera->width, &camera->height, &frame->format, &frame->pixels,
-                            found, error) ||
-           (frame->mask && olat__apply_mask(frame, 0, found, error));
-}
-
 /* Adds a line to the notes. */
 OLAT__PRINTF(2, 3) static void olat__note(olat_dataset *set, const char *format, ...) {
     const size_t used = strlen(set->notes), more = used > 0 && used + 1 < sizeof set->notes;
@@ -659,10 +649,17 @@ static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
     if (found->number > seen->number) seen->number = found->number;
 }
 
+/* The frame's photograph as training takes it, or only its mask, which has waited. */
 static int olat__read_one(const olat__reading *r, int i, char *error) {
-    if (!(r->white > 0)) return olat__read_photo(r->frames + i, r->found + i, error);
-    memset(r->found + i, 0, sizeof *r->found);
-    return olat__apply_mask(r->frames + i, r->white, r->found + i, error);
+    olat_frame *frame = r->frames + i;
+    olat__found *found = r->found + i;
+    ssdgs_camera *camera = &frame->camera;
+    memset(found, 0, sizeof *found);
+    if (r->white > 0) return olat__apply_mask(frame, r->white, found, error);
+    frame->has_image = 1;
+    return olat__image_file(frame->file, 0, &camera->width, &camera->height, &frame->format, &frame->pixels,
+                            found, error) ||
+           (frame->mask && olat__apply_mask(frame, 0, found, error));
 }
 
 static void olat__read_task(void *data, int i) {
@@ -680,16 +677,12 @@ static void olat__read_all(olat__json *j, const olat_reader *reader, olat_datase
         const int count = begin + most < out->count ? most : out->count - begin;
         r->frames = out->frames + begin;
         r->waits = waits + begin;
-        memset(r->found, 0, (size_t)most * sizeof *r->found);
         if (reader && ssdgs_context_run(reader->context, count, olat__read_task, r))
             j->failed = olat__fail(j->error, "%s", ssdgs_error_message(reader->context));
         for (int i = 0; i < count && !j->failed; i++) {
             if (r->white > 0 && !r->waits[i]) continue;
             if (!reader || r->found[i].failed) {
-                if (!(r->white > 0)) {
-                    free(r->frames[i].pixels);
-                    r->frames[i].pixels = NULL;
-                }
+                if (!(r->white > 0)) free(r->frames[i].pixels);
                 j->failed = olat__read_one(r, i, j->error);
             }
             r->waits[i] = (char)r->found[i].waits;
