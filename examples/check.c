@@ -46,17 +46,6 @@ OLAT__PRINTF(3, 4) static void say(check *k, int problem, const char *format, ..
     k->problems += problem;
 }
 
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* What a share of numbers lies below; sorts them. 0 of none. */
-static double percentile(double *values, size_t count, double share) {
-    qsort(values, count, sizeof *values, ascending);
-    return count ? values[(size_t)(share * (double)(count - 1))] : 0;
-}
-
 static void toward(const double middle[3], const ssdgs_real *place, int directional, double direction[3]) {
     for (int c = 0; c < 3; c++) direction[c] = (double)place[c] - (directional ? 0 : middle[c]);
     const double length = sqrt(olat__dot(direction, direction));
@@ -111,10 +100,10 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
             }
         f->shown = (double)count / (double)n;
         f->clipped = count ? clipped / (double)count : 0;
-        f->dark = percentile(light, count, 0.02);
-        f->bright = percentile(light, count, 0.95);
-        f->noise =
-            fines > 100 ? percentile(fine, fines, 0.5) / (6 * 0.6745) : 0; /* a mask of norm 6: its median */
+        f->dark = judge__quantile(light, (int)count, 0.02);
+        f->bright = judge__quantile(light, (int)count, 0.95);
+        /* a mask of norm 6: its median */
+        f->noise = fines > 100 ? judge__quantile(fine, (int)fines, 0.5) / (6 * 0.6745) : 0;
         const double grain = f->noise * f->noise * (double)fines;
         f->sharp = first > 2 * grain && second > 25 * grain ? (second - 20 * grain) / (first - grain) : 0;
         olat_eye(&photo->camera, eye);
@@ -134,7 +123,7 @@ static double median_of(const facts *f, int count, size_t member) {
     double *values = (double *)malloc((size_t)count * sizeof *values);
     for (int i = 0; i < count && values; i++)
         memcpy(values + i, (const char *)(f + i) + member, sizeof *values);
-    const double median = values ? percentile(values, (size_t)count, 0.5) : 0;
+    const double median = values ? judge__quantile(values, count, 0.5) : 0;
     free(values);
     return median;
 }
@@ -265,7 +254,7 @@ static double nearest(const check *k, size_t member) {
                      olat__dot(to, (const double *)(const void *)((const char *)(k->found[0] + j) + member)));
         angles[i] = 57.29577951308232 * acos(fmin(1, best));
     }
-    const double median = angles ? percentile(angles, (size_t)count, 0.5) : 0;
+    const double median = angles ? judge__quantile(angles, count, 0.5) : 0;
     free(angles);
     return median;
 }

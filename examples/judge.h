@@ -362,23 +362,23 @@ OLAT__PRINTF(2, 3) static void judge__say(const judge *k, const char *format, ..
     k->logger->write(k->logger->user, SSDGS_OK, text);
 }
 
+static int judge__ascending(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 /* The values' share-quantile; sorts them. 0 of none. */
 static double judge__quantile(double *values, int count, double share) {
-    for (int gap = count / 2; gap > 0; gap /= 2)
-        for (int i = gap; i < count; i++) {
-            const double v = values[i];
-            int j = i;
-            for (; j >= gap && values[j - gap] > v; j -= gap) values[j] = values[j - gap];
-            values[j] = v;
-        }
+    qsort(values, (size_t)count, sizeof *values, judge__ascending);
     return count ? values[(int)(share * (count - 1))] : 0;
 }
 
 /* Writes the marked photographs' names, less the folders they share. */
 static void judge__names(const judge *k, char *text, size_t room) {
     const char *first = k->set->frames[0].file;
-    size_t folder = 0, used = 0;
+    size_t folder = 0;
     int listed = 0, more = 0;
+    *text = 0;
     for (size_t i = 0, same = 1; same && first[i]; i++) {
         for (int j = 1; j < k->set->count; j++) same = same && k->set->frames[j].file[i] == first[i];
         if (same && strchr(OLAT__SEPARATORS, first[i])) folder = i + 1;
@@ -389,10 +389,9 @@ static void judge__names(const judge *k, char *text, size_t room) {
             more++;
             continue;
         }
-        used += (size_t)snprintf(text + used, room - used, "%s%.80s", listed++ ? ", " : "",
-                                 k->set->frames[i].file + folder);
+        olat__append(text, room, "%s%.80s", listed++ ? ", " : "", k->set->frames[i].file + folder);
     }
-    if (more) snprintf(text + used, room - used, " and %d more", more);
+    if (more) olat__append(text, room, " and %d more", more);
 }
 
 /* Marks and names photographs that show light where their lamps bring none, most of all in what is darkest

@@ -2,7 +2,7 @@
    build/minimal.png */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
-#include "olat.h"
+#include "images.h"
 
 enum { BALL = 1500, SIDE = 40, FLOOR = SIDE * SIDE, WIDTH = 320, HEIGHT = 240 };
 

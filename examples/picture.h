@@ -276,32 +276,23 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
     return SSDGS_OK;
 }
 
-/* Appends to text of a size. */
-OLAT__PRINTF(3, 4) static void view__append(char *text, size_t room, const char *format, ...) {
-    const size_t length = strlen(text);
-    va_list values;
-    va_start(values, format);
-    vsnprintf(text + length, room - length, format, values);
-    va_end(values);
-}
-
 /* What the page must know of the models, as JSON. */
 static void view__about(const view_show *s, char *text, size_t room) {
     *text = 0;
-    view__append(text, room, "{\"middle\":[%.9g,%.9g,%.9g],\"radius\":%.9g,\"light_scale\":%.9g,\"models\":[",
+    olat__append(text, room, "{\"middle\":[%.9g,%.9g,%.9g],\"radius\":%.9g,\"light_scale\":%.9g,\"models\":[",
                  (double)s->middle[0], (double)s->middle[1], (double)s->middle[2], (double)s->radius,
                  (double)ssdgs_model_settings(s->models[0])->light_scale);
     for (int i = 0; i < s->count; i++) {
         const char *name = s->names[i];
         for (const char *c = name; *c; c++)
             if (*c == '/' || *c == '\\') name = c + 1;
-        view__append(text, room, "%s{\"name\":\"", i ? "," : "");
+        olat__append(text, room, "%s{\"name\":\"", i ? "," : "");
         for (int c = 0; name[c] && c < 60; c++)
-            view__append(text, room, "%c",
+            olat__append(text, room, "%c",
                          name[c] >= ' ' && name[c] < 127 && !strchr("\"\\<>&", name[c]) ? name[c] : '?');
-        view__append(text, room, "\",\"gaussians\":%d}", ssdgs_model_peek(s->models[i]).count);
+        olat__append(text, room, "\",\"gaussians\":%d}", ssdgs_model_peek(s->models[i]).count);
     }
-    view__append(text, room,
+    olat__append(text, room,
                  "],\"training\":%s,\"paused\":%s,\"photographs\":%d,\"iteration\":%d,\"iterations\":%d,"
                  "\"loss\":%.6f,\"psnr\":%.3f,\"left\":%.0f}\n",
                  s->training.on ? "true" : "false", s->training.paused ? "true" : "false", s->training.count,
@@ -317,16 +308,16 @@ static ssdgs_result view__picture(view_show *s, ssdgs_scene **scene, const view_
     const ssdgs_result result = view__draw(s, scene, w, &stats);
     *note = 0;
     if (result) {
-        view__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));
+        olat__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));
         return result;
     }
     *size = 4 * (size_t)w->value[VIEW__WIDTH][0] * (size_t)w->value[VIEW__HEIGHT][0];
-    view__append(note, room, "{\"ms\":%.2f,\"shaded\":%d,\"gaussians\":%d,\"kept\":%d,\"stages\":{",
+    olat__append(note, room, "{\"ms\":%.2f,\"shaded\":%d,\"gaussians\":%d,\"kept\":%d,\"stages\":{",
                  1e3 * (olat_seconds() - start), stats.shaded, stats.gaussians, stats.lights_cached);
     for (int i = 0; i < VIEW__STAGES && s->stages[i].name; i++)
-        view__append(note, room, "%s\"%s\":%.2f", i ? "," : "", s->stages[i].name,
+        olat__append(note, room, "%s\"%s\":%.2f", i ? "," : "", s->stages[i].name,
                      1e3 * s->stages[i].seconds);
-    view__append(note, room, "}}");
+    olat__append(note, room, "}}");
     return SSDGS_OK;
 }
 
@@ -349,7 +340,7 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
                                  &image, NULL);
     *note = 0;
     if (result) {
-        view__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));
+        olat__append(note, room, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(s->context));
         return result;
     }
     const int transfer = ssdgs_model_settings(s->models[0])->transfer;
@@ -363,7 +354,7 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
             rgba[3] = 255;
         }
     *size = 8 * pixels;
-    view__append(note, room, "{\"w\":%d,\"h\":%d}", 2 * width, height);
+    olat__append(note, room, "{\"w\":%d,\"h\":%d}", 2 * width, height);
     return SSDGS_OK;
 }
 

@@ -3,7 +3,11 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+<<<<<<< HEAD
 #include "reduce.h"
+=======
+#include "flip.h"
+>>>>>>> olat-split
 #include <ctype.h>
 
 #define PI 3.14159265358979323846
@@ -641,7 +645,7 @@ static int relight(job *j) {
     if (!check_outputs(j) || !make_planes(j)) return 1;
     if (j->given[NETWORKS] && !save_model(j, "whole.ply")) return 1;
     if (j->reduce) {
-        const ssdgs_result result = reduce_model(j->context, &j->model, j->reduce);
+        result = reduce_model(j->context, &j->model, j->reduce);
         if (result) return fail(ssdgs_result_string(result));
         if (!save_model(j, "reduced.ply")) return 1;
     }

@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "olat.h"
+#include "flip.h"
 #include "judge.h"
 #include "reduce.h"
 #include "picture.h"

@@ -83,7 +83,7 @@ cpu=$(sed -n 's/^model name[[:space:]]*: //p' /proc/cpuinfo 2>/dev/null | sed 1q
         done
     else absent Fuzzing "clang's libFuzzer"; fi
     if [ "$seconds" = - ] || command -v gcov >/dev/null; then
-        part coverage 'Coverage of ssdgs.h and examples/olat.h' sh tests/coverage.sh "$build"
+        part coverage 'Coverage of ssdgs.h and of examples/olat.h with its parts' sh tests/coverage.sh "$build"
     else absent Coverage gcov; fi
     part levels 'Compilers: gcc and clang at every level' sh tests/matrix.sh "$build" levels
     part standards 'Compilers: C99 to C17, C++11 to C++20' sh tests/matrix.sh "$build" standards

@@ -1,5 +1,5 @@
 #!/bin/sh
-# usage: images.sh BUILD: how examples/olat.h reads images that other programs wrote, beside what these make of them. A
+# usage: images.sh BUILD: how examples/images.h reads images that other programs wrote, beside what these make of them. A
 # program or profile that is missing is named, and what needs it left out. Closes with "N passed, N failed".
 set -u
 build=$1 work=$1/images passed=0 failed=0

@@ -1,5 +1,6 @@
-/* examples/olat.h: PNG of every kind, hostile PNG, the writer, JSON, numbers, datasets good and bad, failing
-   memory. cc -o build/t_olat tests/t_olat.c -lm -lpthread && build/t_olat       (writes under build/) */
+/* examples/olat.h and what it includes, flip.h: PNG of every kind, hostile PNG, the writer, JSON, numbers,
+   datasets good and bad, failing memory. cc -o build/t_olat tests/t_olat.c -lm -lpthread && build/t_olat
+   (writes under build/) */
 #ifndef _DEFAULT_SOURCE
 #define _DEFAULT_SOURCE /* mkfifo */
 #endif
@@ -34,6 +35,7 @@ static void meter_free(void *memory) {
 #define calloc(count, size) meter_clear(count, size)
 #define free(memory) meter_free(memory)
 #include "../examples/olat.h"
+#include "../examples/flip.h"
 #undef malloc
 #undef realloc
 #undef calloc
