@@ -31,7 +31,7 @@ printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS
 extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
 compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
 for example in train relight minimal engine export view check ball bench; do # each is a program of its own
-    compiles "$example.c alone" examples/$example.c "$@" -fsyntax-only
+    compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
 done
 compiles "without SSDGS_SCALAR" tests/library.c "$@" -USSDGS_SCALAR -USSDGS_STAGES
 # renders OPTION WANTED WORD...: a program of those words, with the option, draws the wanted pictures: hashes of best and scalar kernels

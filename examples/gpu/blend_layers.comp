@@ -1,0 +1,10 @@
+/* COMPOSITE of a colour and layers. */
+#version 430
+#include "common.glsl"
+#include "types.glsl"
+#include "walk.glsl"
+const uint window = 128u;
+#include "window.glsl"
+#include "fours.glsl"
+const uint at_once = 8u;
+#include "blend.glsl"

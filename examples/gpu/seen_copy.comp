@@ -1,0 +1,16 @@
+/* SHADE ends. What is skipped takes its neighbour's colour and layers. Reads the neighbours; reads and
+   writes colours and layers. */
+#version 430
+#include "common.glsl"
+#include "types.glsl"
+#include "seen.glsl"
+
+layout(std430, binding = 3) readonly buffer neighbour_block { uint neighbours[]; };
+layout(std430, binding = 4) buffer color_block { vec4 colors[]; };
+layout(std430, binding = 5) buffer layer_block { vec4 layers[]; };
+void main() {
+    if (item() >= count || neighbours[item()] == none) return;
+    uint from = shaded[neighbours[item()]];
+    colors[item()] = colors[from];
+    for (uint i = 0u; i < layer_count; i++) layers[i * count + item()] = layers[i * count + from];
+}

@@ -1,0 +1,17 @@
+/* SORT, of each digit: counts. Reads keys. Writes how often each value of the digit is in a block of keys. */
+#version 430
+#include "common.glsl"
+#include "types.glsl"
+#include "sort.glsl"
+
+layout(std430, binding = 2) writeonly buffer digits { uint counted[]; };
+shared uint found[256];
+void main() {
+    if (group() >= blocks) return;
+    found[lane()] = 0u;
+    barrier();
+    for (uint row = 0u; row < rows; row++)
+        if (at(row) < count()) atomicAdd(found[digit(at(row))], 1u);
+    barrier();
+    counted[256u * group() + lane()] = found[lane()];
+}
