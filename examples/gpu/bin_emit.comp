@@ -7,9 +7,9 @@
 #include "bin_mask.glsl"
 #include "scan.glsl"
 
-layout(std430, binding = 5) writeonly buffer instances { pair instance[]; };
-layout(std430, binding = 6) writeonly buffer owners { uint owner[]; };
-layout(std430, binding = 7) writeonly buffer keys { uint key[]; };
+layout(std430, binding = 6) writeonly buffer instances { pair instance[]; };
+layout(std430, binding = 7) writeonly buffer owners { uint owner[]; };
+layout(std430, binding = 8) writeonly buffer keys { uint key[]; };
 uint in_256s(uint x) { return (x >> 8u) + 1u; } /* sums of these fit 32 bits where sums of x may not */
 void main() {
     uint rank = item(), groups = (count + 255u) / 256u, all = 0u, first = 0u, most = 0u;

@@ -105,28 +105,31 @@ enum {
 
 typedef void (*gpu_function)(void);
 
+#define GPU_EGL_FUNCTIONS(X) \
+    X(uint32_t, BindAPI, (uint32_t api)) \
+    X(void *, CreateContext, (void *display, void *config, void *share, const int32_t *attributes)) \
+    X(uint32_t, DestroyContext, (void *display, void *context)) \
+    X(void *, GetCurrentContext, (void)) \
+    X(void *, GetCurrentDisplay, (void)) \
+    X(void *, GetCurrentSurface, (int32_t which)) \
+    X(void *, GetDisplay, (void *native)) \
+    X(gpu_function, GetProcAddress, (const char *name)) \
+    X(uint32_t, Initialize, (void *display, int32_t *major, int32_t *minor)) \
+    X(uint32_t, MakeCurrent, (void *display, void *draw, void *read, void *context)) \
+    X(uint32_t, QueryAPI, (void))
+
+#define GPU_MEMBER(result, name, arguments) result(*name) arguments;
 typedef struct gpu_egl {
     void *library, *display, *context;
-    gpu_function (*GetProcAddress)(const char *name);
+    GPU_EGL_FUNCTIONS(GPU_MEMBER)
     void *(*GetPlatformDisplay)(uint32_t platform, void *native, const int32_t *attributes);
-    void *(*GetDisplay)(void *native);
     uint32_t (*QueryDevices)(int32_t room, void **devices, int32_t *count);
-    uint32_t (*Initialize)(void *display, int32_t *major, int32_t *minor);
-    uint32_t (*BindAPI)(uint32_t api);
-    uint32_t (*QueryAPI)(void);
-    void *(*CreateContext)(void *display, void *config, void *share, const int32_t *attributes);
-    uint32_t (*DestroyContext)(void *display, void *context);
-    uint32_t (*MakeCurrent)(void *display, void *draw, void *read, void *context);
-    void *(*GetCurrentContext)(void);
-    void *(*GetCurrentDisplay)(void);
-    void *(*GetCurrentSurface)(int32_t which);
 } gpu_egl;
 
 typedef struct gpu_gl {
-#define GPU_MEMBER(result, name, arguments) result(*name) arguments;
     GPU_FUNCTIONS(GPU_MEMBER)
-#undef GPU_MEMBER
 } gpu_gl;
+#undef GPU_MEMBER
 
 /* Memory of the device. All zero: none yet. */
 typedef struct gpu_buffer {
@@ -134,28 +137,32 @@ typedef struct gpu_buffer {
     size_t size; /* bytes */
 } gpu_buffer;
 
-/* The compute programs, compiled when they are first used. */
+/* The compute programs, each of the file of its name, compiled when they are first used. */
+#define GPU_EACH_PROGRAM(X) \
+    X(SEEN_LIST, seen_list) \
+    X(SEEN_COPY, seen_copy) \
+    X(TRANSPORT_NODES, transport_nodes) \
+    X(TRANSPORT_SUMS, transport_sums) \
+    X(SHADE, shade) \
+    X(HIGHLIGHT, highlight) \
+    X(PROJECT, project) \
+    X(SORT_COUNT, sort_count) \
+    X(SORT_SCATTER, sort_scatter) \
+    X(BIN_COUNT, bin_count) \
+    X(BIN_EMIT, bin_emit) \
+    X(BIN_END, bin_end) \
+    X(WALK_CAMERA, walk_camera) \
+    X(GATHER_CAMERA, gather_camera) \
+    X(WALK_LIGHT, walk_light) \
+    X(WALK_MAP, walk_map) \
+    X(GATHER_LIGHT, gather_light) \
+    X(BLEND, blend) \
+    X(BLEND_LAYERS, blend_layers)
+
 typedef enum gpu_program {
-    GPU_SEEN_LIST,
-    GPU_SEEN_COPY,
-    GPU_TRANSPORT_NODES,
-    GPU_TRANSPORT_SUMS,
-    GPU_SHADE,
-    GPU_HIGHLIGHT,
-    GPU_PROJECT,
-    GPU_SORT_COUNT,
-    GPU_SORT_SCATTER,
-    GPU_BIN_COUNT,
-    GPU_BIN_EMIT,
-    GPU_BIN_END,
-    GPU_WALK_CAMERA,
-    GPU_GATHER_CAMERA,
-    GPU_WALK_LIGHT,
-    GPU_WALK_MAP,
-    GPU_GATHER_LIGHT,
-    GPU_BLEND,
-    GPU_BLEND_LAYERS,
-    GPU_PROGRAMS
+#define GPU_NUMBER(number, file) GPU_##number,
+    GPU_EACH_PROGRAM(GPU_NUMBER) GPU_PROGRAMS
+#undef GPU_NUMBER
 } gpu_program;
 
 /* The program's caller may have a context of its own current: it gets it back. */
@@ -242,25 +249,9 @@ struct gpu {
 static const struct {
     const char *name, *text;
 } gpu_sources[GPU_PROGRAMS] = {
-    {"seen_list.comp", gpu_seen_list_comp},
-    {"seen_copy.comp", gpu_seen_copy_comp},
-    {"transport_nodes.comp", gpu_transport_nodes_comp},
-    {"transport_sums.comp", gpu_transport_sums_comp},
-    {"shade.comp", gpu_shade_comp},
-    {"highlight.comp", gpu_highlight_comp},
-    {"project.comp", gpu_project_comp},
-    {"sort_count.comp", gpu_sort_count_comp},
-    {"sort_scatter.comp", gpu_sort_scatter_comp},
-    {"bin_count.comp", gpu_bin_count_comp},
-    {"bin_emit.comp", gpu_bin_emit_comp},
-    {"bin_end.comp", gpu_bin_end_comp},
-    {"walk_camera.comp", gpu_walk_camera_comp},
-    {"gather_camera.comp", gpu_gather_camera_comp},
-    {"walk_light.comp", gpu_walk_light_comp},
-    {"walk_map.comp", gpu_walk_map_comp},
-    {"gather_light.comp", gpu_gather_light_comp},
-    {"blend.comp", gpu_blend_comp},
-    {"blend_layers.comp", gpu_blend_layers_comp},
+#define GPU_SOURCE(number, file) {#file ".comp", gpu_##file##_comp},
+    GPU_EACH_PROGRAM(GPU_SOURCE)
+#undef GPU_SOURCE
 };
 
 /* ==== failures ==== */
@@ -289,46 +280,35 @@ void gpu_wait(gpu *g, int waits) { g->waits = waits; }
 
 #ifdef _WIN32 /* where drivers have no EGL */
 static void *gpu_open_egl(void) { return NULL; }
-static void *gpu_find(void *library, const char *name) {
-    (void)library, (void)name;
-    return NULL;
+static void gpu_find(void *library, const char *name, void *function) {
+    (void)library, (void)name, (void)function;
 }
 #else
 /* It stays open: loaded again it would make its displays anew, which are never closed. */
 static void *gpu_open_egl(void) { return dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL); }
-static void *gpu_find(void *library, const char *name) { return dlsym(library, name); }
-#endif
-
 /* ISO C has no cast from dlsym's result. */
-static void gpu_symbol(const gpu_egl *egl, const char *name, void *function) {
-    void *const found = gpu_find(egl->library, name);
+static void gpu_find(void *library, const char *name, void *function) {
+    void *const found = dlsym(library, name);
     memcpy(function, &found, sizeof found);
 }
+#endif
 
-/* An extension's function: NULL where it is missing. */
+/* An extension's function, or OpenGL's: NULL where it is missing. */
 static void gpu_extension(const gpu_egl *egl, const char *name, void *function) {
     const gpu_function found = egl->GetProcAddress(name);
     memcpy(function, &found, sizeof found);
 }
 
 static int gpu_load_egl(gpu_egl *egl) {
+    int found = 1;
     egl->library = gpu_open_egl();
     if (!egl->library) return 0;
-    gpu_symbol(egl, "eglGetProcAddress", &egl->GetProcAddress);
-    gpu_symbol(egl, "eglGetDisplay", &egl->GetDisplay);
-    gpu_symbol(egl, "eglInitialize", &egl->Initialize);
-    gpu_symbol(egl, "eglBindAPI", &egl->BindAPI);
-    gpu_symbol(egl, "eglQueryAPI", &egl->QueryAPI);
-    gpu_symbol(egl, "eglCreateContext", &egl->CreateContext);
-    gpu_symbol(egl, "eglDestroyContext", &egl->DestroyContext);
-    gpu_symbol(egl, "eglMakeCurrent", &egl->MakeCurrent);
-    gpu_symbol(egl, "eglGetCurrentContext", &egl->GetCurrentContext);
-    gpu_symbol(egl, "eglGetCurrentDisplay", &egl->GetCurrentDisplay);
-    gpu_symbol(egl, "eglGetCurrentSurface", &egl->GetCurrentSurface);
-    if (!egl->GetProcAddress || !egl->GetDisplay || !egl->Initialize || !egl->BindAPI || !egl->QueryAPI ||
-        !egl->CreateContext || !egl->DestroyContext || !egl->MakeCurrent || !egl->GetCurrentContext ||
-        !egl->GetCurrentDisplay || !egl->GetCurrentSurface)
-        return 0;
+#define GPU_LOAD(result, name, arguments) \
+    gpu_find(egl->library, "egl" #name, &egl->name); \
+    found = found && egl->name;
+    GPU_EGL_FUNCTIONS(GPU_LOAD)
+#undef GPU_LOAD
+    if (!found) return 0;
     gpu_extension(egl, "eglGetPlatformDisplayEXT", &egl->GetPlatformDisplay);
     gpu_extension(egl, "eglQueryDevicesEXT", &egl->QueryDevices);
     return 1;
@@ -522,31 +502,25 @@ static uint32_t gpu_compile(gpu *g, gpu_program which) {
     return 0;
 }
 
-/* The program that the next gpu_dispatch() runs, with what its block `parameters` holds (std140). */
-static void gpu_use(gpu *g, gpu_program which, const void *parameters, size_t size) {
-    if (!g->result && !g->program[which]) g->program[which] = gpu_compile(g, which);
-    if (g->result) return;
-    g->gl.UseProgram(g->program[which]);
-    if (!g->parameters.name) g->gl.GenBuffers(1, &g->parameters.name);
-    g->gl.BindBufferBase(GPU_GL_UNIFORM_BUFFER, 0, g->parameters.name);
-    unsigned char block[1024] = {0}; /* a std140 block's size is a multiple of 16; the largest has 800 */
-    memcpy(block, parameters, size);
-    g->gl.BufferData(GPU_GL_UNIFORM_BUFFER, (intptr_t)((size + 15) / 16 * 16), block, GPU_GL_DYNAMIC_DRAW);
-}
-
-static void gpu_bind(gpu *g, uint32_t binding, const gpu_buffer *b) {
-    if (!g->result) g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, binding, b->name);
-}
-
 enum { GPU_GROUP = 256 };
 static size_t gpu_groups(size_t items) { return (items + GPU_GROUP - 1) / GPU_GROUP; }
 
-/* So many groups, and perhaps some more: programs must look at item() or group(). What follows sees what they
-   wrote. */
-static void gpu_dispatch(gpu *g, size_t groups) {
-    const size_t most = 65535;
-    const size_t rows = (groups + most - 1) / most;
+/* Runs so many groups of a program, and perhaps some more: programs must look at item() or group(). It has
+   what its block `parameters` holds (std140), and the buffers of bindings 0, 1 .., up to a NULL; it need not
+   have them all. What follows sees what it wrote. */
+static void gpu_run(gpu *g, gpu_program which, const void *parameters, size_t size,
+                    const gpu_buffer *const *buffers, size_t groups) {
+    const size_t most = 65535, rows = (groups + most - 1) / most;
+    unsigned char block[1024] = {0}; /* a std140 block's size is a multiple of 16; the largest has 800 */
+    if (!g->result && !g->program[which]) g->program[which] = gpu_compile(g, which);
     if (g->result || !groups) return;
+    g->gl.UseProgram(g->program[which]);
+    if (!g->parameters.name) g->gl.GenBuffers(1, &g->parameters.name);
+    g->gl.BindBufferBase(GPU_GL_UNIFORM_BUFFER, 0, g->parameters.name);
+    memcpy(block, parameters, size);
+    g->gl.BufferData(GPU_GL_UNIFORM_BUFFER, (intptr_t)((size + 15) / 16 * 16), block, GPU_GL_DYNAMIC_DRAW);
+    for (uint32_t i = 0; buffers[i]; i++)
+        g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, i, buffers[i]->name);
     g->gl.DispatchCompute((uint32_t)((groups + rows - 1) / rows), (uint32_t)rows, 1);
     g->gl.MemoryBarrier(GPU_GL_SHADER_STORAGE_BARRIER_BIT);
     g->busy = 1;
@@ -748,15 +722,17 @@ static gpu_lighting gpu_lighting_of(const ssdgs_frame *frame) {
     return k;
 }
 
-/* Has the light a map? One that is dark has none. */
-static int gpu_casts(const ssdgs_light *l) {
-    return !l->unshadowed && (l->intensity[0] > 0 || l->intensity[1] > 0 || l->intensity[2] > 0);
+static int gpu_dark(const ssdgs_light *l) {
+    return !(l->intensity[0] > 0 || l->intensity[1] > 0 || l->intensity[2] > 0);
 }
+
+/* Has the light a map? */
+static int gpu_casts(const ssdgs_light *l) { return !l->unshadowed && !gpu_dark(l); }
 
 static void gpu_set_lamp(gpu_lamp *lamp, const ssdgs_frame *frame, const ssdgs_light *l) {
     const int spot = l->kind == SSDGS_LIGHT_SPOT, directional = l->kind == SSDGS_LIGHT_DIRECTIONAL,
               ranged = !directional && l->range > 0, focused = !directional && l->focus > 0,
-              dark = !(l->intensity[0] > 0 || l->intensity[1] > 0 || l->intensity[2] > 0);
+              dark = gpu_dark(l);
     const double inner = (double)l->cone[0], outer = (double)l->cone[1],
                  width = 2 * sin((inner + outer) / 2) * sin((outer - inner) / 2); /* of their cosines */
     double length2 = 0, norm2 = 0;
@@ -783,6 +759,10 @@ static void gpu_upload_lamps(gpu *g, const ssdgs_frame *frame) {
     gpu_upload(g, &g->frame.lamps, lamps, lights * sizeof *lamps);
 }
 
+static size_t gpu_tiles(const ssdgs_splat_view *v) {
+    return (size_t)((v->width + 15) / 16) * (size_t)((v->height + 15) / 16);
+}
+
 /* A face of a light's maps; the GLSL says what it holds. */
 typedef struct gpu_face {
     float view[12], lens[4], kind[4];
@@ -801,7 +781,7 @@ static void gpu_set_face(gpu_face *face, const ssdgs_splat_view *v) {
     face->size[0] = v->width;
     face->size[1] = v->height;
     face->size[2] = (v->width + 15) / 16;
-    face->size[3] = (v->width + 15) / 16 * ((v->height + 15) / 16);
+    face->size[3] = (int32_t)gpu_tiles(v);
 }
 
 static void gpu_upload_faces(gpu *g, const ssdgs_frame *frame) {
@@ -814,11 +794,9 @@ static void gpu_upload_faces(gpu *g, const ssdgs_frame *frame) {
 static void gpu_seen_program(gpu *g, gpu_program which, uint32_t count, uint32_t layers, size_t groups) {
     const uint32_t parameters[2] = {count, layers};
     gpu_frame *f = &g->frame;
-    const gpu_buffer *const buffers[6] = {&f->seen,       &f->tally, &f->shaded,
-                                          &f->neighbours, &f->color, &f->layers};
-    gpu_use(g, which, parameters, sizeof parameters);
-    for (uint32_t i = 0; i < 6; i++) gpu_bind(g, i, buffers[i]);
-    gpu_dispatch(g, groups);
+    const gpu_buffer *const buffers[] = {&f->seen,  &f->tally,  &f->shaded, &f->neighbours,
+                                         &f->color, &f->layers, NULL};
+    gpu_run(g, which, parameters, sizeof parameters, buffers, groups);
 }
 
 static void gpu_reserve_lights(gpu *g, int count) {
@@ -839,8 +817,8 @@ static void gpu_transport_light(gpu *g, const ssdgs_frame *frame, int light) {
     const size_t n = (size_t)frame->count, nodes = (n + GPU_NODE - 1) / GPU_NODE;
     const double unit = (double)frame->settings.length_unit, pi = 3.14159265358979323846;
     const double shortest = GPU_SHORTEST * unit, longest = shortest * (1 << (GPU_LENGTHS - 1));
-    const gpu_buffer *const buffers[6] = {&f->gaussians, &f->flux,      &f->nodes,
-                                          &f->seen,      &f->transport, &f->arrived};
+    const gpu_buffer *const buffers[] = {&f->gaussians, &f->flux,    &f->nodes, &f->seen,
+                                         &f->transport, &f->arrived, NULL};
     struct {
         uint32_t count, stride, light, nodes;
         float soft2, longest, far_radii, scale;
@@ -856,15 +834,11 @@ static void gpu_transport_light(gpu *g, const ssdgs_frame *frame, int light) {
     p.scale = (float)(1 / (2 * pi * shortest));
     p.revision = f->light[light].ready ? f->light[light].revision : ++g->revisions;
     if (!f->light[light].ready) {
-        gpu_use(g, GPU_TRANSPORT_NODES, &p, sizeof p);
-        for (uint32_t i = 0; i < 3; i++) gpu_bind(g, i, buffers[i]);
-        gpu_dispatch(g, (nodes + GPU_NODE - 1) / GPU_NODE);
+        gpu_run(g, GPU_TRANSPORT_NODES, &p, sizeof p, buffers, (nodes + GPU_NODE - 1) / GPU_NODE);
         f->light[light].revision = p.revision;
         f->light[light].ready = !g->result;
     }
-    gpu_use(g, GPU_TRANSPORT_SUMS, &p, sizeof p);
-    for (uint32_t i = 0; i < 6; i++) gpu_bind(g, i, buffers[i]);
-    gpu_dispatch(g, nodes);
+    gpu_run(g, GPU_TRANSPORT_SUMS, &p, sizeof p, buffers, nodes);
 }
 
 /* Room for transport of all lights. What another transport_detail has left is made anew; other numbers of
@@ -899,18 +873,16 @@ static void gpu_shade(gpu *g, const ssdgs_frame *frame) {
     const uint32_t count = (uint32_t)n, layers = (uint32_t)frame->layer_count;
     gpu_frame *f = &g->frame;
     const gpu_lighting k = gpu_lighting_of(frame);
-    const gpu_buffer *const buffers[11] = {&f->networks,     &f->lamps,     &f->gaussians, &f->shaded,
-                                           &f->visibility,   &f->depth_cue, &f->transport, &f->exposures,
-                                           &f->camera.depth, &f->color,     &f->layers};
+    const gpu_buffer *const buffers[] = {&f->networks,     &f->lamps,     &f->gaussians, &f->shaded,
+                                         &f->visibility,   &f->depth_cue, &f->transport, &f->exposures,
+                                         &f->camera.depth, &f->color,     &f->layers,    NULL};
     gpu_reserve(g, &f->shaded, (n + 1) * sizeof(uint32_t));
     gpu_reserve(g, &f->neighbours, n * sizeof(uint32_t));
     gpu_reserve(g, &f->color, 4 * n * sizeof(float));
     gpu_reserve(g, &f->layers, 4 * n * (size_t)frame->layer_count * sizeof(float));
     gpu_seen_program(g, GPU_SEEN_LIST, count, layers, groups);
     gpu_transport_all(g, frame);
-    gpu_use(g, GPU_SHADE, &k, sizeof k);
-    for (uint32_t i = 0; i < 11; i++) gpu_bind(g, i, buffers[i]);
-    gpu_dispatch(g, (n + (size_t)k.inputs[2] - 1) / (size_t)k.inputs[2]);
+    gpu_run(g, GPU_SHADE, &k, sizeof k, buffers, (n + (size_t)k.inputs[2] - 1) / (size_t)k.inputs[2]);
     if (frame->options.max_error > 0) gpu_seen_program(g, GPU_SEEN_COPY, count, layers, groups);
 }
 
@@ -921,16 +893,13 @@ static float gpu_log2_threshold(const ssdgs_frame *frame) {
     return (float)(log(threshold > 1e-9 ? threshold : 1e-9) * 1.44269504088896341);
 }
 
-static size_t gpu_tiles(const ssdgs_splat_view *v) {
-    return (size_t)((v->width + 15) / 16) * (size_t)((v->height + 15) / 16);
-}
-
 static void gpu_project_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *to) {
     const ssdgs_splat_view *v = frame->views + view;
     struct {
         float view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance;
         uint32_t count, stride, width, height, orthographic, by_distance, compensate, floored;
     } p;
+    const gpu_buffer *const buffers[] = {&g->frame.gaussians, &to->record, &to->depth, NULL};
     const size_t n = (size_t)frame->count;
     for (int i = 0; i < 12; i++) p.view[i] = (float)v->view[i];
     p.fx = (float)v->fx, p.fy = (float)v->fy, p.cx = (float)v->cx, p.cy = (float)v->cy;
@@ -946,11 +915,7 @@ static void gpu_project_view(gpu *g, const ssdgs_frame *frame, int view, gpu_vie
     p.floored = v->blur == SSDGS_BLUR_FLOOR;
     gpu_reserve(g, &to->record, n * sizeof(ssdgs_record));
     gpu_reserve(g, &to->depth, n * sizeof(float));
-    gpu_use(g, GPU_PROJECT, &p, sizeof p);
-    gpu_bind(g, 0, &g->frame.gaussians);
-    gpu_bind(g, 1, &to->record);
-    gpu_bind(g, 2, &to->depth);
-    gpu_dispatch(g, gpu_groups(n));
+    gpu_run(g, GPU_PROJECT, &p, sizeof p, buffers, gpu_groups(n));
 }
 
 enum { GPU_SORT_BLOCKS = 256, GPU_FIRST_ROOM = 1 << 16 };
@@ -972,17 +937,16 @@ static void gpu_radix_sort(gpu *g, int view, const gpu_buffer *keys, size_t room
     gpu_reserve(g, &s->digits, blocks * 256 * sizeof(uint32_t));
     *end = 0;
     for (p.shift = 0; p.shift < (uint32_t)bits; p.shift += 8) {
-        gpu_use(g, GPU_SORT_COUNT, &p, sizeof p);
-        gpu_bind(g, 0, &g->frame.facts);
-        gpu_bind(g, 1, p.shift ? s->key + *end : keys);
-        gpu_bind(g, 2, &s->digits);
-        gpu_dispatch(g, blocks);
-        gpu_use(g, GPU_SORT_SCATTER, &p, sizeof p);
-        gpu_bind(g, 3, s->value + *end);
-        *end = !*end;
-        gpu_bind(g, 4, s->key + *end);
-        gpu_bind(g, 5, s->value + *end);
-        gpu_dispatch(g, blocks);
+        const int from = *end, to = *end = !from;
+        const gpu_buffer *const buffers[] = {&g->frame.facts,
+                                             p.shift ? s->key + from : keys,
+                                             &s->digits,
+                                             s->value + from,
+                                             s->key + to,
+                                             s->value + to,
+                                             NULL};
+        gpu_run(g, GPU_SORT_COUNT, &p, sizeof p, buffers, blocks);
+        gpu_run(g, GPU_SORT_SCATTER, &p, sizeof p, buffers, blocks);
     }
 }
 
@@ -1026,31 +990,19 @@ static void gpu_bin_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *t
            (uint32_t)(v->height + 15) / 16,
            (uint32_t)room,
            gpu_log2_threshold(frame)};
+    gpu_scratch *s = &g->scratch;
+    const gpu_buffer *const counted[] = {&g->frame.facts, &to->record, &to->order,    &to->of_gaussian,
+                                         &s->groups,      &to->depth,  &to->instance, &s->owner,
+                                         s->key,          NULL};
     int bits = 1, end; /* one pass at least: it numbers the instances */
     gpu_reserve_instances(g, frame, v, to);
-    gpu_use(g, GPU_BIN_COUNT, &p, sizeof p);
-    gpu_bind(g, 0, &g->frame.facts);
-    gpu_bind(g, 1, &to->record);
-    gpu_bind(g, 2, &to->order);
-    gpu_bind(g, 3, &to->of_gaussian);
-    gpu_bind(g, 4, &g->scratch.groups);
-    gpu_bind(g, 5, &to->depth);
-    gpu_dispatch(g, gpu_groups(n));
-    gpu_use(g, GPU_BIN_EMIT, &p, sizeof p);
-    gpu_bind(g, 5, &to->instance);
-    gpu_bind(g, 6, &g->scratch.owner);
-    gpu_bind(g, 7, g->scratch.key);
-    gpu_dispatch(g, gpu_groups(n));
+    gpu_run(g, GPU_BIN_COUNT, &p, sizeof p, counted, gpu_groups(n));
+    gpu_run(g, GPU_BIN_EMIT, &p, sizeof p, counted, gpu_groups(n));
     while (tiles > (size_t)1 << bits) bits++;
-    gpu_radix_sort(g, view, g->scratch.key, room, bits, 1, &end);
-    gpu_use(g, GPU_BIN_END, &p, sizeof p);
-    gpu_bind(g, 1, g->scratch.key + end);
-    gpu_bind(g, 2, g->scratch.value + end);
-    gpu_bind(g, 3, &g->scratch.owner);
-    gpu_bind(g, 4, &to->instance);
-    gpu_bind(g, 5, &to->tile_list);
-    gpu_bind(g, 6, &to->tile_start);
-    gpu_dispatch(g, gpu_groups(room + 1));
+    gpu_radix_sort(g, view, s->key, room, bits, 1, &end);
+    const gpu_buffer *const sorted[] = {&g->frame.facts, s->key + end,   s->value + end,  &s->owner,
+                                        &to->instance,   &to->tile_list, &to->tile_start, NULL};
+    gpu_run(g, GPU_BIN_END, &p, sizeof p, sorted, gpu_groups(room + 1));
 }
 
 /* What the walks and COMPOSITE are told of a view. */
@@ -1083,25 +1035,17 @@ static gpu_walk_parameters gpu_walk_of(const ssdgs_frame *frame, int view) {
 static void gpu_walk_camera_view(gpu *g, const ssdgs_frame *frame, gpu_view *to) {
     const gpu_walk_parameters p = gpu_walk_of(frame, 0);
     const struct { uint32_t count, thrifty; } gather = {(uint32_t)frame->count, frame->options.max_error > 0};
+    const gpu_buffer *const walked[] = {&to->record,    &to->tile_list,   &to->tile_start,
+                                        &to->tile_seen, &to->tile_needed, NULL};
+    const gpu_buffer *const gathered[] = {
+        &to->of_gaussian, &to->instance, &to->tile_seen, &to->tile_needed, &g->frame.seen,
+        &g->frame.tally,  NULL};
     gpu_reserve(g, &to->tile_seen, g->instance_room * sizeof(uint32_t));
     gpu_reserve(g, &to->tile_needed, g->instance_room * sizeof(uint32_t));
     gpu_reserve(g, &g->frame.seen, (size_t)frame->count * sizeof(uint32_t));
     gpu_reserve(g, &g->frame.tally, 2 * gpu_groups((size_t)frame->count) * sizeof(uint32_t));
-    gpu_use(g, GPU_WALK_CAMERA, &p, sizeof p);
-    gpu_bind(g, 0, &to->record);
-    gpu_bind(g, 1, &to->tile_list);
-    gpu_bind(g, 2, &to->tile_start);
-    gpu_bind(g, 3, &to->tile_seen);
-    gpu_bind(g, 4, &to->tile_needed);
-    gpu_dispatch(g, p.tiles);
-    gpu_use(g, GPU_GATHER_CAMERA, &gather, sizeof gather);
-    gpu_bind(g, 0, &to->of_gaussian);
-    gpu_bind(g, 1, &to->instance);
-    gpu_bind(g, 2, &to->tile_seen);
-    gpu_bind(g, 3, &to->tile_needed);
-    gpu_bind(g, 4, &g->frame.seen);
-    gpu_bind(g, 5, &g->frame.tally);
-    gpu_dispatch(g, gpu_groups((size_t)frame->count));
+    gpu_run(g, GPU_WALK_CAMERA, &p, sizeof p, walked, p.tiles);
+    gpu_run(g, GPU_GATHER_CAMERA, &gather, sizeof gather, gathered, gpu_groups((size_t)frame->count));
 }
 
 /* Are the lights' maps asked for? */
@@ -1125,19 +1069,14 @@ static void gpu_gather_light_view(gpu *g, const ssdgs_frame *frame, int view, co
            !gpu_same_light(frame, view, view + 1),
            frame->depth_cue != NULL,
            frame->flux != NULL};
+    const gpu_buffer *const buffers[] = {
+        &from->of_gaussian,   &from->instance,     &from->tile_sums, &g->scratch.sums,
+        &g->frame.visibility, &g->frame.depth_cue, &g->frame.flux,   NULL};
     gpu_reserve(g, &g->scratch.sums, n * 4 * sizeof(float));
     gpu_reserve(g, &g->frame.visibility, all);
     gpu_reserve(g, &g->frame.depth_cue, frame->depth_cue ? all : 4);
     gpu_reserve(g, &g->frame.flux, frame->flux ? all : 4);
-    gpu_use(g, GPU_GATHER_LIGHT, &p, sizeof p);
-    gpu_bind(g, 0, &from->of_gaussian);
-    gpu_bind(g, 1, &from->instance);
-    gpu_bind(g, 2, &from->tile_sums);
-    gpu_bind(g, 3, &g->scratch.sums);
-    gpu_bind(g, 4, &g->frame.visibility);
-    gpu_bind(g, 5, &g->frame.depth_cue);
-    gpu_bind(g, 6, &g->frame.flux);
-    gpu_dispatch(g, gpu_groups(n));
+    gpu_run(g, GPU_GATHER_LIGHT, &p, sizeof p, buffers, gpu_groups(n));
 }
 
 static void gpu_walk_light_view(gpu *g, const ssdgs_frame *frame, int view, gpu_view *to) {
@@ -1157,21 +1096,11 @@ static void gpu_walk_light_view(gpu *g, const ssdgs_frame *frame, int view, gpu_
     const size_t tiles = p.map ? (size_t)faces * p.tiles : 1;
     gpu_reserve(g, &light->map_tile, tiles * sizeof(uint32_t));
     gpu_reserve(g, &light->light_map, tiles * 256 * sizeof(ssdgs_light_pixel));
-    gpu_use(g, GPU_WALK_LIGHT, &p, sizeof p);
-    gpu_bind(g, 0, &to->record);
-    gpu_bind(g, 1, &to->tile_list);
-    gpu_bind(g, 2, &to->tile_start);
-    gpu_bind(g, 3, &to->depth);
-    gpu_bind(g, 4, &to->of_gaussian);
-    gpu_bind(g, 5, &to->tile_sums);
-    gpu_bind(g, 6, &g->frame.facts);
-    gpu_dispatch(g, p.tiles);
-    if (p.map || p.flux) {
-        gpu_use(g, GPU_WALK_MAP, &p, sizeof p);
-        gpu_bind(g, 4, &light->light_map);
-        gpu_bind(g, 7, &light->map_tile);
-        gpu_dispatch(g, p.tiles);
-    }
+    const gpu_buffer *const buffers[] = {
+        &to->record,    &to->tile_list,  &to->tile_start,   &to->depth,       &to->of_gaussian,
+        &to->tile_sums, &g->frame.facts, &light->light_map, &light->map_tile, NULL};
+    gpu_run(g, GPU_WALK_LIGHT, &p, sizeof p, buffers, p.tiles);
+    if (p.map || p.flux) gpu_run(g, GPU_WALK_MAP, &p, sizeof p, buffers, p.tiles);
     gpu_gather_light_view(g, frame, view, to);
 }
 
@@ -1182,9 +1111,9 @@ enum { GPU_LAYERS = 8 };
 static void gpu_blend_all(gpu *g, const ssdgs_frame *frame) {
     const size_t pixels = (size_t)frame->camera.width * (size_t)frame->camera.height;
     gpu_frame *f = &g->frame;
-    const gpu_buffer *const buffers[9] = {
+    const gpu_buffer *const buffers[] = {
         &f->camera.record, &f->camera.tile_list, &f->camera.tile_start, &f->camera.tile_seen, &f->color,
-        &f->layers,        &f->pixels,           &f->layer_pixels,      &f->transmittance};
+        &f->layers,        &f->pixels,           &f->layer_pixels,      &f->transmittance,    NULL};
     const uint32_t all = frame->layer_count ? (uint32_t)frame->layer_count + 1 : 1;
     gpu_walk_parameters p = gpu_walk_of(frame, 0);
     p.gaussians = (uint32_t)frame->count;
@@ -1194,9 +1123,7 @@ static void gpu_blend_all(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve(g, &f->layer_pixels, p.deferred ? pixels * 3 * all * sizeof(float) : 0);
     for (; p.first_layer < all; p.first_layer += GPU_LAYERS) {
         p.layers = all - p.first_layer;
-        gpu_use(g, p.deferred ? GPU_BLEND_LAYERS : GPU_BLEND, &p, sizeof p);
-        for (uint32_t i = 0; i < 9; i++) gpu_bind(g, i, buffers[i]);
-        gpu_dispatch(g, p.tiles);
+        gpu_run(g, p.deferred ? GPU_BLEND_LAYERS : GPU_BLEND, &p, sizeof p, buffers, p.tiles);
     }
 }
 
@@ -1215,17 +1142,16 @@ static void gpu_highlights(gpu *g, const ssdgs_frame *frame) {
     gpu_reserve_lights(g, frame->light_count); /* those without maps */
     for (int light = 0, view = 1; light < frame->light_count && !g->result; light++) {
         const gpu_light *map = f->light + light;
-        const gpu_buffer *const buffers[9] = {
-            &f->layer_pixels, &f->lamps,       &f->faces,  &f->facts,
-            &map->map_tile,   &map->light_map, &f->pixels, &f->pixel_visibility,
-            &f->pixel_shadow};
+        const gpu_buffer *const buffers[] = {&f->layer_pixels, &f->lamps,
+                                             &f->faces,        &f->facts,
+                                             &map->map_tile,   &map->light_map,
+                                             &f->pixels,       &f->pixel_visibility,
+                                             &f->pixel_shadow, NULL};
         k.faces[0] = view;
         while (view < frame->view_count && frame->views[view].light == light) view++;
         k.faces[1] = view - k.faces[0];
         k.faces[2] = light;
-        gpu_use(g, GPU_HIGHLIGHT, &k, sizeof k);
-        for (uint32_t i = 0; i < 9; i++) gpu_bind(g, i, buffers[i]);
-        gpu_dispatch(g, gpu_groups(pixels));
+        gpu_run(g, GPU_HIGHLIGHT, &k, sizeof k, buffers, gpu_groups(pixels));
     }
 }
 

@@ -10,10 +10,10 @@ const uint window = 64u;
 #include "sums.glsl"
 
 layout(std430, binding = 3) readonly buffer depths { float depth[]; };
-layout(std430, binding = 4) writeonly buffer maps { vec4 light_map[]; };
+layout(std430, binding = 7) writeonly buffer maps { vec4 light_map[]; };
 layout(std430, binding = 5) buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
-layout(std430, binding = 7) writeonly buffer map_tiles { uint map_tile[]; };
+layout(std430, binding = 8) writeonly buffer map_tiles { uint map_tile[]; };
 shared float distances[window];
 float t, omega; /* transmittance; solid angle */
 const float levels[4] = float[4](0.98, 0.5, 0.1, -1);
