@@ -2,7 +2,6 @@
    the groups of 256 do, and what is visible. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "bin.glsl"
 #include "bin_mask.glsl"
 #include "scan.glsl"

@@ -2,7 +2,6 @@
    mask, owner and tile, and how many there are. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "bin.glsl"
 #include "bin_mask.glsl"
 #include "scan.glsl"

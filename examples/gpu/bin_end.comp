@@ -2,7 +2,6 @@
    lists, and where each begins. Tiles without entries begin where the next one does. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "bin.glsl"
 
 layout(std430, binding = 1) readonly buffer keys { uint key[]; };

@@ -1,7 +1,6 @@
 /* COMPOSITE of a colour alone. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "walk.glsl"
 const uint window = 128u;
 #include "window.glsl"

@@ -2,7 +2,6 @@
    whether it is seen or skipped, and of 256 at a time how many are seen and the first that is skipped. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "scan.glsl"
 
 layout(std140, binding = 0) uniform parameters { uint count, thrifty; };
@@ -22,7 +21,7 @@ void main() {
         blended |= tile_seen[at];
         needed |= thrifty != 0u ? tile_needed[at] : tile_seen[at];
     }
-    if (item() < count) seen[item()] = needed != 0u ? 1u : blended != 0u ? 2u : 0u;
+    if (item() < count) seen[item()] = needed != 0u ? is_seen : blended != 0u ? is_skipped : 0u;
     if (lane() == 0u) first = none;
     scan(needed != 0u ? 1u : 0u, sum);
     if (needed == 0u && blended != 0u) atomicMin(first, item());

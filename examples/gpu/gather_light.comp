@@ -2,7 +2,6 @@
    and flux. Of the views of a light one after the other; what the last one adds up to is eq. 7. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 
 layout(std140, binding = 0) uniform parameters { uint count, light, first, last, cue, flux; };
 layout(std430, binding = 0) readonly buffer of_gaussians { pair of_gaussian[]; };

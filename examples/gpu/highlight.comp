@@ -2,7 +2,6 @@
    and the maps of the light. Writes the picture, and the visibility and shadow of each pixel. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "lighting.glsl"
 
 layout(std430, binding = 0) readonly buffer layer_pixel_block { float layer_pixels[]; };

@@ -44,8 +44,6 @@ struct lamp {
 };
 bool on(int flag) { return (size.z & flag) != 0; }
 
-bool broken(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0x7f800000u; }
-bool broken(vec3 x) { return broken(x.x) || broken(x.y) || broken(x.z); }
 float power_of_e(float x) { return exp(clamp(x, -87.0, 87.0)); }
 float sigmoid(float x) { return 1.0 / (1.0 + power_of_e(-x)); }
 vec3 sigmoid(vec3 x) { return vec3(sigmoid(x.x), sigmoid(x.y), sigmoid(x.z)); }

@@ -2,7 +2,6 @@
    drawn. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "rotation.glsl"
 
 layout(std140, binding = 0) uniform parameters {
@@ -18,9 +17,6 @@ float channel(uint which, uint i) { return gaussian[which * stride + i]; }
 vec3 channels(uint which, uint i) {
     return vec3(channel(which, i), channel(which + 1u, i), channel(which + 2u, i));
 }
-/* By the bits: compilers may take NaN for impossible. */
-bool is_number(float x) { return (floatBitsToUint(x) & 0x7FFFFFFFu) <= 0x7F800000u; }
-bool is_finite(float x) { return (floatBitsToUint(x) & 0x7FFFFFFFu) < 0x7F800000u; }
 
 /* a b - c d, its rounding error put back. */
 float difference(float a, float b, float c, float d) {
@@ -38,8 +34,7 @@ void main() {
     vec4 raw = vec4(channel(3u, i), channels(4u, i));
     vec3 log_scale = channels(7u, i);
     float logit = channel(10u, i);
-    bool drawn = is_finite(position.x) && is_finite(position.y) && is_finite(position.z) &&
-        is_finite(raw.x) && is_finite(raw.y) && is_finite(raw.z) && is_finite(raw.w) &&
+    bool drawn = is_finite(position) && is_finite(raw.xyz) && is_finite(raw.w) &&
         is_number(log_scale.x) && is_number(log_scale.y) && is_number(log_scale.z) && is_number(logit);
     vec3 scale = exp(clamp(log_scale, -20.0, 20.0));
     float opacity = 1 / (1 + exp(-clamp(logit, -20.0, 20.0)));

@@ -2,7 +2,6 @@
    writes colours and layers. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "seen.glsl"
 
 layout(std430, binding = 3) readonly buffer neighbour_block { uint neighbours[]; };

@@ -3,7 +3,6 @@
    is needed: the first's. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "scan.glsl"
 #include "seen.glsl"
 

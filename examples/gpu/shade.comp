@@ -25,7 +25,7 @@ vec3 raw3(int channel) { return vec3(raw(channel), raw(channel + 1), raw(channel
 /* NaN, which max() and clamp() may lose. */
 bool is_broken() {
     bool any = false;
-    for (int i = diffuse; i < material; i++) any = any || (floatBitsToUint(raw(i)) & 0x7fffffffu) > 0x7f800000u;
+    for (int i = diffuse; i < material; i++) any = any || !is_number(raw(i));
     return any;
 }
 void find_frame() {
@@ -137,7 +137,7 @@ layout(std430, binding = 10) writeonly buffer layer_block { vec4 layers[]; };
 bool live; /* the thread has a Gaussian of its own */
 bool black; /* something is not finite, or too large */
 void write_layer(int layer, vec3 value) {
-    black = black || broken(value) || any(greaterThan(abs(value), vec3(1e30)));
+    black = black || !is_finite(value) || any(greaterThan(abs(value), vec3(1e30)));
     if (live) layers[uint(layer) * uint(counts.x) + me] = vec4(value, 0);
 }
 /* Q of the pixel's highlight, depth, F0, cover, normal. */
@@ -293,7 +293,7 @@ void main() {
     if (on(has_ambient)) add_ambient();
     if (!live) return;
     vec3 sum = diffuse_sum + specular_sum + scattering_sum;
-    black = black || broken(sum) || broken(axes[2]) || is_broken();
+    black = black || !is_finite(sum) || !is_finite(axes[2]) || is_broken();
     for (int i = 0; i < counts.w && black; i++) layers[uint(i) * uint(counts.x) + me] = vec4(0);
     colors[me] = black ? vec4(0, 0, 0, 1) : vec4(sum, 0);
 }

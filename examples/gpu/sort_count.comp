@@ -1,7 +1,6 @@
 /* SORT, of each digit: counts. Reads keys. Writes how often each value of the digit is in a block of keys. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "sort.glsl"
 
 layout(std430, binding = 2) writeonly buffer digits { uint counted[]; };

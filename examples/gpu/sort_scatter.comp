@@ -4,7 +4,6 @@
    number of bits before its own. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "sort.glsl"
 #include "scan.glsl"
 

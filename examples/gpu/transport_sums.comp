@@ -7,7 +7,6 @@
 #include "transport.glsl"
 
 const uint lengths = 5u;
-const uint is_seen = 1u;
 layout(std430, binding = 2) readonly buffer node_block { node node_of[]; };
 layout(std430, binding = 3) readonly buffer seen_block { uint seen[]; };
 layout(std430, binding = 4) writeonly buffer transport_block { float transported[]; };

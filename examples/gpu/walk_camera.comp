@@ -4,7 +4,6 @@
    round before. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "walk.glsl"
 const uint window = 256u;
 #include "window.glsl"

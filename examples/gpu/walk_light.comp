@@ -4,7 +4,6 @@
    and what is in no other tile is not sampled, unless for its cue: v = 0 / 1. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "walk.glsl"
 const uint window = 64u;
 #include "window.glsl"

@@ -2,7 +2,6 @@
    transmittance falls below 0.98, 0.5, 0.1, and with flux the sums of solid angle x blend weight. */
 #version 430
 #include "common.glsl"
-#include "types.glsl"
 #include "walk.glsl"
 const uint window = 64u;
 #include "window.glsl"
