@@ -46,7 +46,7 @@ void main() {
         else if (lane() < window) masks[lane()] = 0u;
         for (uint i = lane(); i < entries * at_once; i += 256u)
             values[i] = value_of(first_layer + i % at_once, tile_list[from + i / at_once].first);
-        find_covered();
+        find_covered(0u);
         for (uint word = 0u; word < words && t >= stop; word++) {
             uint rest = covered[words * micro() + word];
             while (rest != 0u && t >= stop) meet_four(rest, word, at);

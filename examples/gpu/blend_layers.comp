@@ -2,7 +2,7 @@
 #version 430
 #include "common.glsl"
 #include "walk.glsl"
-const uint window = 128u;
+const uint window = 128u, windows = 1u;
 #include "window.glsl"
 #include "fours.glsl"
 const uint at_once = 8u;

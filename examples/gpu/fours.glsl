@@ -1,11 +1,11 @@
 /* A micro-tile's list, four entries after four, whose weights do not wait for one another. */
 
-/* What a program does with an entry of the window, or with `nothing`, whose weight is 0. */
+/* What a program does with an entry of the window, or with `none`, whose weight is 0. */
 void meet(float weight, uint i);
 float weight_at(uint i, vec2 at) {
     uint some = i % window;
     float weight = weight_of(splats[some], spreads[some], at);
-    return i == nothing ? 0 : weight;
+    return i == none ? 0 : weight;
 }
 /* The next four of these bits, which are a word of the list. */
 void meet_four(inout uint rest, uint word, vec2 at) {

@@ -5,7 +5,7 @@
 #version 430
 #include "common.glsl"
 #include "walk.glsl"
-const uint window = 256u;
+const uint window = 256u, windows = 1u;
 #include "window.glsl"
 #include "fours.glsl"
 
@@ -44,7 +44,7 @@ void main() {
         if (lane() < words) heavy[lane()] = must[lane()] = 0u;
         if (lane() < entries) load(lane(), tile_list[from + lane()].first, tile_list[from + lane()].second);
         else masks[lane()] = 0u;
-        find_covered();
+        find_covered(0u);
         float before = t;
         for (uint round = thrifty ? 0u : 1u; round < 2u; round++) {
             t = before;

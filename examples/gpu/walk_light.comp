@@ -5,7 +5,7 @@
 #version 430
 #include "common.glsl"
 #include "walk.glsl"
-const uint window = 64u;
+const uint window = 64u, windows = 2u;
 #include "window.glsl"
 #include "sums.glsl"
 
@@ -13,47 +13,34 @@ layout(std430, binding = 3) readonly buffer depths { float depth[]; };
 layout(std430, binding = 4) readonly buffer of_gaussians { pair of_gaussian[]; };
 layout(std430, binding = 5) writeonly buffer sums { vec4 tile_sums[]; };
 layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
-shared float depths_of[window];
+shared float depths_of[windows * window];
 shared uint alone[window];
-shared vec4 near_splats[64]; /* as window's */
-shared vec2 near_spreads[64];
-shared float near_depths[64];
-shared uint near_masks[64];
-shared uint near_covered[32];
 float t, met; /* transmittance; sum of blend weight x distance */
 uint near_rest, near_word; /* what of the micro-tile's is not applied yet */
 
-/* A window of what is to be applied, from this entry on. */
+/* The second window: of what is to be applied, from this entry on. */
 void load_near(uint from, uint end) {
     barrier();
-    if (lane() < 64u) {
+    if (lane() < window) {
         bool there = from + lane() < end;
-        pair entry = tile_list[there ? from + lane() : from];
-        near_splats[lane()] = record[2u * entry.first];
-        near_spreads[lane()] = record[2u * entry.first + 1u].xy;
-        near_depths[lane()] = there ? depth[entry.first] : 1e30;
-        near_masks[lane()] = there ? entry.second : 0u;
+        pair entry = tile_list[min(from + lane(), end - 1u)];
+        load(window + lane(), entry.first, there ? entry.second : 0u);
+        depths_of[window + lane()] = there ? depth[entry.first] : 1e30;
     }
-    barrier();
-    if (lane() < 32u) {
-        uint bits = 0u;
-        for (uint i = 0u; i < 32u; i++) bits |= (near_masks[32u * (lane() & 1u) + i] >> (lane() >> 1u) & 1u) << i;
-        near_covered[lane()] = bits;
-    }
-    barrier();
+    find_covered(1u);
     near_word = 0u;
-    near_rest = near_covered[2u * micro()];
+    near_rest = covered[words * (16u + micro())];
 }
 /* All of the window that is nearer than this. */
 void apply(float reach, float nearest, vec2 at) {
     bool nearer = true;
     while (nearer) {
-        if (near_rest == 0u && near_word == 0u) near_rest = near_covered[2u * micro() + ++near_word];
-        uint i = 32u * near_word + uint(findLSB(near_rest)) % 32u;
-        nearer = near_rest != 0u && near_depths[i] < reach;
+        if (near_rest == 0u && near_word == 0u) near_rest = covered[words * (16u + micro()) + ++near_word];
+        uint i = window + 32u * near_word + uint(findLSB(near_rest)) % 32u;
+        nearer = near_rest != 0u && depths_of[i] < reach;
         if (nearer) {
-            float alpha = alpha_of(weight_of(near_splats[i], near_spreads[i], at));
-            met += alpha * t * (near_depths[i] - nearest);
+            float alpha = alpha_of(weight_of(splats[i], spreads[i], at));
+            met += alpha * t * (depths_of[i] - nearest);
             t = max(fma(-alpha, t, t), 1e-20);
             near_rest &= near_rest - 1u;
         }
@@ -62,7 +49,7 @@ void apply(float reach, float nearest, vec2 at) {
 
 void main() {
     if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u], next = begin + 64u; /* near window */
+    uint begin = tile_start[group()], end = tile_start[group() + 1u], next = begin + window; /* near window */
     float nearest = facts[view].nearest;
     bool dark = false;
     vec2 at = centre();
@@ -83,7 +70,7 @@ void main() {
                     alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
                 }
             }
-            find_covered();
+            find_covered(0u);
         }
         for (uint i = 0u; i < entries; i++)
             if (!dark || alone[loaded + i] == 0u) sampled |= 1u << i;
@@ -91,7 +78,7 @@ void main() {
         float last = depths_of[loaded + entries - 1u] - bias;
         bool more = true;
         while (more) {
-            float within = near_depths[63]; /* what is nearer is in the window */
+            float within = depths_of[2u * window - 1u]; /* what is nearer is in the window */
             more = !dark && within < last;
             bool goes_on = rest != 0u;
             while (goes_on) {
@@ -112,7 +99,7 @@ void main() {
             if (more) {
                 apply(last, nearest, at);
                 load_near(next, end);
-                next += 64u;
+                next += window;
             }
         }
         if (!dark) dark = is_dark(t, step);

@@ -3,7 +3,7 @@
 #version 430
 #include "common.glsl"
 #include "walk.glsl"
-const uint window = 64u;
+const uint window = 64u, windows = 1u;
 #include "window.glsl"
 #include "fours.glsl"
 #include "sums.glsl"
@@ -37,7 +37,7 @@ float solid_angle() {
 
 void meet(float weight, uint i) {
     float alpha = alpha_of(weight), past = t;
-    if (i == nothing) return;
+    if (i == none) return;
     t = max(fma(-alpha, t, t), 1e-20);
     if (t < levels[fallen]) note(past, t, distances[i]);
     if (flux != 0u) part[0][i % at_once][lane()] = omega * alpha * past;
@@ -64,7 +64,7 @@ void main() {
             load(lane(), entry.first, entry.second);
             distances[lane()] = depth[entry.first] - nearest;
         }
-        find_covered();
+        find_covered(0u);
         for (uint first = 0u; first < entries; first += at_once) {
             uint word = first >> 5u, rest = covered[words * micro() + word] & 0xFFu << (first & 31u);
             while (rest != 0u) meet_four(rest, word, at);
