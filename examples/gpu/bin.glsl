@@ -1,4 +1,5 @@
-/* BIN: instances rank by rank, then sorted by their tiles, so lists stay in depth order. */
+/* BIN lists the instances of one Gaussian after the other, in depth order, and sorts them by tiles. So a
+   tile's list stays in depth order. Shared by its programs. */
 
 layout(std140, binding = 0) uniform parameters {
     uint count, view, tiles_x, tiles_y, room;

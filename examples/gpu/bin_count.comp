@@ -1,5 +1,6 @@
-/* BIN counts. Reads records and depths in their order. Writes how many tiles each splat touches, how many
-   the groups of 256 do, and what is visible. */
+/* BIN counts, a thread a Gaussian in depth order. Reads records, depths and their order. Writes of each
+   Gaussian how many instances it has and where they begin in its group, of each group how many it has, and
+   how many Gaussians are visible. */
 #version 430
 #include "common.glsl"
 #include "bin.glsl"

@@ -1,5 +1,6 @@
-/* BIN lists. Reads records in their order, and the counts of bin_count. Writes instances, of each its
-   mask, owner and tile, and how many there are. */
+/* BIN lists, a thread a Gaussian in depth order. Reads records, their order, and what bin_count.comp has
+   counted. Writes of each instance its mask, its Gaussian and, as a key, its tile. Writes of each Gaussian
+   where its instances begin, and how many there are of all. */
 #version 430
 #include "common.glsl"
 #include "bin.glsl"

@@ -1,5 +1,6 @@
-/* BIN ends, a thread a place of the sorted list. Reads instances sorted by their tiles. Writes the tiles'
-   lists, and where each begins. Tiles without entries begin where the next one does. */
+/* BIN ends, a thread an instance, sorted by tiles. Reads keys and values. Writes the tiles' lists, where
+   each begins, and of each instance its place there. A tile without entries begins where the next one
+   does. */
 #version 430
 #include "common.glsl"
 #include "bin.glsl"

@@ -1,4 +1,4 @@
-/* COMPOSITE of a colour alone. */
+/* COMPOSITE of colour alone; blend.glsl says what it reads and writes. */
 #version 430
 #include "common.glsl"
 #include "walk.glsl"

@@ -1,6 +1,6 @@
-/* COMPOSITE: eq. 1, the colour and the layers of what is seen. Reads what WALK of the camera has left,
-   colours and layers. Writes pixels, those of layers, transmittance. Layer 0 is the colour. layers: how
-   many there are from first_layer on. */
+/* COMPOSITE: eq. 1. Reads the tiles' lists, what WALK of the camera has found, colours and layers. Writes
+   pixels, those of layers, and transmittance. Layer 0 is the colour; `layers` counts them from first_layer
+   on. The program says before how many are blended at once: `at_once`. */
 
 layout(std430, binding = 3) readonly buffer seens { uint tile_seen[]; };
 layout(std430, binding = 4) readonly buffer colors { vec4 color[]; };

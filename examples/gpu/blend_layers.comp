@@ -1,4 +1,4 @@
-/* COMPOSITE of a colour and layers. */
+/* COMPOSITE of colour and layers; blend.glsl says what it reads and writes. */
 #version 430
 #include "common.glsl"
 #include "walk.glsl"

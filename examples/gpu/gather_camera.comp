@@ -1,5 +1,6 @@
-/* WALK of the camera ends, a thread a Gaussian. Reads what walk_camera has found of its instances. Writes
-   whether it is seen or skipped, and of 256 at a time how many are seen and the first that is skipped. */
+/* WALK of the camera ends, a thread a Gaussian. Reads what walk_camera.comp has found of its instances.
+   Writes whether it is seen, skipped or neither. Writes of each 256 how many are seen, and the first that
+   is skipped. */
 #version 430
 #include "common.glsl"
 #include "scan.glsl"

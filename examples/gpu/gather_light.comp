@@ -1,5 +1,6 @@
-/* WALK of a light ends, a thread a Gaussian. Reads the sums of its instances. Writes visibility, depth cue
-   and flux. Of the views of a light one after the other; what the last one adds up to is eq. 7. */
+/* WALK of a light ends, a thread a Gaussian. Reads the sums of its instances in one of the light's views,
+   and of the views before. Writes the sums of all so far. After the last view these become visibility,
+   which is eq. 7, depth cue and flux. */
 #version 430
 #include "common.glsl"
 

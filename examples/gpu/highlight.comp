@@ -1,5 +1,5 @@
-/* COMPOSITE's highlights: a pixel under one light, from what its Gaussians blend to. Reads blended layers
-   and the maps of the light. Writes the picture, and the visibility and shadow of each pixel. */
+/* COMPOSITE's deferred highlights of one light, a thread a pixel. Reads the layers that Gaussians blend
+   to, and the light's map. Writes the picture, and each pixel's visibility and shadow. */
 #version 430
 #include "common.glsl"
 #include "lighting.glsl"

@@ -1,5 +1,5 @@
-/* What SHADE and COMPOSITE's highlights know of a frame and of a light, and what both do with them. The
-   parameters are struct gpu_lighting of gpu_gl.c. */
+/* Shared by shade.comp and highlight.comp: what they know of a frame and of a light, and the functions
+   that both need. Reads the block `parameters`, which is gpu_lighting in gpu_gl.c. */
 
 const int diffuse = 11; /* channels of a Gaussian */
 const int specular = 14;
@@ -40,7 +40,8 @@ struct lamp {
     vec4 place; /* w = 1: the direction to it */
     vec4 intensity; /* w = 1: it has a map */
     vec4 cone; /* the axis, of a spot or with a focus; w: 1 / range */
-    vec4 rim; /* a spot leaves (a - b |way - axis|^2)^2, within 0 .. 1; z = 1: with cone, range or focus; focus */
+    vec4 rim; /* a, b: a spot leaves (a - b |way - axis|^2)^2, within 0 .. 1; z = 1: with cone, range or
+                 focus; the focus */
 };
 bool on(int flag) { return (size.z & flag) != 0; }
 

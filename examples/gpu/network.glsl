@@ -1,6 +1,7 @@
-/* Networks of as many inputs as 4096 values hold, a column each, in place: a thread sums 4 neurons of 4
-   columns. Those lie apart, so that neighbours read neighbours. Weights: (inputs, neurons), then biases;
-   neurons are padded to 4. A hidden one that is NaN becomes 0, as on the CPU. */
+/* A network, for `inputs.z` columns at once. Reads weights: of each layer (inputs, neurons), then biases,
+   with neurons padded to 4. Reads and writes `row`: inputs, then what each layer makes of them, in place.
+   A thread sums 4 neurons of 4 columns. Its columns lie apart, so that neighbouring threads read
+   neighbouring values. A hidden value that is NaN becomes 0, as on the CPU. */
 
 layout(std430, binding = 0) readonly buffer weight_block { vec4 weight[]; };
 shared float row[4096];

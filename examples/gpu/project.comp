@@ -1,5 +1,5 @@
-/* PROJECT: eq. 1, a thread a Gaussian. Reads the model. Writes each one's record and depth; -1: it is not
-   drawn. */
+/* PROJECT: eq. 1, a thread a Gaussian. Reads the model. Writes a record and a depth of each; depth -1 says
+   that it is not drawn. */
 #version 430
 #include "common.glsl"
 #include "rotation.glsl"
@@ -25,8 +25,8 @@ float difference(float a, float b, float c, float d) {
     return first + error;
 }
 
-/* C = m m' + h is the splat's covariance, m = J W R S. Opacity fades near the eye and, beside the picture,
-   of what reaches far back along z: its affine projection would cover the picture. */
+/* The splat's covariance is C = m m' + h, m = J W R S. Opacity fades near the eye. Beside the picture it
+   fades of what reaches far back along z: the affine projection of that would cover the picture. */
 void main() {
     uint i = item();
     if (i >= count) return;
@@ -75,6 +75,7 @@ void main() {
     drawn = drawn && centre.x + extent.x >= 0.5 && float(width) - 0.5 >= centre.x - extent.x;
     drawn = drawn && centre.y + extent.y >= 0.5 && float(height) - 0.5 >= centre.y - extent.y;
     depth[i] = drawn ? (by_distance != 0u ? length(t) : t.z) : -1;
-    float ux = sqrt(0.5 * log2e * ((c + h) / det)), uy = -ux * (b / (c + h)), wy = sqrt(0.5 * log2e / (c + h));
+    float ux = sqrt(0.5 * log2e * ((c + h) / det)), uy = -ux * (b / (c + h)),
+        wy = sqrt(0.5 * log2e / (c + h));
     if (drawn) record[i] = splat(centre.x, centre.y, ux, uy, wy, log2_opacity, extent.x, extent.y);
 }

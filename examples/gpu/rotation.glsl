@@ -1,5 +1,5 @@
-/* Columns of the matrix: the axes of a quaternion w x y z of any length; 0 is the identity. First by the
-   largest: squares neither over- nor underflow. */
+/* A matrix whose columns are the axes of a quaternion w x y z. Any length will do; 0 is the identity. It
+   is divided by its largest component first, so that squares neither overflow nor underflow. */
 
 mat3 rotation(vec4 q) {
     float largest = max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));

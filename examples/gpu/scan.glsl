@@ -1,4 +1,5 @@
-/* The sum of what the threads before this one have, and of all. */
+/* The sum of the values of the threads before this one; `total` is the sum of all. The whole group must
+   call it. */
 
 shared uint scanned[256];
 shared uint scanned_16[16]; /* of 16 threads */

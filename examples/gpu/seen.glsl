@@ -1,5 +1,4 @@
-/* What seen_list and seen_copy share. Reads what the walk has found of each Gaussian, which it has counted
-   256 at a time. */
+/* Shared by seen_list.comp and seen_copy.comp: what gather_camera.comp leaves, and the list made of it. */
 
 layout(std140, binding = 0) uniform parameters { uint count; uint layer_count; };
 layout(std430, binding = 0) buffer seen_block { uint seen[]; };

@@ -1,5 +1,5 @@
-/* SHADE ends. What is skipped takes its neighbour's colour and layers. Reads the neighbours; reads and
-   writes colours and layers. */
+/* SHADE ends. Reads the neighbours that seen_list.comp found. Writes colours and layers: a skipped
+   Gaussian gets its neighbour's. */
 #version 430
 #include "common.glsl"
 #include "seen.glsl"

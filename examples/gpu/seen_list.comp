@@ -1,6 +1,6 @@
-/* SHADE begins. Reads what the walk has seen and skipped. Writes the Gaussians to be shaded, ascending,
-   and for each that is skipped the place of its neighbour among them. Where all are skipped, some colour
-   is needed: the first's. */
+/* SHADE begins. Reads which Gaussians are seen and which are skipped, and the tally of each 256. Writes
+   the list of those to be shaded, ascending. Writes for each skipped one its neighbour, a place in that
+   list. If all are skipped some colour is needed: the first one is shaded. */
 #version 430
 #include "common.glsl"
 #include "scan.glsl"

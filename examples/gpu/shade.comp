@@ -1,6 +1,6 @@
-/* SHADE: what is seen, in groups of a network's columns, the lights one after the other. Reads the list of
-   seen_list, Gaussians, networks, lights, and of each Gaussian and light visibility, depth cue and
-   transport. Writes colours, and the layers of deferred highlights. */
+/* SHADE. Reads the list of seen_list.comp, the model, networks, lights, and for each Gaussian and light
+   visibility, depth cue and transport. Writes colours, and the layers of deferred highlights. A group
+   shades as many Gaussians as the networks have columns, under one light after the other. */
 #version 430
 #include "common.glsl"
 #include "rotation.glsl"

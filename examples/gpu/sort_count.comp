@@ -1,4 +1,4 @@
-/* SORT, of each digit: counts. Reads keys. Writes how often each value of the digit is in a block of keys. */
+/* SORT, first half of a pass. Reads keys. Writes how often each of the 256 digits is in each block. */
 #version 430
 #include "common.glsl"
 #include "sort.glsl"

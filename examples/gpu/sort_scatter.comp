@@ -1,7 +1,7 @@
-/* SORT, of each digit: moves. Reads keys, values and all counts. Writes keys and values in order of the
-   digit. A digit begins after what is smaller, and after its like in the blocks before. Row after row of
-   256 keys: each digit has a word of bits for each 32 of them, and a key's place among its like is the
-   number of bits before its own. */
+/* SORT, second half of a pass. Reads keys, values and the counts of all blocks. Writes keys and values in
+   the order of their digits. A digit begins after all smaller ones, and after its like in the blocks
+   before. A block goes row by row. For each 32 keys of a row a digit has a word of bits: a key's place
+   among its like is the number of bits before its own. */
 #version 430
 #include "common.glsl"
 #include "sort.glsl"
@@ -34,7 +34,8 @@ void main() {
         barrier();
         if (there) {
             uint place = next[own] + uint(bitCount(bits[(lane() >> 5u) * 256u + own] & ((1u << bit) - 1u)));
-            for (uint word = 0u; word < lane() >> 5u; word++) place += uint(bitCount(bits[word * 256u + own]));
+            for (uint word = 0u; word < lane() >> 5u; word++)
+                place += uint(bitCount(bits[word * 256u + own]));
             key_out[place] = key[at(row)];
             value_out[place] = shift == 0u ? at(row) : value[at(row)];
         }

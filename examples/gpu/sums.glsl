@@ -1,5 +1,6 @@
-/* Sums of up to three values of the pixels of 8 entries, whose micro-tiles alone are looked at: 32 threads
-   an entry, one for each pixel of two micro-tiles, then four a value. */
+/* Sums over the pixels of a tile, of 8 entries at once, up to three values each. Only the micro-tiles of
+   an entry count. 32 threads do an entry: each sums its pixel of every other micro-tile; then four do a
+   value. */
 
 const uint at_once = 8u;
 shared float part[3][8][256];

@@ -1,5 +1,6 @@
-/* Where light enters: nodes of 64 Gaussians, neighbours as training leaves them, and after them nodes of
-   64 nodes. */
+/* Shared by transport_nodes.comp and transport_sums.comp. Reads the places of Gaussians, and the flux that
+   a light brings to each. 64 Gaussians are a node: training leaves neighbours together. After these nodes
+   come the nodes above them, of 64 nodes each. */
 
 layout(std140, binding = 0) uniform parameters {
     uint count, stride, light, nodes;
@@ -14,4 +15,6 @@ struct node {
 };
 uint above() { return (nodes + 63u) / 64u; }
 uint first_node() { return light * (nodes + above()); }
-vec4 source(uint g) { return vec4(gauss[g], gauss[stride + g], gauss[2u * stride + g], flux[light * count + g]); }
+vec4 source(uint g) {
+    return vec4(gauss[g], gauss[stride + g], gauss[2u * stride + g], flux[light * count + g]);
+}

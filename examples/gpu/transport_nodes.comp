@@ -1,5 +1,5 @@
-/* True dipole transport begins. Reads Gaussians' places and the flux to them. Writes nodes. A group makes
-   64 nodes and the one above them; a thread sums 16 Gaussians. */
+/* True dipole transport of a light begins. Reads places and flux. Writes nodes. A group makes 64 nodes and
+   the one above them; a thread sums 16 Gaussians. */
 #version 430
 #include "common.glsl"
 #include "transport.glsl"

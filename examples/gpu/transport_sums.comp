@@ -1,7 +1,8 @@
-/* True dipole transport to 64 neighbours a group, by four threads each. Reads Gaussians' places, the flux
-   to them, nodes, what is seen. Writes sums of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2), for
-   each length l. Nodes that are far from all 64 are points, the others are opened. What one of the 64
-   needs all get, so what is kept does not depend on what has been seen before. */
+/* True dipole transport of a light. Reads places, flux, nodes, and which Gaussians are seen. Writes for
+   each Gaussian and each length l the sum of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2). Writes
+   which revision of the flux these are of. A group does 64 neighbours, with four threads for each. A node
+   that is far from all 64 is a point; others are opened. If one of the 64 is seen all get their sums, so
+   that what is kept does not depend on what was seen before. */
 #version 430
 #include "common.glsl"
 #include "transport.glsl"
@@ -81,10 +82,12 @@ void main() {
     for (uint base = 0u; base < above(); base += 256u) {
         uint tops = open(nodes + base + lane(), base + lane() < above(), 0u);
         for (uint top = 0u; top < tops; top += 4u) {
-            uint own = top + lane() / 64u, at = own < tops ? 64u * (opened[own] - nodes) + lane() % 64u : nodes;
+            uint own = top + lane() / 64u,
+                at = own < tops ? 64u * (opened[own] - nodes) + lane() % 64u : nodes;
             uint near = open(at, at < nodes, 256u);
             for (uint i = 0u; i < near; i += 4u) {
-                uint which = i + lane() / 64u, g = which < near ? 64u * opened[256u + which] + lane() % 64u : count;
+                uint which = i + lane() / 64u,
+                    g = which < near ? 64u * opened[256u + which] + lane() % 64u : count;
                 points[lane()] = g < count ? source(g) : vec4(0);
                 add_points(256u);
             }

@@ -1,5 +1,5 @@
-/* WALK and COMPOSITE: a group a tile, a thread a pixel; 16 threads are a 4x4 micro-tile. Reads records and
-   the tiles' lists. */
+/* Shared by WALK and COMPOSITE: a group a tile, a thread a pixel. 16 threads are a micro-tile of 4x4
+   pixels. Reads records and the tiles' lists. */
 
 layout(std140, binding = 0) uniform parameters {
     uint view, tiles_x, tiles, width, height, first_tile;
@@ -10,7 +10,7 @@ layout(std430, binding = 0) readonly buffer records { vec4 record[]; }; /* two o
 layout(std430, binding = 1) readonly buffer lists { pair tile_list[]; };
 layout(std430, binding = 2) readonly buffer starts { uint tile_start[]; };
 
-/* Every program finds alpha by the same operations, so all of them take the same decisions. */
+/* All programs find alpha by the same operations, so they decide alike. */
 uint micro() { return lane() >> 4u; }
 uvec2 pixel() {
     uint m = micro(), p = lane() & 15u;
@@ -26,7 +26,7 @@ float weight_of(vec4 splat, vec2 spread, vec2 at) { /* x, y, ux, uy; wy, log2 op
     return p >= log2_threshold ? exp2(p) : 0;
 }
 float alpha_of(float weight) { return min(weight, 0.999); }
-/* Has every pixel of the group fallen below the stop by this step, of 1, 2 ..? What is dark stays so. */
+/* Are all pixels of the group below the stop? step: 1, 2 .., one more each time. What is dark stays so. */
 shared uint lit;
 bool is_dark(float t, uint step) {
     if (t >= stop) lit = step;

@@ -1,7 +1,7 @@
-/* WALK of the camera. Writes which micro-tiles blend an entry, and whether it must be shaded. A pixel
-   passes over small weights as long as their sum stays within max_error: what no pixel needs adds up to no
-   more in any. What is heavy in some pixel is shaded anyway and takes nothing of that, so it is found in a
-   round before. */
+/* WALK of the camera. Reads the tiles' lists. Writes of each entry which micro-tiles blend it, and whether
+   it must be shaded. A pixel passes over small weights as long as their sum stays within max_error, so
+   what no pixel needs adds up to no more than that. What is heavy in some pixel is shaded in any case and
+   takes nothing of that sum, so a round before finds it. */
 #version 430
 #include "common.glsl"
 #include "walk.glsl"

@@ -1,7 +1,8 @@
-/* WALK of a light: eqs. 6, 7 and the depth cue. Writes per entry the sums of rho v, rho and rho x cue. It
-   is sampled once all that is nearer than its distance - bias is in the transmittance, so two windows run
-   along the list; a thread takes of them what its micro-tile has. In the dark nothing is applied any more,
-   and what is in no other tile is not sampled, unless for its cue: v = 0 / 1. */
+/* WALK of a light: eqs. 6, 7 and the depth cue. Reads the tiles' lists of one of its views. Writes of each
+   entry the sums of rho v, rho and rho x cue. An entry is sampled once all that is nearer than its
+   distance - bias is in the transmittance. So two windows run along the list: what is sampled, and what is
+   applied to the transmittance. A thread takes of both what its micro-tile has. In the dark nothing is
+   applied any more. What is in no other tile is not sampled there, unless for its cue: v = 0 / 1. */
 #version 430
 #include "common.glsl"
 #include "walk.glsl"
@@ -67,14 +68,16 @@ void main() {
                     pair entry = tile_list[from + lane()];
                     load(lane(), entry.first, entry.second);
                     depths_of[lane()] = depth[entry.first];
-                    alone[lane()] = shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+                    alone[lane()] =
+                        shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
                 }
             }
             find_covered(0u);
         }
         for (uint i = 0u; i < entries; i++)
             if (!dark || alone[loaded + i] == 0u) sampled |= 1u << i;
-        uint word = loaded >> 5u, shift = loaded & 31u, rest = covered[words * micro() + word] >> shift & sampled;
+        uint word = loaded >> 5u, shift = loaded & 31u,
+            rest = covered[words * micro() + word] >> shift & sampled;
         float last = depths_of[loaded + entries - 1u] - bias;
         bool more = true;
         while (more) {
@@ -104,7 +107,8 @@ void main() {
         }
         if (!dark) dark = is_dark(t, step);
         uint own = lane() >> 5u;
-        if (sampled != 0u) add_up(cue != 0u ? 3u : 2u, (sampled >> own & 1u) != 0u ? masks[loaded + own] : 0u);
+        if (sampled != 0u)
+            add_up(cue != 0u ? 3u : 2u, (sampled >> own & 1u) != 0u ? masks[loaded + own] : 0u);
         if (lane() < entries) {
             vec4 sum = vec4(0, 1, 0, 0);
             if ((sampled >> lane() & 1u) != 0u)

@@ -1,5 +1,6 @@
-/* WALK of a light whose map or flux is asked for. Writes the light's map, where on its way the
-   transmittance falls below 0.98, 0.5, 0.1, and with flux the sums of solid angle x blend weight. */
+/* WALK of a light whose map or flux is asked for. Reads the tiles' lists of one of its views. Writes the
+   map: of each pixel where transmittance falls below 0.98, 0.5 and 0.1. With flux it writes of each entry
+   the sum of solid angle x blend weight. */
 #version 430
 #include "common.glsl"
 #include "walk.glsl"

@@ -1,5 +1,6 @@
-/* A window of entries of a tile's list, and which of them each micro-tile has: a bit an entry, in depth
-   order. The program says how many entries: `window`, and how many windows it has: `windows`. */
+/* A window is some entries of a tile's list in shared memory. Each micro-tile has a bit for each entry
+   that touches it, in depth order. The program says before how many entries that is, `window`, and how
+   many windows it has, `windows`. */
 
 /* The entry of the lowest bit, which goes; none: there is none. */
 uint take(inout uint bits, uint word) {
