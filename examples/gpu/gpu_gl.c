@@ -1,19 +1,20 @@
 /* ssdgs.h on a GPU: an ssdgs_gpu_hook in OpenGL 4.3 compute shaders. EGL and OpenGL are found when the
    program runs (libEGL.so.1), without a window; building needs neither their headers nor a library but
    dlopen's. Include this file after ssdgs.h with SSDGS_STAGES, or compile it on its own and declare the
-   functions of its face. The programs are this folder's *.comp, one a file; to be included they become
-   gpu_shaders.h:
+   functions of its face. Each compute program is a file of this folder, *.comp. To be included they become
+   gpu_shaders.h first:
 
        awk -f shaders.awk *.comp >gpu_shaders.h
+
+   Then:
 
        char message[256];
        gpu *g = gpu_create(message, sizeof message);
        ssdgs_gpu_hook hook = gpu_hook(g);
        desc.gpu = &hook;                              of ssdgs_context_create()
 
-   What a stage leaves stays on the device, in buffers laid out as the arrays of ssdgs_frame and
-   ssdgs_splat_view are documented, but for what is smaller than 32 bits, which becomes 32-bit, and numbers of
-   instances, 32-bit too. */
+   What a stage leaves stays on the device. Its buffers are laid out as ssdgs_frame and ssdgs_splat_view say
+   of their arrays, but every value has 32 bits: what has fewer or more there, too. */
 #ifndef SSDGS_STAGES
 #define SSDGS_STAGES
 #endif
@@ -31,8 +32,8 @@
 
 typedef struct gpu gpu;
 gpu *gpu_create(char *message, size_t size); /* NULL: message says why, as where there is no OpenGL 4.3 */
-void gpu_destroy(
-    gpu *g); /* after the contexts that have its hook, and all that was made on them; NULL is fine */
+/* After the contexts that have its hook, and after all that was made on them. NULL is fine. */
+void gpu_destroy(gpu *g);
 /* May serve several contexts, one call at a time, on threads without a GLX context. A frame in which the
    device fails ends with its message; those after it are the CPU's. */
 ssdgs_gpu_hook gpu_hook(gpu *g);
@@ -165,7 +166,7 @@ typedef enum gpu_program {
 #undef GPU_NUMBER
 } gpu_program;
 
-/* The program's caller may have a context of its own current: it gets it back. */
+/* The context that the calling program had current, and gets back. */
 typedef struct gpu_current {
     void *display, *draw, *read, *context;
     uint32_t api;
@@ -446,8 +447,8 @@ static void gpu_reserve(gpu *g, gpu_buffer *b, size_t size) {
     b->size = g->result ? 0 : size;
 }
 
-/* From there on in a buffer that has room for it. Programs that still run are waited for: on NVIDIA's driver
-   580 they could see what was written after they were started. */
+/* Writes to a buffer that has room, from there on. Waits for programs that still run: on NVIDIA's driver 580
+   they could see what was written after they were started. */
 static void gpu_write(gpu *g, const gpu_buffer *b, size_t from, const void *data, size_t size) {
     if (g->result) return;
     gpu_finish(g);
@@ -505,9 +506,9 @@ static uint32_t gpu_compile(gpu *g, gpu_program which) {
 enum { GPU_GROUP = 256 };
 static size_t gpu_groups(size_t items) { return (items + GPU_GROUP - 1) / GPU_GROUP; }
 
-/* Runs so many groups of a program, and perhaps some more: programs must look at item() or group(). It has
-   what its block `parameters` holds (std140), and the buffers of bindings 0, 1 .., up to a NULL; it need not
-   have them all. What follows sees what it wrote. */
+/* Runs so many groups of a program, and perhaps some more: programs must look at item() or group(). Its block
+   `parameters` (std140) is given, and its buffers: of bindings 0, 1 .., up to a NULL. Some may be other
+   programs' alone. What runs later sees what it wrote. */
 static void gpu_run(gpu *g, gpu_program which, const void *parameters, size_t size,
                     const gpu_buffer *const *buffers, size_t groups) {
     const size_t most = 65535, rows = (groups + most - 1) / most;
@@ -547,7 +548,7 @@ enum {
 #define GPU_SOFT 0.02     /* length units: transport's distances are sqrt(r^2 + soft^2) */
 #define GPU_SHORTEST 0.04 /* of its lengths, each twice the one before */
 
-/* The parameters of the lighting programs; the GLSL says what they are. */
+/* The parameters of the lighting programs; lighting.glsl says what they are. */
 typedef struct gpu_lighting {
     float eye[4], centre[4], basis[3 * SSDGS_ASG_COUNT][4], ambient[9][4], medium[GPU_LENGTHS][4],
         camera[3][4], lens[4];
@@ -763,7 +764,7 @@ static size_t gpu_tiles(const ssdgs_splat_view *v) {
     return (size_t)((v->width + 15) / 16) * (size_t)((v->height + 15) / 16);
 }
 
-/* A face of a light's maps; the GLSL says what it holds. */
+/* A face of a light's maps; highlight.comp says what it holds. */
 typedef struct gpu_face {
     float view[12], lens[4], kind[4];
     int32_t size[4];
@@ -921,7 +922,7 @@ static void gpu_project_view(gpu *g, const ssdgs_frame *frame, int view, gpu_vie
 enum { GPU_SORT_BLOCKS = 256, GPU_FIRST_ROOM = 1 << 16 };
 
 /* Sorts the numbers of room keys at most by so many of their low bits, into key[*end], value[*end].
-   instances: how many there are facts.instances says, else room. */
+   instances: 1: facts.instances says how many there are; 0: as many as there is room for. */
 static void gpu_radix_sort(gpu *g, int view, const gpu_buffer *keys, size_t room, int bits, int instances,
                            int *end) {
     gpu_scratch *s = &g->scratch;
