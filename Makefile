@@ -84,7 +84,7 @@ $(filter-out %/fuzz.log,$(TESTS:=.log)): %.log: %
 	@$(RUN) $* $(KEEP_LOG)
 $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
-$(BUILD)/builds.log: %.log: $(OBJECTS)
+$(BUILD)/builds.log: %.log: $(OBJECTS) $(BUILD)/gpu_shaders.h
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 $(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
@@ -102,7 +102,7 @@ test-editors: $(BUILD)/relight $(BUILD)/export ## models that went through an ed
 test-images: $(BUILD)/pixels ## images that other programs wrote, beside what these make of them; leaves out what is missing
 	sh tests/images.sh $(BUILD)
 
-test-gpu: $(BUILD)/t_gpu ## examples/gpu_gl.c on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
+test-gpu: $(BUILD)/t_gpu ## examples/gpu on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
 	$(BUILD)/t_gpu
 
 test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc
@@ -169,9 +169,12 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/t_ball: examples/ball.c
-$(BUILD)/t_gpu: examples/gpu_gl.c
-$(BUILD)/view $(BUILD)/bench: examples/gpu_gl.c
+# What has the GPU's stages
+$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: examples/gpu/gpu_gl.c $(BUILD)/gpu_shaders.h
+$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: PROGRAM += -I$(BUILD)
 $(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += -ldl
+$(BUILD)/gpu_shaders.h: examples/gpu/shaders.awk $(wildcard examples/gpu/*.comp examples/gpu/*.glsl) | $(BUILD)
+	awk -f $(filter-out %.glsl,$^) >$@ || { rm -f $@; exit 1; }
 $(BUILD)/t_check: examples/check.c
 $(BUILD)/t_relight: examples/relight.c
 $(BUILD)/t_options: examples/train.c

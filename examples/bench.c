@@ -1,9 +1,10 @@
-/* cc -O2 examples/bench.c -o bench -lm -lpthread: how fast models render and train here, and what each
+/* (cd examples/gpu; awk -f shaders.awk *.comp) >gpu_shaders.h
+   cc -O2 -I. examples/bench.c -o bench -lm -lpthread: how fast models render and train here, and what each
    shortcut costs in quality. Tables on stdout, bench.json and bench.svg beside the program. Times are the
    best of several passes, taken view by view. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
-#include "gpu_gl.c"
+#include "gpu/gpu_gl.c"
 #include "olat.h"
 #include "reduce.h"
 #ifndef _WIN32

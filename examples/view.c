@@ -1,11 +1,12 @@
-/* cc -O2 examples/view.c -o view -lm -lpthread (Windows: -lws2_32; before glibc 2.34: -ldl): models in a
+/* (cd examples/gpu; awk -f shaders.awk *.comp) >gpu_shaders.h
+   cc -O2 -I. examples/view.c -o view -lm -lpthread (Windows: -lws2_32; before glibc 2.34: -ldl): models in a
    browser on this machine. Prints the address to open; Ctrl-C ends it. */
 #define SSDGS_IMPLEMENTATION
 #ifdef _WIN32
 #include <winsock2.h> /* before windows.h */
 #endif
 #include "../ssdgs.h"
-#include "gpu_gl.c"
+#include "gpu/gpu_gl.c"
 #include "olat.h"
 #include "picture.h"
 #include "view.h"

@@ -31,7 +31,7 @@ printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS
 extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
 compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
 for example in train relight minimal engine export view check ball bench; do # each is a program of its own
-    compiles "$example.c alone" examples/$example.c "$@" -fsyntax-only
+    compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
 done
 for header in files json images flip olat; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
     case $header in files | json) : ;; *) echo '#include "ssdgs.h"' ;; esac >"$build/header.c"

@@ -1,8 +1,8 @@
-/* The GPU's stages (examples/gpu_gl.c), each alone and whole frames, against the CPU's. Not one of `make
+/* The GPU's stages (examples/gpu/gpu_gl.c), each alone and whole frames, against the CPU's. Not one of `make
    test`: it needs EGL with OpenGL 4.3, and Mesa's software renderer does. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
-#include "../examples/gpu_gl.c"
+#include "../examples/gpu/gpu_gl.c"
 #include "scene.h"
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,0 +1,23 @@
+/* BIN ends, a thread an instance, sorted by tiles. Reads keys and values. Writes the tiles' lists, where
+   each begins, and of each instance its place there. A tile without entries begins where the next one
+   does. */
+#version 430
+#include "common.glsl"
+#include "bin.glsl"
+
+layout(std430, binding = 1) readonly buffer keys { uint key[]; };
+layout(std430, binding = 2) readonly buffer values { uint value[]; };
+layout(std430, binding = 3) readonly buffer owners { uint owner[]; };
+layout(std430, binding = 4) buffer instances { pair instance[]; };
+layout(std430, binding = 5) writeonly buffer lists { pair tile_list[]; };
+layout(std430, binding = 6) writeonly buffer starts { uint tile_start[]; };
+void main() {
+    uint place = item(), all = listed(facts[view].instances, room), tiles = tiles_x * tiles_y;
+    if (place > all) return;
+    uint from = place == 0u ? 0u : key[place - 1u] + 1u, to = place == all ? tiles : key[place];
+    for (uint tile = from; tile <= to; tile++) tile_start[tile] = place;
+    if (place == all) return;
+    uint number = value[place];
+    instance[number].first = place;
+    tile_list[place] = pair(owner[number], instance[number].second);
+}
