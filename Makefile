@@ -158,9 +158,9 @@ help: ## this list
 
 $(BUILD):
 	mkdir -p $(BUILD)
-$(BUILD)/ssdgs.o $(BUILD)/ssdgs_64.o: tests/library.c $(HEADERS) | $(BUILD)
+$(BUILD)/ssdgs.o $(BUILD)/ssdgs_64.o: tests/library.c ssdgs.h tests/kernels.h | $(BUILD)
 	$(COMPILE) $(KERNELS) $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
-$(BUILD)/kernels.o $(BUILD)/kernels_64.o: tests/library.c $(HEADERS) | $(BUILD)
+$(BUILD)/kernels.o $(BUILD)/kernels_64.o: tests/library.c ssdgs.h tests/kernels.h | $(BUILD)
 	$(COMPILE) $(KERNELS) -DSSDGS_STATIC -DTEST_KERNELS $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
 $(EXAMPLES): $(BUILD)/%: examples/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)

@@ -17,7 +17,8 @@ DO THIS
     int main(int argc, char **argv) {
         static ssdgs_real color[64 * 64 * 3], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 64, 64);
-        ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0, 0};
+        static const ssdgs_real lamp[3] = {1, -2, 2}, white[3] = {9, 9, 9};
+        ssdgs_light light = ssdgs_light_point(lamp, white);
         static ssdgs_image image;
         ssdgs_context *context = NULL;
         ssdgs_model *model = NULL;
@@ -492,6 +493,13 @@ typedef struct ssdgs_light {
     int unshadowed;   /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
                          beneath a plane */
 } ssdgs_light;
+
+/* Lights of each kind; what else they have, set behind that. direction: of any length. cone: angles inner and
+   outer. NULL: zeros, which rendering refuses. */
+SSDGS_API ssdgs_light ssdgs_light_point(const ssdgs_real position[3], const ssdgs_real intensity[3]);
+SSDGS_API ssdgs_light ssdgs_light_directional(const ssdgs_real direction[3], const ssdgs_real irradiance[3]);
+SSDGS_API ssdgs_light ssdgs_light_spot(const ssdgs_real position[3], const ssdgs_real direction[3],
+                                       const ssdgs_real intensity[3], ssdgs_real inner, ssdgs_real outer);
 
 /* A camera at eye that looks at target; fov_x: horizontal field of view in radians. up may be any vector. fx
    is 0, which rendering refuses, where eye is target or fov_x not within 0 .. pi. */
@@ -3794,6 +3802,38 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
     camera.cx = (ssdgs_real)width / 2;
     camera.cy = (ssdgs_real)height / 2;
     return camera;
+}
+
+static ssdgs_light ssdgs__light_of(ssdgs_light_kind kind, const ssdgs_real *position,
+                                   const ssdgs_real *direction, const ssdgs_real *intensity) {
+    ssdgs_light light;
+    double length2 = 0;
+    memset(&light, 0, sizeof light);
+    light.kind = kind;
+    for (int i = 0; direction && i < 3; i++) length2 += (double)direction[i] * (double)direction[i];
+    const double inverse = fabs(length2 - 1) < 1e-6 || !(length2 > 0) ? 1 : 1 / sqrt(length2);
+    for (int i = 0; i < 3; i++) {
+        if (position) light.position[i] = position[i];
+        if (intensity) light.intensity[i] = intensity[i];
+        if (direction) light.direction[i] = (ssdgs_real)((double)direction[i] * inverse);
+    }
+    return light;
+}
+
+SSDGS_API ssdgs_light ssdgs_light_point(const ssdgs_real position[3], const ssdgs_real intensity[3]) {
+    return ssdgs__light_of(SSDGS_LIGHT_POINT, position, NULL, intensity);
+}
+
+SSDGS_API ssdgs_light ssdgs_light_directional(const ssdgs_real direction[3], const ssdgs_real irradiance[3]) {
+    return ssdgs__light_of(SSDGS_LIGHT_DIRECTIONAL, NULL, direction, irradiance);
+}
+
+SSDGS_API ssdgs_light ssdgs_light_spot(const ssdgs_real position[3], const ssdgs_real direction[3],
+                                       const ssdgs_real intensity[3], ssdgs_real inner, ssdgs_real outer) {
+    ssdgs_light light = ssdgs__light_of(SSDGS_LIGHT_SPOT, position, direction, intensity);
+    light.cone[0] = inner;
+    light.cone[1] = outer;
+    return light;
 }
 
 /* For frames of which only the lights' views count. */
@@ -8181,13 +8221,9 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
     const ssdgs_object object = ssdgs__object_alone(model);
     const ssdgs_camera camera = ssdgs__no_camera();
     const ssdgs_render_options options = ssdgs_render_options_preview();
-    ssdgs_light light;
-    memset(&light, 0, sizeof light);
-    light.kind = SSDGS_LIGHT_DIRECTIONAL;
-    for (int c = 0; c < 3; c++) {
-        light.direction[c] = -direction[c];
-        light.intensity[c] = 1;
-    }
+    static const ssdgs_real even[3] = {1, 1, 1};
+    const ssdgs_real along[3] = {-direction[0], -direction[1], -direction[2]};
+    const ssdgs_light light = ssdgs_light_directional(along, even);
     ssdgs__request request = ssdgs__request_of(&object, 1, &camera, &light, 1, &options);
     request.maps = 1;
     ssdgs_frame frame;

@@ -247,24 +247,16 @@ static ssdgs_object place(const level *l, int model, float height, float x, floa
 }
 
 static void move(level *l, float t) { /* t: 0 .. 1 */
-    const float turn = 6.2831853f * t, sun[3] = {0.48f, -0.36f, 0.8f}, aim[3] = {0, 0.2f, 0.4f};
+    const float turn = 6.2831853f * t, sun[3] = {-0.48f, 0.36f, -0.8f}, aim[3] = {0, 0.2f, 0.4f};
     const float eye[3] = {3.2f * sinf(0.5f * sinf(turn)), -3.2f * cosf(0.5f * sinf(turn)), 1.7f};
-    ssdgs_light *spot = l->lights, *far_away = l->lights + 1;
     look_at(eye, aim, l->view);
     perspective(0.75f, (float)l->width / (float)l->height, 0.05f, l->projection);
-    memset(l->lights, 0, sizeof l->lights);
-    spot->kind = SSDGS_LIGHT_SPOT;
-    spot->position[0] = 2.2f * cosf(turn), spot->position[1] = -1.2f + 0.8f * sinf(turn),
-    spot->position[2] = 2.6f;
-    for (int c = 0; c < 3; c++) spot->direction[c] = aim[c] - spot->position[c];
-    normalize(spot->direction);
-    spot->cone[0] = 0.3f, spot->cone[1] = 0.5f;
-    far_away->kind = SSDGS_LIGHT_DIRECTIONAL;
-    for (int c = 0; c < 3; c++) {
-        spot->intensity[c] = (c == 2 ? 24.0f : 30.0f) / l->light_scale;
-        far_away->intensity[c] = (c ? 0.5f + 0.1f * (float)c : 0.5f) / l->light_scale;
-        far_away->direction[c] = -sun[c];
-    }
+    const float lamp[3] = {2.2f * cosf(turn), -1.2f + 0.8f * sinf(turn), 2.6f};
+    const float beam[3] = {aim[0] - lamp[0], aim[1] - lamp[1], aim[2] - lamp[2]}, unit = 1 / l->light_scale;
+    const float warm[3] = {30 * unit, 30 * unit, 24 * unit},
+                cool[3] = {0.5f * unit, 0.6f * unit, 0.7f * unit};
+    l->lights[0] = ssdgs_light_spot(lamp, beam, warm, 0.3f, 0.5f);
+    l->lights[1] = ssdgs_light_directional(sun, cool);
     l->objects[0] = place(l, 0, 1.0f, -0.75f, 0.1f, turn);
     l->objects[1] = place(l, 1, 0.8f, 0.85f, 0.3f, 0.6f);
     l->objects[2] = place(l, 0, 0.5f, 0.15f, -0.8f, 2 - turn);

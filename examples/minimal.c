@@ -46,7 +46,8 @@ int main(int argc, char **argv) {
     const char *path = argc > 1 ? argv[1] : "build/minimal.png";
     const float eye[3] = {0, -4, 2}, target[3] = {0, 0, 0.2f}, up[3] = {0, 0, 1};
     const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7f, WIDTH, HEIGHT);
-    const ssdgs_light light = {SSDGS_LIGHT_POINT, {2, -2, 3}, {140, 140, 140}, {0, 0, 0}, {0, 0}, 0, 0, 0};
+    const ssdgs_real lamp[3] = {2, -2, 3}, white[3] = {140, 140, 140};
+    const ssdgs_light light = ssdgs_light_point(lamp, white);
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_image image;
     ssdgs_context *context = NULL;

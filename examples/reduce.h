@@ -84,13 +84,10 @@ static inline ssdgs_result reduce__seen_around(const reduce__state *r) {
     const ssdgs_object object = ssdgs_object_default(level);
     for (int view = 0; view < REDUCE__VIEWS && !result; view++) { /* on a spiral around the sphere */
         const double z = 1 - (2 * view + 1.0) / REDUCE__VIEWS, across = sqrt(1 - z * z), turn = 2.39996323;
-        ssdgs_light light;
-        memset(&light, 0, sizeof light);
-        light.kind = SSDGS_LIGHT_DIRECTIONAL;
-        light.intensity[0] = light.intensity[1] = light.intensity[2] = 1;
-        light.direction[0] = (ssdgs_real)(-across * cos(turn * view));
-        light.direction[1] = (ssdgs_real)(-across * sin(turn * view));
-        light.direction[2] = (ssdgs_real)-z;
+        const ssdgs_real even[3] = {1, 1, 1},
+                         along[3] = {(ssdgs_real)(-across * cos(turn * view)),
+                                     (ssdgs_real)(-across * sin(turn * view)), (ssdgs_real)-z};
+        const ssdgs_light light = ssdgs_light_directional(along, even);
         result = ssdgs_scene_light(scene, &object, 1, &light, 1, &exact);
         for (size_t i = 0; i < r->rows && !result; i++) r->seen[i] += r->flux[i] / REDUCE__VIEWS;
     }

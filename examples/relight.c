@@ -3,11 +3,8 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
-<<<<<<< HEAD
-#include "reduce.h"
-=======
 #include "flip.h"
->>>>>>> olat-split
+#include "reduce.h"
 #include <ctype.h>
 
 #define PI 3.14159265358979323846

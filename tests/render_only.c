@@ -17,7 +17,8 @@ int main(void) {
     static ssdgs_real color[SIDE * SIDE * 3], depth[SIDE * SIDE], eye[3] = {0, -3, 1}, target[3] = {0, 0, 0},
                                                                   up[3] = {0, 0, 1};
     ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, SIDE, SIDE);
-    ssdgs_light light = {SSDGS_LIGHT_POINT, {1, -2, 2}, {9, 9, 9}, {0, 0, 0}, {0, 0}, 0, 0, 0};
+    static const ssdgs_real lamp[3] = {1, -2, 2}, white[3] = {9, 9, 9};
+    ssdgs_light light = ssdgs_light_point(lamp, white);
     ssdgs_image image = {0, color, NULL, depth, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_settings settings[2];
     settings[0] = ssdgs_settings_default();

@@ -917,6 +917,25 @@ static void test_bounds(void) {
 /* ---- cameras ---- */
 
 /* A camera at eye looks at target, as wide as fov_x, upright by up; any up makes a camera. */
+/* Each kind's values are where they belong, the others 0, and a direction has length 1. */
+static void test_light_kinds(void) {
+    const ssdgs_real at[3] = {1, 2, 3}, along[3] = {0, 3, -4}, bright[3] = {5, 6, 7};
+    const ssdgs_real unit[3] = {0, (ssdgs_real)0.6, (ssdgs_real)-0.8}, zero[3] = {0, 0, 0};
+    const ssdgs_light lights[3] = {ssdgs_light_point(at, bright), ssdgs_light_directional(along, bright),
+                                   ssdgs_light_spot(at, unit, bright, (ssdgs_real)0.25, (ssdgs_real)0.5)};
+    for (int i = 0; i < 3; i++) {
+        CHECK((int)lights[i].kind == i);
+        CHECK(!memcmp(lights[i].intensity, bright, sizeof bright));
+        CHECK(!memcmp(lights[i].position, i == 1 ? zero : at, sizeof at));
+        for (int c = 0; c < 3; c++) CHECK(fabs((double)(lights[i].direction[c] - (i ? unit[c] : 0))) < 1e-7);
+        CHECK(!(lights[i].range > 0) && !(lights[i].focus > 0) && !lights[i].unshadowed);
+    }
+    CHECK(!memcmp(lights[2].direction, unit, sizeof unit)); /* a unit vector stays as it is */
+    CHECK(lights[2].cone[0] == (ssdgs_real)0.25 && lights[2].cone[1] == (ssdgs_real)0.5);
+    const ssdgs_light none = ssdgs_light_directional(NULL, NULL);
+    CHECK(!memcmp(none.direction, zero, sizeof zero) && !memcmp(none.intensity, zero, sizeof zero));
+}
+
 static void test_look_at(void) {
     enum { W = 80, H = 50 };
     for (int i = 0; i < 100; i++) {
@@ -1842,6 +1861,7 @@ int main(void) {
     test_spot();
     test_bounds();
     test_look_at();
+    test_light_kinds();
     test_matrices();
     test_left_handed();
     test_missed();
