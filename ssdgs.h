@@ -1496,59 +1496,64 @@ typedef struct ssdgs__adam_rate {
     ssdgs_real rate, correct_mean, correct_square, epsilon;
 } ssdgs__adam_rate;
 
+/* Every kernel once: K(result, name, arguments), T where only training asks for it. */
+/* clang-format off */
+#define SSDGS__KERNELS(K, T) \
+    K(void, project, (const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, \
+        size_t begin, size_t end, ssdgs_record *record, ssdgs_real *depth)) \
+    T(void, project_backward, (const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, \
+        size_t begin, size_t end, const ssdgs__project_gradient *d)) \
+    K(uint32_t, bin, (const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, \
+        int begin, int end, uint32_t at)) \
+    K(void, walk_camera, (const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed)) \
+    K(void, walk_light, (const ssdgs__tile *tile, ssdgs_real *sums)) \
+    K(void, composite, (const ssdgs__tile *tile, int layers, const ssdgs_real *const *color, \
+        ssdgs_real *pixels)) \
+    T(void, composite_backward, (const ssdgs__tile *tile, int layers, const ssdgs_real *const *color, \
+        const ssdgs_real *pixels, ssdgs_real *scratch, ssdgs_real *sums, size_t stride, int slot)) \
+    K(void, highlight, (const ssdgs__lighting *lighting, const ssdgs__tile *tile, ssdgs_real *layers, \
+        ssdgs_real *visibility)) \
+    T(void, highlight_backward, (const ssdgs__lighting *lighting, const ssdgs__tile *tile, \
+        const ssdgs_real *layers, const ssdgs_real *visibility, ssdgs_real *gradient, ssdgs_real *sums)) \
+    K(void, lobe, (const ssdgs_real *gauss, ssdgs_real *rows)) \
+    T(void, lobe_backward, (const ssdgs_real *gauss, const ssdgs_real *drows, ssdgs_real *dgauss)) \
+    K(void, transport, (const ssdgs_real *sources, int count, const ssdgs_real *x, \
+        const ssdgs_real *scale, ssdgs_real *sums)) \
+    K(void, expand, (const ssdgs_real *sources, int count, const ssdgs_real *middle, \
+        const ssdgs_real *scale, ssdgs_real *series)) \
+    K(void, series, (const ssdgs_real *series, const ssdgs_real *middle, const ssdgs_real *x, int lanes, \
+        ssdgs_real *sums)) \
+    K(void, dense, (const ssdgs__product *product)) \
+    K(int, live_rows, (const ssdgs_real *rows, int count, uint16_t *list)) \
+    T(void, transpose, (const ssdgs_real *rows, int count, size_t padded, size_t stride, ssdgs_real *out)) \
+    T(void, row_sums, (ssdgs_real *sums, size_t stride, const ssdgs_real *rows, const uint16_t *list, \
+        int count)) \
+    K(void, encode, (ssdgs_real *out, const ssdgs_real *in, const ssdgs_real *origin, ssdgs_real scale, \
+        int dims, int levels)) \
+    T(void, encode_backward, (ssdgs_real *din, const ssdgs_real *dout, const ssdgs_real *out, \
+        ssdgs_real scale, int dims, int levels)) \
+    K(void, reflect, (const ssdgs__lighting *lighting, const ssdgs_real *gauss, ssdgs_real *rows)) \
+    T(void, reflect_backward, (const ssdgs__lighting *lighting, const ssdgs_real *gauss, \
+        const ssdgs_real *drows, ssdgs_real *dgauss, ssdgs_real *lane_sums)) \
+    K(void, colour, (const ssdgs__lighting *lighting, const ssdgs__colour_in *in, ssdgs_real *out)) \
+    T(void, colour_backward, (const ssdgs__lighting *lighting, const ssdgs__colour_in *in, \
+        const ssdgs__colour_gradient *d)) \
+    T(void, depth_normals, (const ssdgs_camera *camera, const ssdgs_real *depth, size_t stride, int y, \
+        ssdgs_real weight, ssdgs_real *out)) \
+    K(void, srgb_encode, (ssdgs_real *out, ssdgs_real *slope, const ssdgs_real *in, size_t n)) \
+    K(void, srgb_decode, (ssdgs_real *out, const ssdgs_real *in, size_t n)) \
+    T(void, ssim_row, (const ssdgs__ssim_row *row, ssdgs_real *sums)) \
+    T(void, ssim_backward_row, (const ssdgs__ssim_row *row, ssdgs_real by_l1, ssdgs_real by_ssim, \
+        ssdgs_real *gradient)) \
+    K(int, finite, (const ssdgs_real *values, size_t n)) \
+    T(void, adam, (ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean, \
+        ssdgs_real *square, size_t n, const ssdgs__adam_rate *rate))
+/* clang-format on */
+#define SSDGS__KERNEL(result, name, arguments) result(*name) arguments;
 typedef struct ssdgs__kernels {
-    void (*project)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, size_t begin,
-                    size_t end, ssdgs_record *record, ssdgs_real *depth);
-    void (*project_backward)(const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride,
-                             size_t begin, size_t end, const ssdgs__project_gradient *d);
-    uint32_t (*bin)(const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, int begin,
-                    int end, uint32_t at);
-    void (*walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed);
-    void (*walk_light)(const ssdgs__tile *tile, ssdgs_real *sums);
-    void (*composite)(const ssdgs__tile *tile, int layers, const ssdgs_real *const *color,
-                      ssdgs_real *pixels);
-    void (*composite_backward)(const ssdgs__tile *tile, int layers, const ssdgs_real *const *color,
-                               const ssdgs_real *pixels, ssdgs_real *scratch, ssdgs_real *sums, size_t stride,
-                               int slot);
-    void (*highlight)(const ssdgs__lighting *lighting, const ssdgs__tile *tile, ssdgs_real *layers,
-                      ssdgs_real *visibility);
-    void (*highlight_backward)(const ssdgs__lighting *lighting, const ssdgs__tile *tile,
-                               const ssdgs_real *layers, const ssdgs_real *visibility, ssdgs_real *gradient,
-                               ssdgs_real *sums);
-    void (*lobe)(const ssdgs_real *gauss, ssdgs_real *rows);
-    void (*lobe_backward)(const ssdgs_real *gauss, const ssdgs_real *drows, ssdgs_real *dgauss);
-    void (*transport)(const ssdgs_real *sources, int count, const ssdgs_real *x, const ssdgs_real *scale,
-                      ssdgs_real *sums);
-    void (*expand)(const ssdgs_real *sources, int count, const ssdgs_real *middle, const ssdgs_real *scale,
-                   ssdgs_real *series);
-    void (*series)(const ssdgs_real *series, const ssdgs_real *middle, const ssdgs_real *x, int lanes,
-                   ssdgs_real *sums);
-    void (*dense)(const ssdgs__product *product);
-    int (*live_rows)(const ssdgs_real *rows, int count, uint16_t *list);
-    void (*transpose)(const ssdgs_real *rows, int count, size_t padded, size_t stride, ssdgs_real *out);
-    void (*row_sums)(ssdgs_real *sums, size_t stride, const ssdgs_real *rows, const uint16_t *list,
-                     int count);
-    void (*encode)(ssdgs_real *out, const ssdgs_real *in, const ssdgs_real *origin, ssdgs_real scale,
-                   int dims, int levels);
-    void (*encode_backward)(ssdgs_real *din, const ssdgs_real *dout, const ssdgs_real *out, ssdgs_real scale,
-                            int dims, int levels);
-    void (*reflect)(const ssdgs__lighting *lighting, const ssdgs_real *gauss, ssdgs_real *rows);
-    void (*reflect_backward)(const ssdgs__lighting *lighting, const ssdgs_real *gauss,
-                             const ssdgs_real *drows, ssdgs_real *dgauss, ssdgs_real *lane_sums);
-    void (*colour)(const ssdgs__lighting *lighting, const ssdgs__colour_in *in, ssdgs_real *out);
-    void (*colour_backward)(const ssdgs__lighting *lighting, const ssdgs__colour_in *in,
-                            const ssdgs__colour_gradient *d);
-    void (*depth_normals)(const ssdgs_camera *camera, const ssdgs_real *depth, size_t stride, int y,
-                          ssdgs_real weight, ssdgs_real *out);
-    void (*srgb_encode)(ssdgs_real *out, ssdgs_real *slope, const ssdgs_real *in, size_t n);
-    void (*srgb_decode)(ssdgs_real *out, const ssdgs_real *in, size_t n);
-    void (*ssim_row)(const ssdgs__ssim_row *row, ssdgs_real *sums);
-    void (*ssim_backward_row)(const ssdgs__ssim_row *row, ssdgs_real by_l1, ssdgs_real by_ssim,
-                              ssdgs_real *gradient);
-    int (*finite)(const ssdgs_real *values, size_t n);
-    void (*adam)(ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean, ssdgs_real *square,
-                 size_t n, const ssdgs__adam_rate *rate);
+    SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__KERNEL)
 } ssdgs__kernels;
+#undef SSDGS__KERNEL
 
 /* Pixel offsets of the lanes of a 4x4 micro-tile, and the lanes' numbers. */
 static const ssdgs_real ssdgs__lane_x[16] = {0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5,
@@ -1843,51 +1848,15 @@ static void ssdgs__append(char *text, size_t *at, const char *more) {
     text[*at] = 0;
 }
 
+/* A whole number in full, others to seven digits, with a point wherever the program's locale has another. */
 static void ssdgs__append_number(char *text, size_t *at, double value) {
-    char digits[32];
-    int n = 31;
-    digits[n] = 0;
-    if (value < 0) {
-        ssdgs__append(text, at, "-");
-        value = -value;
+    char digits[40], one[2] = {0, 0};
+    snprintf(digits, sizeof digits, value > -1e15 && value < 1e15 && value == floor(value) ? "%.0f" : "%.7g",
+             value);
+    for (const char *c = digits; *c; c++) {
+        *one = strchr("+-0123456789einfa", *c) ? *c : '.';
+        if ((*c & 0xC0) != 0x80) ssdgs__append(text, at, one); /* else the rest of a point in UTF-8 */
     }
-    uint64_t bits; /* -ffast-math folds isnan() and isinf() away */
-    memcpy(&bits, &value, sizeof bits);
-    bits &= UINT64_C(0x7FFFFFFFFFFFFFFF);
-    const uint64_t infinite = UINT64_C(0x7FF0000000000000);
-    if (bits >= infinite) {
-        ssdgs__append(text, at, bits > infinite ? "NaN" : "infinite");
-        return;
-    }
-    if (bits && (value < 1e-6 || value >= 1e15)) {
-        double exponent = floor(log10(value)), rest = value * (value < 1 ? 1e20 : 1e-20);
-        rest /= pow(10, exponent + (value < 1 ? 20 : -20)); /* two steps: the power may be 0 */
-        if (rest >= 9.9999995) rest /= 10, exponent++;
-        ssdgs__append_number(text, at, rest);
-        ssdgs__append(text, at, "e");
-        ssdgs__append_number(text, at, exponent);
-        return;
-    }
-    uint64_t whole = (uint64_t)value, rest = (uint64_t)((value - (double)whole) * 1e6 + 0.5);
-    if (rest >= 1000000) {
-        whole++;
-        rest = 0;
-    }
-    if (rest) {
-        int shown = 0;
-        for (int i = 0; i < 6; i++, rest /= 10) {
-            if (rest % 10 || shown) {
-                digits[--n] = (char)('0' + rest % 10);
-                shown = 1;
-            }
-        }
-        digits[--n] = '.';
-    }
-    do {
-        digits[--n] = (char)('0' + whole % 10);
-        whole /= 10;
-    } while (whole);
-    ssdgs__append(text, at, digits + n);
 }
 
 /* Appends %s, %d int, %z size_t, %g double. */
@@ -8495,59 +8464,20 @@ SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int heigh
     ssdgs__pixels(image, width, height, transfer, format, 1, pixels, pitch);
 }
 
-/* The sRGB curve by straight lines, at + slope x: 64 for each octave from 2^-13 to 2^17, off by 1e-5 at most
-   up to 1. */
-enum { SSDGS__LINES_FIRST = (127 - 13) << 6, SSDGS__LINES = 30 << 6 };
-typedef struct ssdgs__line {
-    ssdgs_real at, slope;
-} ssdgs__line;
-
-static void ssdgs__lines_make(ssdgs__line lines[SSDGS__LINES]) {
-    enum { octave = 64, points = octave + 16 };
-    ssdgs_real from[points];
-    for (int begin = 0; begin < SSDGS__LINES; begin += octave) {
-        for (int i = 0; i < points; i++) {
-            const uint32_t bits = (uint32_t)(SSDGS__LINES_FIRST + begin + i) << 17;
-            float start;
-            memcpy(&start, &bits, sizeof start);
-            from[i] = (ssdgs_real)start;
-        }
-        ssdgs_real encoded[points];
-        SSDGS__SRGB_ENCODE(encoded, NULL, from, points);
-        for (int i = 0; i < octave; i++) {
-            const ssdgs_real slope = (encoded[i + 1] - encoded[i]) / (from[i + 1] - from[i]);
-            lines[begin + i].slope = slope;
-            lines[begin + i].at = begin ? encoded[i] - slope * from[i]
-                                        : 0; /* the curve is straight from 0 on to beyond the first octave */
-        }
-    }
-}
-
-/* The value encoded by the lines, or as it is. */
-static SSDGS__INLINE ssdgs_real ssdgs__on_curve(const ssdgs__line *lines, ssdgs_real linear) {
-#ifdef SSDGS_REAL64
-    return lines ? ssdgs_srgb_encode(linear) : linear; /* exact, for tests */
-#else
-    if (!lines) return linear;
-    int32_t line;
-    memcpy(&line, &linear, sizeof line);
-    line = (line >> 17) - SSDGS__LINES_FIRST; /* below 0: of less than 2^-13, negative ones too */
-    line = line < 0 ? 0 : line;
-    line = line < SSDGS__LINES ? line : SSDGS__LINES - 1;
-    return lines[line].at + lines[line].slope * linear;
-#endif
-}
-
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
                              const ssdgs_real background[3], ssdgs_real *stored) {
-    ssdgs__line curve[SSDGS__LINES];
-    const ssdgs__line *lines = transfer == SSDGS_TRANSFER_SRGB ? curve : NULL;
+    enum { part = 240 }; /* values at a time: whole pixels and whole vectors */
+    ssdgs_real straight[part], encoded[part];
     if (!color || !alpha || !background || !stored) return;
-    if (lines) ssdgs__lines_make(curve);
-    for (size_t i = 0; i < pixels; i++, color += 3, stored += 3) {
-        const ssdgs_real a = alpha[i], by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-        for (int c = 0; c < 3; c++)
-            stored[c] = a * ssdgs__on_curve(lines, color[c] * by) + (1 - a) * background[c];
+    for (; pixels; color += part, stored += part, alpha += part / 3, pixels -= part / 3) {
+        const int n = pixels < part / 3 ? 3 * (int)pixels : part;
+        for (int i = 0; i < part; i++)
+            straight[i] = i < n ? color[i] / (alpha[i / 3] > SSDGS__THIN ? alpha[i / 3] : SSDGS__THIN) : 0;
+        if (transfer == SSDGS_TRANSFER_SRGB) SSDGS__SRGB_ENCODE(encoded, NULL, straight, part);
+        else memcpy(encoded, straight, sizeof encoded);
+        for (int i = 0; i < n; i++)
+            stored[i] = alpha[i / 3] * encoded[i] + (1 - alpha[i / 3]) * background[i % 3];
+        if (n < part) return;
     }
 }
 
@@ -14939,37 +14869,11 @@ SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size
     }
 }
 
-static const ssdgs__kernels F(kernels) = {F(project),
-                                          SSDGS__TRAINS(F(project_backward)),
-                                          F(bin),
-                                          F(walk_camera),
-                                          F(walk_light),
-                                          F(composite),
-                                          SSDGS__TRAINS(F(composite_backward)),
-                                          F(highlight),
-                                          SSDGS__TRAINS(F(highlight_backward)),
-                                          F(lobe),
-                                          SSDGS__TRAINS(F(lobe_backward)),
-                                          F(transport),
-                                          F(expand),
-                                          F(series),
-                                          F(dense),
-                                          F(live_rows),
-                                          SSDGS__TRAINS(F(transpose)),
-                                          SSDGS__TRAINS(F(row_sums)),
-                                          F(encode),
-                                          SSDGS__TRAINS(F(encode_backward)),
-                                          F(reflect),
-                                          SSDGS__TRAINS(F(reflect_backward)),
-                                          F(colour),
-                                          SSDGS__TRAINS(F(colour_backward)),
-                                          SSDGS__TRAINS(F(depth_normals)),
-                                          F(srgb_encode),
-                                          F(srgb_decode),
-                                          SSDGS__TRAINS(F(ssim_row)),
-                                          SSDGS__TRAINS(F(ssim_backward_row)),
-                                          F(finite),
-                                          SSDGS__TRAINS(F(adam))};
+#define SSDGS__KERNEL(result, name, arguments) F(name),
+#define SSDGS__TRAINED(result, name, arguments) SSDGS__TRAINS(F(name)),
+static const ssdgs__kernels F(kernels) = {SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__TRAINED)};
+#undef SSDGS__KERNEL
+#undef SSDGS__TRAINED
 
 #endif /* SSDGS__SCALAR */
 #endif /* SSDGS__ISA, else the names alone */

@@ -535,12 +535,13 @@ static void test_odd_numbers(void) {
         const char *text;
     } numbers[] = {{0, "0"},
                    {-7, "-7"},
-                   {1e30, "1e30"},
-                   {9.9999999e30, "1e31"},
-                   {-2.5e-9, "-2.5e-9"},
+                   {1e30, "1e+30"},
+                   {9.9999999e30, "1e+31"},
+                   {-2.5e-9, "-2.5e-09"},
+                   {-123456789012.0, "-123456789012"},
                    {0.125, "0.125"},
                    {1e-300, "1e-300"},
-                   {1.5e300, "1.5e300"}};
+                   {1.5e300, "1.5e+300"}};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         char text[SSDGS__MESSAGE] = "";
         size_t at = 0;

@@ -190,7 +190,7 @@ static void test_focus(ssdgs_model *single, const ssdgs_camera *camera) {
     middle_of(shot + 1, 0, lit);
     CHECK_NEAR(lit, want, 3, 0, exactly(1e-4), "an LED in a world that is turned");
     for (int i = 0; i < 4; i++) {
-        static const char *const words[4] = {"focus = -1", "focus = 1001", "focus = NaN", "unit vector"};
+        static const char *const words[4] = {"focus = -1", "focus = 1001", "focus = nan", "unit vector"};
         ssdgs_image image = {0, shot[1].value, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
         light.focus = i == 0 ? -1 : i == 1 ? 1001 : i == 2 ? (ssdgs_real)NAN : 1;
         if (i == 3) light.direction[0] += 1;
