@@ -48,11 +48,10 @@ static const char *const help[] = {
     "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
     "                           shadow, normal",
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
-    "  --animation FILE.png     of the path's pictures those of the light's first round, as one animated",
-    "                           PNG",
-    "  --size PIXELS            so wide are the path's pictures; the photographs' width",
-    "  --sky MAP                lights all frames by an environment map instead, OpenEXR or PNG, whose rows",
-    "                           lie round the upward axis: it becomes 16 lights and ambient light",
+    "  --animation FILE.png     the light's first round on that path, as one animated PNG",
+    "  --size PIXELS            width of the path's pictures; that of the photographs",
+    "  --sky MAP                an environment map, OpenEXR or PNG, lights all frames in place of lamps and",
+    "                           room: 16 lights and ambient light; its rows lie round the upward axis",
     "  --ambient FACTOR         of the light from the room that the model's photographs had; 1, 0 leaves",
     "                           it out",
     "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
@@ -82,7 +81,9 @@ static int fail_with(const ssdgs_context *context, ssdgs_result result) {
 /* What is written for a view; the first columns of the sheet come first. */
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
 enum { FIT_STEPS = 200, SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160, SKY_LIGHTS = 16 };
-enum { ROUND = 150, FILM_STEP = 2, FILM_FRAMES = ROUND / FILM_STEP, FILM_DELAY = 67 }; /* five seconds */
+/* Pictures of the light's way round on the path; every second one is the animation's, which takes five
+   seconds. */
+enum { ROUND = 150, FILM_STEP = 2, FILM_FRAMES = ROUND / FILM_STEP, FILM_DELAY = 67 };
 static const char *const suffixes[OUTPUT_COUNT] = {
     "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"};
 
@@ -389,7 +390,7 @@ static int make_trajectory(job *j) {
     if (!frames) return !fail("out of memory");
     for (int i = 0; i < count; i++) {
         int half = i / 240, step = i % 240 + 1;
-        double light_turn = step < ROUND ? 360.0 / ROUND * step : 0,
+        double light_turn = step < ROUND ? 360.0 / (double)ROUND * step : 0,
                camera_turn = (step > ROUND ? 2.0 * (step - ROUND) : 0) + 180 * half;
         ssdgs_camera *camera = &frames[i].camera;
         orbit_at(&camera_orbit, axes, camera_turn, eye);
