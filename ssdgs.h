@@ -10635,12 +10635,6 @@ static void ssdgs__bounds_centre(const ssdgs_train_options *o, double centre[3])
     for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
 }
 
-static int ssdgs__in_bounds(const ssdgs_train_options *o, const double x[3]) {
-    int j = 0;
-    while (j < 3 && x[j] > (double)o->bounds_min[j] && x[j] < (double)o->bounds_max[j]) j++;
-    return j == 3;
-}
-
 /* Takes out of the corrections the turn and the move of the bounds' centre that all cameras have in common,
    to first order: the scene would follow, and its photographs look the same. */
 static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
@@ -11052,46 +11046,30 @@ static void ssdgs__draw_place(const ssdgs_train_options *o, uint64_t draw, doubl
     }
 }
 
-/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds'
-   picture. */
-typedef struct ssdgs__silhouette {
-    int left, right, top, bottom; /* right < left: nothing */
-    int whole;                    /* not cut by the picture's border, so that its middle is known */
-    double shown, outside;
-} ssdgs__silhouette;
-
-static ssdgs__silhouette ssdgs__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
+/* Whether more than a tenth of what a photograph shows lies beside the bounds' picture. */
+static int ssdgs__shows_beside(const ssdgs_photo *photo, const ssdgs_train_options *o) {
     const ssdgs_camera *camera = &photo->camera;
-    ssdgs__silhouette s = {0, -1, 0, -1, 0, 0, 0};
-    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30}, shown = 0, beside = 0;
     for (int corner = 0; corner < 8; corner++) {
-        double world[3];
+        double world[3], seen[3];
         for (int c = 0; c < 3; c++)
             world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
-        double seen[3];
         ssdgs__to_camera(camera, world, 1, seen);
+        if (!(seen[2] > 0)) return 0; /* reaching behind the camera it may be anywhere */
         for (int c = 0; c < 2; c++) {
-            const double f = (double)(c ? camera->fy : camera->fx),
-                         at = (double)(c ? camera->cy : camera->cx);
-            const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
-            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c]
-                                 : -1e30; /* reaching behind the camera it may be anywhere */
-            high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
+            const double p = (double)(c ? camera->fy : camera->fx) * seen[c] / seen[2] +
+                             (double)(c ? camera->cy : camera->cx);
+            low[c] = p < low[c] ? p : low[c];
+            high[c] = p > high[c] ? p : high[c];
         }
     }
     for (int y = 0; y < camera->height; y++)
         for (int x = 0; x < camera->width; x++) {
             if (ssdgs__photo_alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 32768) continue;
-            if (s.right < s.left) s.left = s.right = x, s.top = y;
-            s.left = x < s.left ? x : s.left;
-            s.right = x > s.right ? x : s.right;
-            s.bottom = y;
-            s.shown++;
-            s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
+            shown++;
+            beside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
         }
-    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 &&
-              s.bottom < camera->height - 1;
-    return s;
+    return beside > 0.1 * shown;
 }
 
 /* Of eight or more outlines leaves out the wrong ones. The object's places are those where at most one
@@ -11131,11 +11109,8 @@ static ssdgs_result ssdgs__doubt_outlines(ssdgs_trainer *trainer) {
         refused[i] = shown[i] >= few && 3 * refused[i] > shown[i];
         wrong += refused[i];
     }
-    for (int i = 0; i < photos && wrong; i++) {
-        if (trainer->transparent[i] != 2) continue;
-        const ssdgs__silhouette s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
-        beside += s.outside > 0.1 * s.shown;
-    }
+    for (int i = 0; i < photos && wrong; i++)
+        beside += trainer->transparent[i] == 2 && ssdgs__shows_beside(trainer->photos + i, &trainer->options);
     if (2 * beside > outlined) wrong = 0;
     for (int i = photos - 1; i >= 0 && wrong; i--)
         if (refused[i]) trainer->transparent[i] = 1, first = i;
@@ -11293,431 +11268,54 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     return result;
 }
 
-/* ---- whether photographs, cameras and bounds suit each other: notes ---- */
-
-/* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the
-   middles of the silhouettes meet about where the object is; `within` cameras stand within the bounds. */
-static ssdgs_result ssdgs__note_bounds(const ssdgs_trainer *trainer, int within) {
+/* Decides whether the lights tell what other lights do: not where they hardly move, or hardly move in the
+   camera's axes. radius: of the cameras. */
+static void ssdgs__judge_lights(ssdgs_trainer *trainer, double radius) {
     ssdgs_context *context = trainer->context;
-    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0};
-    double shown = 0, outside = 0, half = 0, miss = 0;
-    ssdgs__silhouette *silhouettes = (ssdgs__silhouette *)ssdgs__allocate(
-        trainer->context, (size_t)trainer->photo_count * sizeof *silhouettes);
-    int rays = 0, behind = 0;
-    if (!silhouettes) return SSDGS_ERR_MEMORY;
-    int l;
-    for (int i = 0; i < trainer->photo_count;
-         i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
-        const ssdgs_camera *camera = &trainer->photos[i].camera;
-        ssdgs__silhouette *s = silhouettes + i;
-        if (trainer->transparent[i] != 2) continue;
-        *s = ssdgs__silhouette_of(trainer->photos + i, &trainer->options);
-        shown += s->shown;
-        outside += s->outside;
-        if (!s->whole) continue;
-        rays++;
-        double ray[3];
-        ray[0] = (0.5 * (s->left + s->right + 1) - (double)camera->cx) / (double)camera->fx;
-        ray[1] = (0.5 * (s->top + s->bottom + 1) - (double)camera->cy) / (double)camera->fy;
-        ray[2] = 1;
-        const double length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
-        double eye[3];
-        ssdgs__camera_centre(camera, eye);
-        double d[3];
-        for (int j = 0; j < 3; j++)
-            for (d[j] = 0, l = 0; l < 3; l++) d[j] += (double)camera->view[4 * l + j] * ray[l] / length;
-        for (int j = 0; j < 3; j++)
-            for (l = 0; l < 3; l++) {
-                a[3 * j + l] += (j == l) - d[j] * d[l];
-                b[j] += ((j == l) - d[j] * d[l]) * eye[l];
-                miss += ((j == l) - d[j] * d[l]) * eye[j] * eye[l];
-            }
-    }
-    double cross[3];
-    ssdgs__cross(a + 3, a + 6, cross);
-    const double determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
-    if (determinant > 1e-6) {         /* else they are parallel */
-        for (int j = 0; j < 3; j++) { /* Cramer's rule on a symmetric matrix */
-            double m[9];
-            memcpy(m, a, sizeof m);
-            memcpy(m + 3 * j, b, sizeof b);
-            ssdgs__cross(m + 3, m + 6, cross);
-            x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
-        }
-        for (int i = 0; i < trainer->photo_count; i++) {
-            const ssdgs_camera *camera = &trainer->photos[i].camera;
-            const ssdgs__silhouette *s = silhouettes + i;
-            double seen[3];
-            ssdgs__to_camera(camera, x, 1, seen);
-            if (!s->whole) continue;
-            double wide = 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx;
-            const double high = 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy;
-            wide = wide > high ? wide : high;
-            half = wide > half ? wide : half;
-            behind += wide < 0;
-        }
-        for (int j = 0; j < 3; j++)
-            for (miss -= 2 * b[j] * x[j], l = 0; l < 3; l++) miss += x[j] * a[3 * j + l] * x[l];
-        miss = sqrt(miss > 0 ? miss / rays : 0);
-    }
-    ssdgs__release(trainer->context, silhouettes);
-    const int doubtful = determinant > 1e-6 && miss > 0.5 * half;
-    if (doubtful && behind > rays / 2)
-        ssdgs__note(context, "what the photographs show lies behind the cameras: are their axes right?");
-    else if (doubtful)
-        ssdgs__note(context,
-                    "what the photographs show is in no one place, lines of sight to it miss each other by "
-                    "%g where it is %g "
-                    "wide: are the cameras' poses, axes and lenses right?",
-                    miss, 2 * half);
-    if (within)
-        ssdgs__note(
-            context,
-            "%d cameras of %d stand within bounds_min .. bounds_max, which should hold the object alone",
-            within, trainer->photo_count);
-    if (outside > 0.1 * shown && !doubtful)
-        ssdgs__note(context,
-                    "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
-                    (int)(100 * outside / shown));
-    if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return SSDGS_OK;
-    const double step = pow(10, floor(log10(half)) - 1);
-    for (int j = 0; j < 3; j++) x[j] += (double)trainer->model->settings.origin[j];
-    ssdgs__note(context, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g",
-                step * floor((x[0] - half) / step), step * floor((x[1] - half) / step),
-                step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
-                step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));
-    return SSDGS_OK;
-}
-
-/* Of one photograph, for whether its shading agrees with its light. In camera axes. */
-typedef struct ssdgs__shading {
-    double rotation[9]; /* world to camera */
-    double eye[3];      /* from the bounds' centre, world */
-    double position[3]; /* as given: of the light, or towards it */
-    double shift[2];    /* of the brightness' middle from the silhouette's, in the silhouette's standard
-                           deviations */
-    double brightness;  /* mean, over the light's intensity */
-    int directional;
-} ssdgs__shading;
-
-/* About the light of a pixel laid over black; 0 where it has the colour of the first one. */
-static double ssdgs__lightness(const ssdgs_photo *photo, int transfer, const ssdgs_real corner[3],
-                               size_t pixel) {
-    static const ssdgs_real black[3] = {0, 0, 0};
-    double value = 0, apart = 0;
-    ssdgs_real stored[3];
-    ssdgs__photo_pixel(photo, transfer, black, pixel, stored);
-    for (int c = 0; c < 3; c++) {
-        const double d = fabs((double)(stored[c] - corner[c]));
-        value += (double)stored[c] * (double)stored[c];
-        apart = d > apart ? d : apart;
-    }
-    return apart < 0.02 ? 0 : value;
-}
-
-/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture.
-   Pixels of the first one's colour count as dark, those brighter than all that lie three pixels away as the
-   brightest of these. */
-static int ssdgs__shading_of(const ssdgs_photo *photo, int transfer, const double centre[3],
-                             ssdgs__shading *s) {
-    static const ssdgs_real black[3] = {0, 0, 0};
-    const ssdgs_camera *camera = &photo->camera;
-    const int w = camera->width, h = camera->height, step = 1 + (w > h ? w : h) / 128; /* some pixels tell */
-    double area = 0, light = 0, middle[2] = {0, 0}, square[2] = {0, 0}, bright[2] = {0, 0}, intensity = 0;
-    ssdgs_real corner[3];
-    ssdgs__photo_pixel(photo, transfer, black, 0, corner);
-    for (int y = step / 2; y < h; y += step)
-        for (int x = step / 2; x < w; x += step) {
-            const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
-            const double alpha = ssdgs__photo_alpha(photo, pixel) / 65535.0;
-            const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx,
-                                  (y + 0.5 - (double)camera->cy) / (double)camera->fy};
-            double value = ssdgs__lightness(photo, transfer, corner, pixel), around = 0;
-            for (int side = 0; side < 9 && value > around; side++) { /* a hot pixel is not the object's */
-                const int u = x + 3 * (side % 3 - 1), v = y + 3 * (side / 3 - 1);
-                if (side == 4 || u < 0 || u >= w || v < 0 || v >= h) continue;
-                const double there =
-                    ssdgs__lightness(photo, transfer, corner, (size_t)v * (size_t)w + (size_t)u);
-                around = there > around ? there : around;
-            }
-            value = value < around ? value : around;
-            area += alpha;
-            light += value;
-            for (int c = 0; c < 2; c++) {
-                middle[c] += alpha * at[c];
-                square[c] += alpha * at[c] * at[c];
-                bright[c] += value * at[c];
-            }
-        }
-    for (int c = 0; c < 3; c++) intensity += (double)photo->light.intensity[c] / 3;
-    if (!(area > 0) || !(light > 0) || !(intensity > 0)) return 0;
-    for (int c = 0; c < 2; c++) {
-        const double variance = square[c] / area - middle[c] / area * (middle[c] / area);
-        s->shift[c] = (bright[c] / light - middle[c] / area) / sqrt(variance > 1e-12 ? variance : 1e-12);
-    }
-    s->brightness = light / area / intensity;
-    s->directional = photo->light.kind == SSDGS_LIGHT_DIRECTIONAL;
-    ssdgs_real place[3];
-    ssdgs__light_place(&photo->light, place);
-    ssdgs__camera_centre(camera, s->eye);
-    for (int c = 0; c < 3; c++) {
-        s->eye[c] -= centre[c];
-        s->position[c] = (double)place[c];
-        for (int l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
-    }
-    return 1;
-}
-
-/* A way to read three numbers as a light's position: axis[c] and sign[c] tell which is the c-th coordinate,
-   then in world or camera axes, from the world's origin or the camera. */
-typedef struct ssdgs__reading {
-    int axis[3], in_camera, from_camera;
-    double sign[3];
-} ssdgs__reading;
-
-/* Where the light stands from the bounds' centre: its direction in world axes, and its squared distance. */
-static double ssdgs__read_light(const ssdgs__shading *s, const ssdgs__reading *r, const double centre[3],
-                                double direction[3]) {
-    double p[3], distance2 = 0;
-    for (int c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
-    for (int c = 0; c < 3; c++) {
-        direction[c] = r->in_camera ? 0 : p[c];
-        for (int l = 0; l < 3 && r->in_camera; l++) direction[c] += s->rotation[3 * l + c] * p[l];
-        if (!s->directional) direction[c] += r->from_camera ? s->eye[c] : -centre[c];
-        distance2 += direction[c] * direction[c];
-    }
-    for (int c = 0; c < 3; c++) direction[c] /= sqrt(distance2) + 1e-12;
-    return s->directional ? 1 : distance2;
-}
-
-/* The correlation of (n, width) numbers with others, each less their means; *spread: the first ones' standard
-   deviation. */
-static double ssdgs__correlation(const double *a, const double *b, int n, int width, double *spread) {
-    double ab = 0, aa = 0, bb = 0;
-    for (int c = 0; c < width; c++) {
-        double a_mean = 0, b_mean = 0;
-        for (int i = 0; i < n; i++) a_mean += a[i * width + c] / n, b_mean += b[i * width + c] / n;
-        for (int i = 0; i < n; i++) {
-            const double x = a[i * width + c] - a_mean, y = b[i * width + c] - b_mean;
-            ab += x * y, aa += x * x, bb += y * y;
-        }
-    }
-    *spread = sqrt(aa / n);
-    return ab / sqrt(aa * bb + 1e-30);
-}
-
-/* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright
-   as a whole where the light is on the camera's side. On a floor seen from above only two axes tell of the
-   former. 1 where nothing tells. *facing: how far the lights are on the camera's side, on average, plus twice
-   its error. scratch: (n, 6). */
-static double ssdgs__agreement(const ssdgs__shading *s, int n, const ssdgs__reading *reading,
-                               const double centre[3], double *scratch, double *facing) {
-    double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
-    double sideways = -2, brightness = 0, front_mean = 0;
-    for (int flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
-        double lights = 0, shown = 0;
-        int above = 0;
-        for (int i = 0; i < n; i++) {
-            double d[3], eye2 = 0, towards_eye = 0;
-            const double distance2 = ssdgs__read_light(s + i, reading, centre, d);
-            for (int c = 0; c < 3; c++) {
-                towards_eye += d[c] * s[i].eye[c];
-                eye2 += s[i].eye[c] * s[i].eye[c];
-            }
-            front[i] = towards_eye / (sqrt(eye2) + 1e-12);
-            bright[i] = s[i].brightness * distance2;
-            if (flat < 3) {
-                lights += d[flat];
-                above += s[i].eye[flat] > 0;
-                d[flat] = 0;
-            }
-            for (int c = 0; c < 2; c++) {
-                shift[2 * i + c] = s[i].shift[c];
-                int l;
-                for (l = 0, toward[2 * i + c] = 0; l < 3; l++)
-                    toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
-            }
-        }
-        if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0))
-            continue; /* neither a floor nor a ceiling */
-        const double r = ssdgs__correlation(toward, shift, n, 2, &shown);
-        sideways = shown > 0.1 && r > sideways ? r : sideways;
-    }
-    for (int i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
-    for (int i = 0; i < n; i++)
-        bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
-    double spread;
-    const double frontal = ssdgs__correlation(front, bright, n, 1, &spread);
-    *facing = front_mean + 2 * spread / sqrt((double)n);
-    if (!(spread > 0.2))
-        return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
-    return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
-}
-
-/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. Right
-   captures agree to 0.8 and more, wrong readings to 0.5 or so; on a floor seen from above one that puts the
-   lights below it may agree to 0.86. */
-static ssdgs_result ssdgs__note_shading(const ssdgs_trainer *trainer, const double centre[3]) {
-    enum { few = 6, enough = 12 };
-    static const ssdgs__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
-    static const char *const axes[2][3] = {{"x", "y", "z"}, {"-x", "-y", "-z"}};
-    ssdgs_context *context = trainer->context;
-    const size_t room = (size_t)trainer->photo_count * (sizeof(ssdgs__shading) + 6 * sizeof(double));
-    ssdgs__shading *s = (ssdgs__shading *)ssdgs__allocate(context, room);
-    if (!s) return SSDGS_ERR_MEMORY;
-    double *scratch = (double *)(s + trainer->photo_count), agrees = 1, facing = 1, best = 0;
-    ssdgs__reading found = as_given;
-    int n = 0;
-    for (int i = 0; i < trainer->photo_count; i++)
-        n += ssdgs__shading_of(trainer->photos + i, trainer->model->settings.transfer, centre, s + n);
-    if (n >= few) agrees = ssdgs__agreement(s, n, &as_given, centre, scratch, &facing);
-    ssdgs__reading reading;
-    for (int way = 0; way < 4 && n >= enough; way++)
-        for (int order = 0; order < 6; order++)
-            for (int signs = 0; signs < 8; signs++) {
-                for (int i = 0; i < 3; i++) {
-                    reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
-                    reading.sign[i] = signs >> i & 1 ? -1 : 1;
-                }
-                reading.in_camera = way & 1;
-                reading.from_camera = way >> 1;
-                double facing_so;
-                const double agrees_so = ssdgs__agreement(s, n, &reading, centre, scratch, &facing_so);
-                /* a place beside the camera mixes in the camera's direction, of which much is right in any
-                   reading */
-                if (facing_so < -0.1 ||
-                    agrees_so < best + (reading.from_camera != found.from_camera ? 0.2 : 0))
-                    continue;
-                best = agrees_so;
-                found = reading;
-            }
-    const int behind = n >= enough && agrees < 0.88 && facing < -0.1;
-    const int contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
-    if (contradicts)
-        ssdgs__note(context,
-                    "the photographs' shading contradicts their lights: its correlation with their "
-                    "directions is %g, and near 1 "
-                    "where these are right",
-                    floor(100 * agrees + 0.5) / 100);
-    else if (behind)
-        ssdgs__note(
-            context,
-            "the lights stand behind the object as most cameras see it: are their axes and signs right?");
-    if ((contradicts || behind) && best > 0.7 && best > agrees + 0.03)
-        ssdgs__note(context,
-                    "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
-                    axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
-                    axes[found.sign[2] < 0][found.axis[2]],
-                    found.in_camera ? "each camera's (right, down, forward)" : "the world's",
-                    found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
-    ssdgs__release(context, s);
-    return SSDGS_OK;
-}
-
-/* Notes where the lights do not tell what other lights do: hardly move, or hardly move in the camera's axes.
-   radius: of the cameras. */
-static ssdgs_result ssdgs__note_lights(ssdgs_trainer *trainer, double radius) {
-    ssdgs_context *context = trainer->context;
-    const ssdgs_train_options *o = &trainer->options;
     const int n = trainer->photo_count;
     double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
-    int within = 0, points = 0, several = 0;
-    ssdgs__bounds_centre(o, centre);
+    int points = 0, several = 0;
+    ssdgs__bounds_centre(&trainer->options, centre);
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < n; i++) {
             const ssdgs_photo *photo = trainer->photos + i;
             const int point = photo->light.kind != SSDGS_LIGHT_DIRECTIONAL;
-            double eye[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
-            ssdgs__camera_centre(&photo->camera, eye);
-            double p[3];
+            double eye[3], p[3], seen[3], from_mean = 0, from_held = 0, to_eye = 0, to_light = 0;
             ssdgs_real place[3];
+            ssdgs__camera_centre(&photo->camera, eye);
             ssdgs__light_place(&photo->light, place);
             for (int j = 0; j < 3; j++) p[j] = (double)place[j];
-            double seen[3];
             ssdgs__to_camera(&photo->camera, p, point, seen);
             for (int j = 0; j < 3; j++) {
                 from_mean += (p[j] - mean[j]) * (p[j] - mean[j]);
                 from_held += (seen[j] - held[j]) * (seen[j] - held[j]);
                 to_eye += (eye[j] - centre[j]) * (eye[j] - centre[j]);
                 to_light += (p[j] - centre[j]) * (p[j] - centre[j]);
+                if (!pass) mean[j] += p[j] / n, held[j] += seen[j] / n;
             }
-            if (pass) {
-                spread = from_mean > spread ? from_mean : spread;
-                apart = from_held > apart ? from_held : apart;
-                away += (points ? sqrt(to_eye) : 1) / n;
-                lit_from += (points ? sqrt(to_light) : 1) / n;
-                continue;
-            }
-            for (int j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
-            within += point && ssdgs__in_bounds(o, p);
-            points += point;
+            points += !pass && point;
             several |= photo->more_count > 0;
+            if (!pass) continue;
+            spread = from_mean > spread ? from_mean : spread;
+            apart = from_held > apart ? from_held : apart;
+            away += (points ? sqrt(to_eye) : 1) / n;
+            lit_from += (points ? sqrt(to_light) : 1) / n;
         }
-    if (within)
-        ssdgs__note(
-            context,
-            "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
-            within, n);
-    if (n < 2 || several || (points && points < n)) return SSDGS_OK;
+    if (n < 2 || several || (points && points < n)) return;
+    if (points && radius > 1e-3 * trainer->unit && radius < away)
+        away = radius; /* bounds, and so away, may be wrong */
     const int still = sqrt(spread) < 0.03 * lit_from;
-    const double moves = points && radius > 1e-3 * trainer->unit && radius < away
-                             ? radius /* bounds, and so away, may be wrong */
-                             : away;
-    trainer->one_light = still || sqrt(apart) < 0.1 * moves;
-    if (!trainer->one_light) return ssdgs__note_shading(trainer, centre);
+    trainer->one_light = still || sqrt(apart) < 0.1 * away;
     if (still)
         ssdgs__note(
             context,
             "all photographs are lit from one place: they do not tell how the object looks in other light");
-    else
+    else if (trainer->one_light)
         ssdgs__note(context,
                     "the light moves with the camera, at (%g, %g, %g) of its axes (right, down, forward) in "
-                    "all photographs: they do "
-                    "not tell how the object looks in other light",
+                    "all photographs: they do not tell how the object looks in other light",
                     floor(1e3 * held[0] + 0.5) / 1e3, floor(1e3 * held[1] + 0.5) / 1e3,
                     floor(1e3 * held[2] + 0.5) / 1e3);
-    return SSDGS_OK;
-}
-
-/* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that
-   the opaque ones beside it lead to, but that times alpha, as stored or as linear light. */
-static void ssdgs__note_alpha(const ssdgs_trainer *trainer) {
-    const int transfer = trainer->model->settings.transfer;
-    double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
-    for (int i = 0; i < trainer->photo_count; i++) {
-        const ssdgs_photo *photo = trainer->photos + i;
-        const int w = photo->camera.width, h = photo->camera.height;
-        for (int y = 0; y < h && trainer->transparent[i]; y++)
-            for (int x = 3; x < w - 3; x++) {
-                const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
-                const int alpha = ssdgs__photo_alpha(photo, pixel);
-                const double a = alpha / 65535.0;
-                if (alpha < 6554 || alpha > 45875) continue; /* 0.1 .. 0.7 */
-                for (int side = 0; side < 4; side++) {       /* right and left, next to it and one further */
-                    const int step = 1 + side / 2;
-                    const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step,
-                                 further = side & 1 ? next - 1 : next + 1;
-                    if (ssdgs__photo_alpha(photo, next) < 64880 || ssdgs__photo_alpha(photo, further) < 64880)
-                        continue; /* 0.99 */
-                    for (int c = 0; c < 3; c++) {
-                        const double v = (double)ssdgs__photo_value(photo, transfer, pixel, c),
-                                     beside = (double)ssdgs__photo_value(photo, transfer, next, c);
-                        double n = beside +
-                                   step * (beside - (double)ssdgs__photo_value(photo, transfer, further, c));
-                        n = n < 0 ? 0 : n > 1 ? 1 : n;
-                        straight += fabs(v - n);
-                        times_alpha += fabs(v - a * n);
-                        times_linear += fabs(v - pow(a, 1 / 2.2) * n);
-                    }
-                    count++;
-                    break;
-                }
-            }
-    }
-    if (count >= 50 && (times_alpha < 0.5 * straight || times_linear < 0.5 * straight))
-        ssdgs__note(trainer->context, "the photographs' colours look multiplied by alpha, which darkens "
-                                      "outlines: they must be straight "
-                                      "(divide by alpha, or export without premultiplication)");
 }
 
 /* ---- a trainer and its steps ---- */
@@ -11778,7 +11376,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     double mean[3] = {0, 0, 0}, middle[3], radius = 0, irradiance = 0;
     ssdgs_result result = ssdgs__options_check(context, o);
     const int fresh = model->count == 0;
-    int outlined = 0, empty = 0, dark = 0, within = 0;
+    int outlined = 0, empty = 0, dark = 0;
     double shown = 0;
     if (result) return result;
     if (model->settings.baked)
@@ -11850,7 +11448,6 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         ssdgs__camera_centre(&photos[i].camera, centre);
         for (int j = 0; j < 3; j++) d2 += (centre[j] - mean[j]) * (centre[j] - mean[j]);
         radius = sqrt(d2) > radius ? sqrt(d2) : radius;
-        within += ssdgs__in_bounds(o, centre);
         double e =
             0; /* as from half the unit at least: a light inside of the object must not darken others */
         for (int l = 0; l <= photos[i].more_count; l++)
@@ -11861,10 +11458,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     if (dark) ssdgs__note(context, "%d photographs of %d have no light", dark, photo_count);
     if (radius < 1e-3 * trainer->unit)
         ssdgs__note(context, "all photographs are taken from one place: other views cannot be right");
-    else result = ssdgs__note_bounds(trainer, within);
-    if (!result) result = ssdgs__note_lights(trainer, radius);
-    ssdgs__note_alpha(trainer);
-    if (result) return result;
+    ssdgs__judge_lights(trainer, radius);
     trainer->extent = 1.1 * (radius > trainer->unit ? radius : trainer->unit); /* one camera has no radius */
     result = fresh ? ssdgs__random_start(trainer) : ssdgs__trainer_grow(trainer, (size_t)model->count);
     if (fresh && !result) { /* the model stays as it was when that fails */

@@ -4,6 +4,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include "hull.h"
 #include "judge.h"
 
 enum { CELL = 96, COLUMNS = 12, MOST_CELLS = 96, RAYS = 1000, PLOT = 360, LISTED = 6 };
@@ -100,10 +101,10 @@ static int look_at(const ssdgs_photo *photo, const double middle[3], facts *f) {
             }
         f->shown = (double)count / (double)n;
         f->clipped = count ? clipped / (double)count : 0;
-        f->dark = judge__quantile(light, (int)count, 0.02);
-        f->bright = judge__quantile(light, (int)count, 0.95);
+        f->dark = hull__quantile(light, (int)count, 0.02);
+        f->bright = hull__quantile(light, (int)count, 0.95);
         /* a mask of norm 6: its median */
-        f->noise = fines > 100 ? judge__quantile(fine, (int)fines, 0.5) / (6 * 0.6745) : 0;
+        f->noise = fines > 100 ? hull__quantile(fine, (int)fines, 0.5) / (6 * 0.6745) : 0;
         const double grain = f->noise * f->noise * (double)fines;
         f->sharp = first > 2 * grain && second > 25 * grain ? (second - 20 * grain) / (first - grain) : 0;
         olat_eye(&photo->camera, eye);
@@ -123,7 +124,7 @@ static double median_of(const facts *f, int count, size_t member) {
     double *values = (double *)malloc((size_t)count * sizeof *values);
     for (int i = 0; i < count && values; i++)
         memcpy(values + i, (const char *)(f + i) + member, sizeof *values);
-    const double median = values ? judge__quantile(values, count, 0.5) : 0;
+    const double median = values ? hull__quantile(values, count, 0.5) : 0;
     free(values);
     return median;
 }
@@ -254,7 +255,7 @@ static double nearest(const check *k, size_t member) {
                      olat__dot(to, (const double *)(const void *)((const char *)(k->found[0] + j) + member)));
         angles[i] = 57.29577951308232 * acos(fmin(1, best));
     }
-    const double median = angles ? judge__quantile(angles, count, 0.5) : 0;
+    const double median = angles ? hull__quantile(angles, count, 0.5) : 0;
     free(angles);
     return median;
 }
@@ -313,7 +314,8 @@ static int report_training(check *k) {
     pace p = {0, 0, 0};
     for (int c = 0; c < 3; c++) settings.origin[c] = (ssdgs_real)k->sets[0].origin[c]; /* notes name places */
     const ssdgs_logger logger = {hear, k};
-    ssdgs_result result = photos && !judge_capture(k->sets, &k->options, &logger)
+    ssdgs_result result = photos && !hull_judge(k->sets, &k->options, &logger) &&
+                                  !judge_photos(photos, k->sets[0].count, &settings, &k->options, &logger)
                               ? ssdgs_model_create(k->context, &settings, 0, &model)
                               : SSDGS_ERR_MEMORY;
     if (!result) result = ssdgs_trainer_create(model, photos, k->sets[0].count, &k->options, &trainer);

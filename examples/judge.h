@@ -1,733 +1,571 @@
-/* judge.h - what the photographs of a capture tell against each other before they are trained on: frames lit
-   from all around among those of one lamp, exposures that nobody told, a background mixed into edges, OpenEXR
-   that is not linear light. MIT, see ssdgs.h.
+/* judge.h - whether photographs, cameras, lights and bounds suit each other, told before they are trained on.
+   MIT, see ssdgs.h.
 
    #include "ssdgs.h"
-   #include "olat.h"
    #include "judge.h"
    ...
-   if (judge_capture(&set, &options, &logger)) puts("out of memory");
+   if (judge_photos(photos, count, &settings, &options, &logger)) puts("out of memory");
 
-   HOW  The outlines carve the object's hull out of the bounds, coarsely. Points on it have normals, see
-   cameras and lamps or do not, and so a matt surface's light is known but for its albedo. Albedos and one
-   gain for each photograph are fitted. Objects are neither their hull nor matt, so what depends on where
-   camera and lamp stand is no fault, and only what is far from right captures is told.
-
-   The library's own notes, which the trainer writes, are not repeated. */
+   WHAT  Where the lines of sight to the object meet, and so its box; cameras and lights that stand within it;
+   shading that contradicts the lights, and how else these may be read; colours that are multiplied by alpha.
+   The library's own notes, on what training makes of outlines, backgrounds and lights that do not move, are
+   not repeated. hull.h judges what the photographs tell against each other. */
 
 #ifndef JUDGE_H
 #define JUDGE_H
 
-enum {
-    JUDGE__SIDE = 64,    /* photographs are read down to so many cells */
-    JUDGE__GRID = 32,    /* cells of the hull, each way */
-    JUDGE__POINTS = 800, /* on it, at most */
-    JUDGE__EDGES = 4096, /* half-transparent pixels that are looked at, at most */
-    JUDGE__FEW = 12,     /* photographs that tell about each other */
-    JUDGE__LISTED = 6,   /* names in a note */
-    JUDGE__LEAST = 15,   /* lit points that tell a photograph's gain */
-    JUDGE__LIT = 1,      /* how a lamp's light comes to a point */
-    JUDGE__SHADED
-};
+#include "images.h"
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
-/* A photograph as cells. */
-typedef struct judge__view {
-    const olat_frame *frame;
-    int width, height, step;        /* cells, and pixels of a cell's side */
-    float *light, *alpha;           /* (height, width) means: of linear light times alpha; of alpha */
-    int outlined, flooded;          /* flooded: lit from all around */
-    double eye[3], gain;            /* gain: logarithm of its brightness over what its lamps explain */
-    double darkest, light_in_shade; /* where no lamp shines: light over what a lamp would bring; 1 and more is
-                                       too much */
-    int lit;                        /* points from which the gain is known */
-} judge__view;
-
-/* A half-transparent pixel, and the colour to which the opaque ones beside it lead. */
-typedef struct judge__edge {
-    float value[3], beside[3], alpha;
-} judge__edge;
-
-typedef struct judge__point {
-    double place[3], normal[3], albedo;
-    int lit; /* photographs from which that is known */
-} judge__point;
-
-typedef struct judge {
-    const olat_dataset *set;
+/* What is judged. */
+typedef struct judge__capture {
+    const ssdgs_photo *photos;
+    int count, transfer;
+    const ssdgs_settings *settings;
+    const ssdgs_train_options *options;
     const ssdgs_logger *logger;
-    judge__view *views;
-    float *cells; /* of all views */
-    float *curve; /* (65536) linear light of stored words */
-    judge__edge *edges;
-    int edge_count;
-    size_t edges_met;
-    double low[3], cell[3]; /* the grid */
-    unsigned char *hull;    /* (GRID^3) */
-    judge__point *points;
-    int point_count, flooded, usable; /* flooded photographs; photographs with outlines */
-    unsigned char *kind;              /* (photographs, points): JUDGE__LIT, JUDGE__SHADED or 0, unknown */
-    float *ratio, *due; /* (photographs, points) log of light seen over light due; log of light due to a white
-                           point or, in shadow, of what would be if it faced the lamp */
-    double most;        /* of all numbers in OpenEXR photographs */
-    size_t numbers, full, above, on_grid; /* of them; that are 1; above 0.1, of these a byte's */
-} judge;
+    double radius, unit; /* of the cameras from their middle; the bounds' longest side */
+} judge__capture;
 
-/* ---- reading ---- */
+static inline void judge__note(const judge__capture *k, const char *format, ...) {
+    char text[600];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (k->logger && k->logger->write) k->logger->write(k->logger->user, SSDGS_OK, text);
+}
 
-/* Keeps of the half-transparent pixels those that have opaque ones beside them, in the end a part of all. */
-static void judge__edge_at(judge *k, const olat_frame *frame, size_t pixel, double alpha) {
-    for (int side = 0; side < 4; side++) { /* right and left, next to it and one further */
-        const size_t step = 1 + (size_t)side / 2, next = side & 1 ? pixel - step : pixel + step,
-                     further = side & 1 ? next - 1 : next + 1;
-        if (olat__number(frame->pixels, frame->format, 4 * next + 3) < (ssdgs_real)0.99 ||
-            olat__number(frame->pixels, frame->format, 4 * further + 3) < (ssdgs_real)0.99)
-            continue;
-        const size_t met = k->edges_met++;
-        size_t at = met;
-        if (at >= JUDGE__EDGES) at = (size_t)((met * UINT64_C(0x9E3779B97F4A7C15) >> 32) % (met + 1));
-        if (at >= JUDGE__EDGES) return;
-        judge__edge *e = k->edges + at;
-        e->alpha = (float)alpha;
-        for (size_t c = 0; c < 3; c++) {
-            const double beside = (double)olat__number(frame->pixels, frame->format, 4 * next + c);
-            const double lead =
-                beside +
-                (double)step * (beside - (double)olat__number(frame->pixels, frame->format, 4 * further + c));
-            e->value[c] = (float)olat__number(frame->pixels, frame->format, 4 * pixel + c);
-            e->beside[c] = (float)(lead < 0 ? 0 : lead > 1 && !olat__is_light(frame->format) ? 1 : lead);
-        }
-        if (met < JUDGE__EDGES) k->edge_count++;
-        return;
+/* ---- pixels, cameras, lights ---- */
+
+static inline double judge__alpha(const ssdgs_photo *photo, size_t pixel) {
+    return (double)olat__number(photo->pixels, photo->format, 4 * pixel + 3);
+}
+
+/* A stored value. */
+static inline double judge__value(const ssdgs_photo *photo, int transfer, size_t pixel, int c) {
+    const ssdgs_real number = olat__number(photo->pixels, photo->format, 4 * pixel + (size_t)c);
+    const int encodes = transfer == SSDGS_TRANSFER_SRGB && olat__is_light(photo->format);
+    return (double)(encodes ? ssdgs_srgb_encode(number) : number);
+}
+
+static inline void judge__to_camera(const ssdgs_camera *camera, const double world[3], double w,
+                                    double seen[3]) {
+    int j;
+    for (int i = 0; i < 3; i++)
+        for (seen[i] = w * (double)camera->view[4 * i + 3], j = 0; j < 3; j++)
+            seen[i] += (double)camera->view[4 * i + j] * world[j];
+}
+
+static inline void judge__camera_centre(const ssdgs_camera *camera, double centre[3]) {
+    for (int j = 0; j < 3; j++) {
+        centre[j] = 0;
+        for (int l = 0; l < 3; l++)
+            centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
     }
 }
 
-static void judge__read(judge *k, judge__view *v) {
-    const olat_frame *frame = v->frame;
-    const int w = frame->camera.width, h = frame->camera.height, light = olat__is_light(frame->format);
+static inline void judge__cross(const double a[3], const double b[3], double c[3]) {
+    for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+/* Where a light stands, or the direction towards it. */
+static inline void judge__light_place(const ssdgs_light *light, double place[3]) {
+    for (int i = 0; i < 3; i++)
+        place[i] =
+            (double)(light->kind == SSDGS_LIGHT_DIRECTIONAL ? -light->direction[i] : light->position[i]);
+}
+
+static inline void judge__bounds_centre(const ssdgs_train_options *o, double centre[3]) {
+    for (int j = 0; j < 3; j++) centre[j] = 0.5 * ((double)o->bounds_min[j] + (double)o->bounds_max[j]);
+}
+
+static inline int judge__in_bounds(const ssdgs_train_options *o, const double x[3]) {
+    int j = 0;
+    while (j < 3 && x[j] > (double)o->bounds_min[j] && x[j] < (double)o->bounds_max[j]) j++;
+    return j == 3;
+}
+
+/* ---- cameras and bounds ---- */
+
+/* Whether more than a hundredth of its pixels, but not all, are wholly transparent. */
+static inline int judge__outlined(const ssdgs_photo *photo) {
+    const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     size_t clear = 0;
-    for (int y = 0; y < h; y++)
-        for (int x = 0; x < w; x++) {
-            const size_t pixel = (size_t)y * (size_t)w + (size_t)x,
-                         cell = (size_t)(y / v->step) * (size_t)v->width + (size_t)(x / v->step);
-            const double alpha = (double)olat__number(frame->pixels, frame->format, 4 * pixel + 3);
-            double sum = 0;
-            if (alpha <= 0) {
-                clear++;
-                continue;
-            }
-            for (size_t c = 0; c < 3; c++)
-                if (frame->format == SSDGS_PIXELS_RGBA8)
-                    sum +=
-                        (double)k->curve[257 * (size_t)((const unsigned char *)frame->pixels)[4 * pixel + c]];
-                else if (!light) sum += (double)k->curve[((const uint16_t *)frame->pixels)[4 * pixel + c]];
-                else {
-                    const double number = (double)olat__number(frame->pixels, frame->format, 4 * pixel + c);
-                    sum += number;
-                    k->most = number > k->most ? number : k->most;
-                    k->full += number > 0.9995 && number < 1.0005;
-                    k->numbers++;
-                    if (!(number > 0.1)) continue; /* below, many are near a byte's by chance */
-                    k->above++;
-                    k->on_grid += fabs(255 * number - floor(255 * number + 0.5)) < 0.03;
-                }
-            v->light[cell] += (float)(alpha * sum / 3);
-            v->alpha[cell] += (float)alpha;
-            if (alpha > 0.1 && alpha < 0.7 && x >= 3 && x < w - 3) judge__edge_at(k, frame, pixel, alpha);
-        }
-    for (int y = 0; y < v->height; y++)
-        for (int x = 0; x < v->width; x++) {
-            const int across = w - x * v->step, down = h - y * v->step;
-            const float area =
-                (float)(across < v->step ? across : v->step) * (float)(down < v->step ? down : v->step);
-            v->light[y * v->width + x] /= area;
-            v->alpha[y * v->width + x] /= area;
-        }
-    const size_t pixels = (size_t)w * (size_t)h;
-    v->outlined = clear > pixels / 100 && clear < pixels;
-    ssdgs_real eye[3];
-    olat_eye(&frame->camera, eye);
-    for (int c = 0; c < 3; c++) v->eye[c] = (double)eye[c];
+    for (size_t i = 0; i < pixels; i++) clear += judge__alpha(photo, i) < 0.5 / 65535;
+    return clear > pixels / 100 && clear < pixels;
 }
 
-/* The cell that shows a place, or -1. */
-static int judge__cell_of(const judge__view *v, const double place[3]) {
-    const ssdgs_camera *camera = &v->frame->camera;
-    double seen[3];
-    for (int r = 0; r < 3; r++) {
-        const ssdgs_real *row = camera->view + 4 * r;
-        seen[r] = (double)row[0] * place[0] + (double)row[1] * place[1] + (double)row[2] * place[2] +
-                  (double)row[3];
-    }
-    if (!(seen[2] > 0)) return -1;
-    const double x = (double)camera->fx * seen[0] / seen[2] + (double)camera->cx,
-                 y = (double)camera->fy * seen[1] / seen[2] + (double)camera->cy;
-    if (!(x >= 0 && y >= 0 && x < camera->width && y < camera->height)) return -1;
-    return (int)y / v->step * v->width + (int)x / v->step;
-}
+/* What a photograph shows: its pixels' sides, how many these are and how many of them lie beside the bounds'
+   picture. */
+typedef struct judge__silhouette {
+    int left, right, top, bottom; /* right < left: nothing */
+    int whole;                    /* not cut by the picture's border, so that its middle is known */
+    double shown, outside;
+} judge__silhouette;
 
-/* ---- the hull ---- */
-
-static int judge__inside(const judge *k, const int at[3]) {
-    for (int c = 0; c < 3; c++)
-        if (at[c] < 0 || at[c] >= JUDGE__GRID) return 0;
-    return k->hull[(at[0] * JUDGE__GRID + at[1]) * JUDGE__GRID + at[2]];
-}
-
-/* Leaves in the grid what no more than 2 in 100 outlines leave out; 0 where nothing is left. box: of the
-   cells left. */
-static int judge__carve(judge *k, int box[2][3]) {
-    int left = 0;
-    for (int c = 0; c < 3; c++) box[0][c] = JUDGE__GRID, box[1][c] = -1;
-    for (int i = 0; i < JUDGE__GRID * JUDGE__GRID * JUDGE__GRID; i++) {
-        const int at[3] = {i / JUDGE__GRID / JUDGE__GRID, i / JUDGE__GRID % JUDGE__GRID, i % JUDGE__GRID};
-        double place[3];
-        int seen = 0, out = 0;
-        for (int c = 0; c < 3; c++) place[c] = k->low[c] + (at[c] + 0.5) * k->cell[c];
-        for (int p = 0; p < k->set->count && 50 * out <= k->usable; p++) {
-            const judge__view *v =
-                k->views + (size_t)p * 7919 % (size_t)k->set->count; /* neighbours tell the same */
-            const int cell = v->outlined ? judge__cell_of(v, place) : -1;
-            if (cell < 0) continue;
-            seen++;
-            out += v->alpha[cell] < 0.02f;
-        }
-        k->hull[i] = (unsigned char)(seen > 0 && 50 * out <= seen);
-        if (!k->hull[i]) continue;
-        left++;
-        for (int c = 0; c < 3; c++) {
-            box[0][c] = at[c] < box[0][c] ? at[c] : box[0][c];
-            box[1][c] = at[c] > box[1][c] ? at[c] : box[1][c];
-        }
-    }
-    return left;
-}
-
-/* Points on the hull, evenly taken from all its outer cells, whose normals point to where less of it is. */
-static void judge__place_points(judge *k) {
-    enum { most = JUDGE__POINTS };
-    for (int pass = 0, outer = 0, kept = 0; pass < 2; pass++) {
-        int met = 0;
-        for (int i = 0; i < JUDGE__GRID * JUDGE__GRID * JUDGE__GRID; i++) {
-            const int at[3] = {i / JUDGE__GRID / JUDGE__GRID, i / JUDGE__GRID % JUDGE__GRID, i % JUDGE__GRID};
-            int whole = 1, to[3];
-            if (!k->hull[i]) continue;
-            for (int side = 0; side < 6; side++) {
-                memcpy(to, at, sizeof to);
-                to[side / 2] += side % 2 ? 1 : -1;
-                whole = whole && judge__inside(k, to);
-            }
-            if (whole) continue;
-            if (!pass) {
-                outer++;
-                continue;
-            }
-            if ((long long)met++ * most / outer < kept && outer > most) continue;
-            kept++;
-            judge__point *p = k->points + k->point_count;
-            double length = 0;
-            for (int c = 0; c < 3; c++)
-                p->normal[c] = 0, p->place[c] = k->low[c] + (at[c] + 0.5) * k->cell[c];
-            for (int d = 0; d < 125; d++) {
-                const int off[3] = {d / 25 - 2, d / 5 % 5 - 2, d % 5 - 2};
-                for (int c = 0; c < 3; c++) to[c] = at[c] + off[c];
-                if (judge__inside(k, to))
-                    for (int c = 0; c < 3; c++) p->normal[c] -= off[c] / k->cell[c];
-            }
-            for (int c = 0; c < 3; c++) length += p->normal[c] * p->normal[c];
-            if (!(length > 0)) continue;
-            for (int c = 0; c < 3; c++) p->normal[c] /= sqrt(length);
-            k->point_count++;
-        }
-    }
-}
-
-/* Whether the hull is in the way from just above a point towards a direction. */
-static int judge__blocked(const judge *k, const judge__point *p, const double direction[3]) {
-    const double step = fmax(k->cell[0], fmax(k->cell[1], k->cell[2]));
-    for (int i = 1; i < 4 * JUDGE__GRID; i++) {
-        int at[3];
-        for (int c = 0; c < 3; c++) {
-            const double cell =
-                (p->place[c] + step * (1.7 * p->normal[c] + i * direction[c]) - k->low[c]) / k->cell[c];
-            if (!(cell >= 0 && cell < JUDGE__GRID)) return 0;
-            at[c] = (int)cell;
-        }
-        if (judge__inside(k, at)) return 1;
-    }
-    return 0;
-}
-
-/* Where a light stands from a point: its direction, and what it would bring to a surface that faces it. */
-static double judge__toward(const ssdgs_light *light, const double place[3], double direction[3]) {
-    const int directional = light->kind == SSDGS_LIGHT_DIRECTIONAL;
-    double distance2 = 0, e = 0, along = 0;
-    ssdgs_real from[3];
-    olat_place(light, from);
-    for (int c = 0; c < 3; c++) {
-        direction[c] = (double)from[c] - (directional ? 0 : place[c]);
-        distance2 += direction[c] * direction[c];
-        e += (double)light->intensity[c] / 3;
-    }
-    for (int c = 0; c < 3; c++) {
-        direction[c] /= sqrt(distance2) + 1e-30;
-        along -= direction[c] * (double)light->direction[c];
-    }
-    if (light->focus > 0) e *= along > 0 ? pow(along, (double)light->focus) : 0;
-    return directional ? e : e / (distance2 + 1e-30);
-}
-
-/* What each photograph shows of each point, and what it should. Surfaces seen or lit at a slant tell little.
- */
-static void judge__look(judge *k, int photo) {
-    const judge__view *v = k->views + photo;
-    const size_t first = (size_t)photo * (size_t)k->point_count;
-    const double above = 0.5 * fmax(k->cell[0], fmax(k->cell[1], k->cell[2]));
-    for (int i = 0; i < k->point_count; i++) {
-        const judge__point *p = k->points + i;
-        double to[3], length2 = 0, facing = 0, place[3], shadow = 0, light = 0;
-        int slant = 0;
-        for (int c = 0; c < 3; c++) {
-            to[c] = v->eye[c] - p->place[c];
-            length2 += to[c] * to[c];
-            facing += to[c] * p->normal[c];
-            place[c] = p->place[c] + above * p->normal[c];
-        }
-        if (!(facing > 0.25 * sqrt(length2))) continue;
-        for (int c = 0; c < 3; c++) to[c] /= sqrt(length2);
-        const int cell = judge__cell_of(v, place);
-        if (cell < 0 || v->alpha[cell] < 0.5f || judge__blocked(k, p, to)) continue;
-        for (int l = 0; l <= v->frame->more_count; l++) {
-            const double e = judge__toward(l ? v->frame->more + l - 1 : &v->frame->light, p->place, to);
-            const double cosine = to[0] * p->normal[0] + to[1] * p->normal[1] + to[2] * p->normal[2];
-            if (cosine > 0 && !judge__blocked(k, p, to)) {
-                light += e * cosine;
-                slant |= cosine < 0.3;
-            } else shadow += e;
-        }
-        if (slant || (light > 0 && light < 0.3 * shadow) || !(light + shadow > 0)) continue;
-        const double seen = (double)v->light[cell] / (double)v->alpha[cell], due = light > 0 ? light : shadow;
-        if (light > 0 && !(seen > 1e-6 * due)) continue; /* black: nothing tells its albedo */
-        k->kind[first + (size_t)i] = light > 0 ? JUDGE__LIT : JUDGE__SHADED;
-        k->due[first + (size_t)i] = (float)log(due);
-        k->ratio[first + (size_t)i] = (float)log((seen + 1e-9 * due) / due);
-    }
-}
-
-/* Albedos and gains, logarithms, such that seen = albedo x gain x due where the lamp shines; what is far off,
-   a highlight for instance, counts little. */
-static void judge__fit(judge *k) {
-    enum { sweeps = 24 };
-    const int n = k->set->count, points = k->point_count;
-    for (int i = 0; i < n; i++) k->views[i].gain = 0, k->views[i].lit = 0;
-    for (int i = 0; i < n * points; i++) k->views[i / points].lit += k->kind[i] == JUDGE__LIT;
-    for (int sweep = 0; sweep < sweeps; sweep++) {
-        double mean = 0;
-        int known = 0;
-        for (int i = 0; i < points + n; i++) { /* each albedo, then each gain */
-            const int of_point = i < points;
-            double *value = of_point ? &k->points[i].albedo : &k->views[i - points].gain, sum = 0,
-                   weights = 0;
-            int count = 0;
-            for (int j = 0; j < (of_point ? n : points); j++) {
-                const int photo = of_point ? j : i - points, point = of_point ? i : j;
-                const int at = photo * points + point;
-                if (k->kind[at] != JUDGE__LIT || k->views[photo].lit < JUDGE__LEAST) continue;
-                const double wants = (double)k->ratio[at] -
-                                     (of_point ? k->views[photo].gain : k->points[point].albedo),
-                             off = fabs(wants - *value), weight = sweep && off > 0.3 ? 0.3 / off : 1;
-                sum += weight * wants;
-                weights += weight;
-                count++;
-            }
-            *value = weights > 0 ? sum / weights : 0;
-            if (of_point) k->points[i].lit = count;
-            if (of_point || !(weights > 0)) continue;
-            mean += *value;
-            known++;
-        }
-
-        for (int i = 0; i < n && known; i++)
-            if (k->views[i].lit >= JUDGE__LEAST) k->views[i].gain -= mean / known;
-    }
-}
-
-/* ---- what they tell ---- */
-
-OLAT__PRINTF(2, 3) static void judge__say(const judge *k, const char *format, ...) {
-    char text[1024];
-    va_list values;
-    va_start(values, format);
-    vsnprintf(text, sizeof text, format, values);
-    va_end(values);
-    k->logger->write(k->logger->user, SSDGS_OK, text);
-}
-
-static int judge__ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* The values' share-quantile; sorts them. 0 of none. */
-static double judge__quantile(double *values, int count, double share) {
-    qsort(values, (size_t)count, sizeof *values, judge__ascending);
-    return count ? values[(int)(share * (count - 1))] : 0;
-}
-
-/* Writes the marked photographs' names, less the folders they share. */
-static void judge__names(const judge *k, char *text, size_t room) {
-    const char *first = k->set->frames[0].file;
-    size_t folder = 0;
-    int listed = 0, more = 0;
-    *text = 0;
-    for (size_t i = 0, same = 1; same && first[i]; i++) {
-        for (int j = 1; j < k->set->count; j++) same = same && k->set->frames[j].file[i] == first[i];
-        if (same && strchr(OLAT__SEPARATORS, first[i])) folder = i + 1;
-    }
-    for (int i = 0; i < k->set->count; i++) {
-        if (!k->views[i].flooded) continue;
-        if (listed == JUDGE__LISTED) {
-            more++;
-            continue;
-        }
-        olat__append(text, room, "%s%.80s", listed++ ? ", " : "", k->set->frames[i].file + folder);
-    }
-    if (more) olat__append(text, room, " and %d more", more);
-}
-
-/* Marks and names photographs that show light where their lamps bring none, most of all in what is darkest
-   there, while the others are dark. Right captures reach 0.8 of what is asked for; where two are sure, 0.8 is
-   enough for others. */
-static int judge__flooded(judge *k) {
-    enum { least = 20 };
-    const int n = k->set->count, points = k->point_count;
-    double *levels = (double *)malloc(((size_t)n + (size_t)points) * sizeof *levels);
-    int judged = 0, sure = 0;
-    if (!levels) return 1;
-    double *shades = levels + n;
-    for (int i = 0; i < n; i++) {
-        judge__view *v = k->views + i;
-        int count = 0;
-        for (int j = 0; j < points; j++)
-            if (k->kind[i * points + j] == JUDGE__SHADED && k->points[j].lit > 1)
-                shades[count++] = (double)k->ratio[i * points + j] - k->points[j].albedo;
-        v->darkest = v->light_in_shade = 0;
-        if (count < least) continue;
-        const double darkest = exp(judge__quantile(shades, count, 0.1)),
-                     dark = exp(judge__quantile(shades, count, 0.25)),
-                     middle = exp(judge__quantile(shades, count, 0.5));
-        levels[judged++] = v->darkest = darkest;
-        v->light_in_shade = fmin(darkest / 0.18, fmin(dark / 0.33, middle / 0.45)) / exp(fmax(0, v->gain)) /
-                            (1 + 15.0 / count);
-    }
-    const double usual = judge__quantile(levels, judged, 0.25);
-    free(levels);
-    if (judged < 8) return 0;
-    for (int i = 0; i < n; i++) sure += k->views[i].light_in_shade > 1 && k->views[i].darkest > 4 * usual;
-    for (int i = 0; i < n; i++) {
-        judge__view *v = k->views + i;
-        v->flooded = v->light_in_shade > (sure > 1 ? 0.8 : 1) && v->darkest > 4 * usual;
-        k->flooded += v->flooded;
-    }
-    if (!k->flooded) return 0;
-    char names[JUDGE__LISTED * 90 + 40];
-    judge__names(k, names, sizeof names);
-    judge__say(k,
-               "%d of the %d photographs %s lit from all around, not by the lamp that the list gives: %s. "
-               "Leave such "
-               "frames out of the list, or give them the lights that they have (pl_lights)",
-               k->flooded, n, k->flooded == 1 ? "looks" : "look", names);
-    return 0;
-}
-
-/* Solves a (size, size + extra) system in place by elimination; symmetric and positive. */
-static void judge__solve(double *a, int size, int columns) {
-    for (int i = 0; i < size; i++) {
-        const double pivot = a[i * columns + i] + 1e-12;
-        for (int c = 0; c < columns; c++) a[i * columns + c] /= pivot;
-        for (int r = 0; r < size; r++) {
-            const double factor = a[r * columns + i];
-            for (int c = 0; c < columns && r != i; c++) a[r * columns + c] -= factor * a[i * columns + c];
-        }
-    }
-}
-
-enum { JUDGE__TERMS = 9 };
-
-/* How far numbers are, each, from what a linear function of the first `terms` of their terms, fitted to the
-   others, makes of them: about a standard deviation. scratch: (count) */
-static double judge__spread(const double (*term)[JUDGE__TERMS], const double *value, int count, int terms,
-                            double *weight, double *scratch) {
-    enum { columns = 2 * JUDGE__TERMS + 1, rounds = 8 };
-    double spread = 0;
-    for (int i = 0; i < count; i++) weight[i] = 1;
-    for (int round = 0; round < rounds; round++) {
-        double a[JUDGE__TERMS * columns];
-        const int wide = 2 * terms + 1;
-        memset(a, 0, sizeof a);
-        for (int r = 0; r < terms; r++) {
-            a[r * wide + terms + r] = 1; /* becomes the inverse; the last column the solution */
-            for (int i = 0; i < count; i++) {
-                for (int c = 0; c < terms; c++) a[r * wide + c] += weight[i] * term[i][r] * term[i][c];
-                a[r * wide + 2 * terms] += weight[i] * term[i][r] * value[i];
-            }
-        }
-        judge__solve(a, terms, wide);
-        for (int i = 0; i < count; i++) {
-            double off = value[i], own = 0;
-            for (int r = 0; r < terms; r++) {
-                off -= term[i][r] * a[r * wide + 2 * terms];
-                for (int c = 0; c < terms; c++)
-                    own += weight[i] * term[i][r] * term[i][c] * a[r * wide + terms + c];
-            }
-            scratch[i] = fabs(off) / fmax(1 - own, 0.05);
-            weight[i] = scratch[i];
-        }
-        spread = judge__quantile(scratch, count, 0.5) / 0.6745;
-        for (int i = 0; i < count; i++) weight[i] = weight[i] > 1.5 * spread ? 1.5 * spread / weight[i] : 1;
-    }
-    return spread;
-}
-
-/* Says why nothing can be said. */
-static int judge__cannot(const judge *k, const char *why) {
-    judge__say(k, "whether the photographs are exposed alike and lit by the lamps given cannot be judged: %s",
-               why);
-    return 0;
-}
-
-/* Notes where gains differ more than functions of the directions to camera and lamp explain. */
-static int judge__exposures(judge *k) {
-    static const int terms[3] = {3, 6, JUDGE__TERMS}, few[3] = {11, 24, 36};
-    const int n = k->set->count;
-    double middle[3] = {0, 0, 0}, least = 1e30;
-    int known = 0;
-    double(*term)[JUDGE__TERMS] =
-        (double(*)[JUDGE__TERMS])malloc((size_t)n * (sizeof *term + 3 * sizeof(double)));
-    if (!term) return 1;
-    double *value = (double *)(term + n);
-    for (int i = 0; i < k->point_count; i++)
-        for (int c = 0; c < 3; c++) middle[c] += k->points[i].place[c] / k->point_count;
-    for (int i = 0; i < n; i++) {
-        const judge__view *v = k->views + i;
-        double light[3], eye[3], length = 0, cosine = 0;
-        if (v->flooded || v->lit < JUDGE__LEAST) continue;
-        judge__toward(&v->frame->light, middle, light);
-        for (int c = 0; c < 3; c++) eye[c] = v->eye[c] - middle[c], length += eye[c] * eye[c];
-        for (int c = 0; c < 3; c++) eye[c] /= sqrt(length) + 1e-30, cosine += eye[c] * light[c];
-        term[known][0] = 1, term[known][1] = cosine, term[known][2] = cosine * cosine;
-        for (int c = 0; c < 3; c++) term[known][3 + c] = light[c], term[known][6 + c] = eye[c];
-        value[known++] = v->gain;
-    }
-    for (int i = 0; i < 3 && known >= few[i]; i++)
-        least = fmin(least, judge__spread((const double(*)[JUDGE__TERMS])term, value, known, terms[i],
-                                          value + n, value + 2 * n));
-    free(term);
-    if (known < few[0]) return judge__cannot(k, "too few are lit from the camera's side");
-    if (least >
-        0.28 + 3.5 / known) /* right captures reach 0.85 of that where few are known, else two thirds */
-        judge__say(
-            k,
-            "brightness differs from photograph to photograph more than views and lights explain, by a "
-            "factor of %.1f or so: exposures, cameras or lamps that pl_intensity does not tell apart? "
-            "Tell it, or train with --refine, which fits it",
-            exp(2 * least));
-    return 0;
-}
-
-/* Notes where half-transparent pixels have not the colour to which the opaque ones beside them lead, but that
-   mixed with a background by alpha, as stored or as light. Black is premultiplied alpha, which the trainer
-   notes. */
-static int judge__edges(judge *k) {
-    const int count = k->edge_count, light = k->numbers > 0;
-    double *values = (double *)malloc((size_t)(count + 1) * sizeof *values);
-    int told = count < 50;
-    if (!values) return 1;
-    for (int decodes = 0; decodes < 2 - light && !told; decodes++) {
-        double straight = 0, mixed = 0, behind[3];
-        for (int c = 0; c < 3; c++) {
-            for (int i = 0; i < 2 * count; i++) {
-                const judge__edge *e = k->edges + i % count;
-                double v = (double)e->value[c], lead = (double)e->beside[c];
-                const double a = (double)e->alpha;
-                if (decodes)
-                    v = (double)ssdgs_srgb_decode((ssdgs_real)v),
-                    lead = (double)ssdgs_srgb_decode((ssdgs_real)lead);
-                if (i < count) values[i] = (v - a * lead) / (1 - a);
-                if (i == count) behind[c] = fmin(1, fmax(0, judge__quantile(values, count, 0.5)));
-                if (i < count) continue;
-                straight += fabs(v - lead);
-                mixed += fabs(v - a * lead - (1 - a) * behind[c]);
-            }
-        }
-        const double most = fmax(behind[0], fmax(behind[1], behind[2])),
-                     least = fmin(behind[0], fmin(behind[1], behind[2]));
-        if (mixed > 0.5 * straight || most < 0.15) continue;
-        told = 1;
-        judge__say(
-            k,
-            "half-transparent pixels' colours lead towards %s (%.2f,%.2f,%.2f): the background that the "
-            "object was cut from is left in them, and shows as a rim. Let the program that cuts it out "
-            "remove the background's colour (decontaminate, defringe), or make the edges opaque or clear",
-            least > 0.75 ? "white" : "one colour", behind[0], behind[1], behind[2]);
-    }
-    free(values);
-    return 0;
-}
-
-/* How light grows with what is due, by powers: 1 is light, 0.45 or so are numbers encoded as sRGB. 1 where
-   too little is known. */
-static double judge__power(const judge *k) {
-    const int points = k->point_count;
-    double square = 0, product = 0;
-    int photos = 0;
-    for (int i = 0; i < k->set->count; i++) {
-        const judge__view *v = k->views + i;
-        double mean = 0;
-        if (v->lit < JUDGE__LEAST || v->flooded) continue;
-        photos++;
-        for (int j = 0; j < points; j++)
-            if (k->kind[i * points + j] == JUDGE__LIT) mean += (double)k->due[i * points + j] / v->lit;
-        for (int j = 0; j < points; j++) {
-            if (k->kind[i * points + j] != JUDGE__LIT) continue;
-            const double x = (double)k->due[i * points + j] - mean,
-                         off = (double)k->ratio[i * points + j] - k->points[j].albedo - v->gain;
-            square += x * x;
-            product += x * fmin(1, fmax(-1, off));
-        }
-    }
-    return photos < JUDGE__FEW || !(square > 0) ? 1 : 1 + product / square;
-}
-
-/* Asks where no number in OpenEXR photographs exceeds 1, and they end there, are bytes, or grow too slowly
-   with light. */
-static void judge__numbers(const judge *k) {
-    if (!k->numbers || k->most > 1.0005) return;
-    if (k->full * 2000 > k->numbers || k->on_grid * 2 > k->above || judge__power(k) < 0.8)
-        judge__say(k,
-                   "no number in the OpenEXR photographs exceeds 1: are they made from PNG, or encoded? They "
-                   "must hold linear light (darktable: output profile \"linear Rec709 RGB\", LIN_REC709)");
-}
-
-/* The share of what a photograph shows that lies beside the bounds' picture. */
-static double judge__beside(const judge *k, const judge__view *v) {
-    const ssdgs_camera *camera = &v->frame->camera;
-    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30}, shown = 0, beside = 0;
+static inline judge__silhouette judge__silhouette_of(const ssdgs_photo *photo, const ssdgs_train_options *o) {
+    const ssdgs_camera *camera = &photo->camera;
+    judge__silhouette s = {0, -1, 0, -1, 0, 0, 0};
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
     for (int corner = 0; corner < 8; corner++) {
-        double seen[3];
-        for (int r = 0; r < 3; r++) {
-            seen[r] = (double)camera->view[4 * r + 3];
-            for (int c = 0; c < 3; c++)
-                seen[r] += (double)camera->view[4 * r + c] *
-                           (k->low[c] + (corner >> c & 1 ? JUDGE__GRID * k->cell[c] : 0));
-        }
-        if (!(seen[2] > 0)) return 0; /* reaching behind the camera it may be anywhere */
-        for (int c = 0; c < 2; c++) {
-            const double at = ((double)(c ? camera->fy : camera->fx) * seen[c] / seen[2] +
-                               (double)(c ? camera->cy : camera->cx)) /
-                              v->step;
-            low[c] = fmin(low[c], at), high[c] = fmax(high[c], at);
-        }
-    }
-    for (int y = 0; y < v->height; y++)
-        for (int x = 0; x < v->width; x++) {
-            const double alpha = (double)v->alpha[y * v->width + x];
-            shown += alpha;
-            beside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1] ? alpha : 0;
-        }
-    return shown > 0 ? beside / shown : 0;
-}
-
-/* Finds the hull and what the photographs show of it, and judges that. */
-static int judge__hull(judge *k) {
-    const int n = k->set->count;
-    int box[2][3];
-    double toward[3] = {0, 0, 0};
-    double beside = 0;
-    for (int i = 0; i < n; i++) {
-        k->usable += k->views[i].outlined;
-        beside += k->views[i].outlined ? judge__beside(k, k->views + i) : 0;
-    }
-    if (k->usable < JUDGE__FEW) {
-        char why[80];
-        snprintf(why, sizeof why, "that takes %d photographs that show outlines, and %d do", JUDGE__FEW,
-                 k->usable);
-        return judge__cannot(k, why);
-    }
-    if (beside > 0.05 * k->usable)
-        return judge__cannot(k, "bounds_min .. bounds_max do not hold what the photographs show");
-    for (int level = 0; level < 2; level++) { /* coarsely, then what is left more finely */
-        if (judge__carve(k, box) < 30)
-            return judge__cannot(k, "the outlines leave nothing of bounds_min .. bounds_max");
-        for (int c = 0; c < 3 && !level; c++) {
-            const int first = box[0][c] > 0 ? box[0][c] - 1 : 0,
-                      last = box[1][c] < JUDGE__GRID - 1 ? box[1][c] + 1 : JUDGE__GRID - 1;
-            k->low[c] += first * k->cell[c];
-            k->cell[c] *= (double)(last + 1 - first) / JUDGE__GRID;
-        }
-    }
-    for (int i = 0; i < n; i++) {
-        double to[3], length = 0;
+        double world[3];
         for (int c = 0; c < 3; c++)
-            to[c] = k->views[i].eye[c] - k->low[c] - JUDGE__GRID / 2 * k->cell[c], length += to[c] * to[c];
-        for (int c = 0; c < 3; c++) toward[c] += to[c] / (sqrt(length) + 1e-30) / n;
+            world[c] = (double)(corner >> c & 1 ? o->bounds_max[c] : o->bounds_min[c]);
+        double seen[3];
+        judge__to_camera(camera, world, 1, seen);
+        for (int c = 0; c < 2; c++) {
+            const double f = (double)(c ? camera->fy : camera->fx),
+                         at = (double)(c ? camera->cy : camera->cx);
+            const double p = seen[2] > 0 ? f * seen[c] / seen[2] + at : 0;
+            low[c] = seen[2] > 0 ? p < low[c] ? p : low[c]
+                                 : -1e30; /* reaching behind the camera it may be anywhere */
+            high[c] = seen[2] > 0 ? p > high[c] ? p : high[c] : 1e30;
+        }
     }
-    if (toward[0] * toward[0] + toward[1] * toward[1] + toward[2] * toward[2] > 0.8)
-        return judge__cannot(k, "all are taken from one side");
-    judge__place_points(k);
-    const size_t size = (size_t)n * (size_t)k->point_count;
-    k->ratio = (float *)malloc((size + 1) * sizeof *k->ratio);
-    k->due = (float *)malloc((size + 1) * sizeof *k->due);
-    k->kind = (unsigned char *)calloc(size + 1, 1);
-    if (!k->ratio || !k->due || !k->kind) return 1;
-    for (int i = 0; i < n; i++)
-        if (k->views[i].outlined) judge__look(k, i);
-    judge__fit(k);
-    if (judge__flooded(k)) return 1;
-    const int failed = !k->flooded && judge__exposures(k);
-    return failed;
+    for (int y = 0; y < camera->height; y++)
+        for (int x = 0; x < camera->width; x++) {
+            if (judge__alpha(photo, (size_t)y * (size_t)camera->width + (size_t)x) < 0.5) continue;
+            if (s.right < s.left) s.left = s.right = x, s.top = y;
+            s.left = x < s.left ? x : s.left;
+            s.right = x > s.right ? x : s.right;
+            s.bottom = y;
+            s.shown++;
+            s.outside += x + 1 < low[0] || x > high[0] || y + 1 < low[1] || y > high[1];
+        }
+    s.whole = s.shown > 0 && s.left > 0 && s.right < camera->width - 1 && s.top > 0 &&
+              s.bottom < camera->height - 1;
+    return s;
 }
 
-/* Writes a note to the logger for each thing that is wrong, and where that cannot be known. options: the
-   bounds. 1: out of memory. */
-OLAT__API int judge_capture(const olat_dataset *set, const ssdgs_train_options *options,
-                            const ssdgs_logger *logger) {
-    judge k;
-    size_t cells = 0, at = 0;
-    memset(&k, 0, sizeof k);
-    k.set = set;
-    k.logger = logger;
-    k.views = (judge__view *)calloc((size_t)set->count, sizeof *k.views);
-    k.curve = (float *)malloc(65536 * sizeof *k.curve);
-    k.edges = (judge__edge *)malloc(JUDGE__EDGES * sizeof *k.edges);
-    k.hull = (unsigned char *)malloc(JUDGE__GRID * JUDGE__GRID * JUDGE__GRID);
-    k.points = (judge__point *)malloc((JUDGE__POINTS + 1) * sizeof *k.points);
-    int failed = !k.views || !k.curve || !k.edges || !k.hull || !k.points;
-    for (int i = 0; i < 65536 && !failed; i++) k.curve[i] = (float)ssdgs_srgb_decode((ssdgs_real)i / 65535);
-    for (int i = 0; i < set->count && !failed; i++) {
-        judge__view *v = k.views + i;
-        v->frame = set->frames + i;
-        const int w = v->frame->camera.width, h = v->frame->camera.height;
-        v->step = ((w > h ? w : h) + JUDGE__SIDE - 1) / JUDGE__SIDE;
-        v->width = (w + v->step - 1) / v->step;
-        v->height = (h + v->step - 1) / v->step;
-        cells += 2 * (size_t)v->width * (size_t)v->height;
+/* Notes where photographs and their cameras or the bounds do not suit each other. The rays through the
+   middles of the silhouettes meet about where the object is; `within` cameras stand within the bounds. */
+static inline int judge__bounds(const judge__capture *k, int within) {
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, b[3] = {0, 0, 0}, x[3] = {0, 0, 0};
+    double shown = 0, outside = 0, half = 0, miss = 0;
+    judge__silhouette *silhouettes = (judge__silhouette *)calloc((size_t)k->count, sizeof *silhouettes);
+    int rays = 0, behind = 0;
+    if (!silhouettes) return 1;
+    int l;
+    for (int i = 0; i < k->count;
+         i++) { /* sum of |(1 - d d') (x - eye)|^2 = x.a x - 2 b.x + miss, d the ray */
+        const ssdgs_camera *camera = &k->photos[i].camera;
+        judge__silhouette *s = silhouettes + i;
+        if (!judge__outlined(k->photos + i)) continue;
+        *s = judge__silhouette_of(k->photos + i, k->options);
+        shown += s->shown;
+        outside += s->outside;
+        if (!s->whole) continue;
+        rays++;
+        double ray[3];
+        ray[0] = (0.5 * (s->left + s->right + 1) - (double)camera->cx) / (double)camera->fx;
+        ray[1] = (0.5 * (s->top + s->bottom + 1) - (double)camera->cy) / (double)camera->fy;
+        ray[2] = 1;
+        const double length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+        double eye[3];
+        judge__camera_centre(camera, eye);
+        double d[3];
+        for (int j = 0; j < 3; j++)
+            for (d[j] = 0, l = 0; l < 3; l++) d[j] += (double)camera->view[4 * l + j] * ray[l] / length;
+        for (int j = 0; j < 3; j++)
+            for (l = 0; l < 3; l++) {
+                a[3 * j + l] += (j == l) - d[j] * d[l];
+                b[j] += ((j == l) - d[j] * d[l]) * eye[l];
+                miss += ((j == l) - d[j] * d[l]) * eye[j] * eye[l];
+            }
     }
-    if (!failed) k.cells = (float *)calloc(cells, sizeof *k.cells);
-    failed = failed || !k.cells;
-    for (int i = 0; i < set->count && !failed; i++) {
-        judge__view *v = k.views + i;
-        v->light = k.cells + at;
-        v->alpha = v->light + v->width * v->height;
-        at += 2 * (size_t)v->width * (size_t)v->height;
-        judge__read(&k, v);
+    double cross[3];
+    judge__cross(a + 3, a + 6, cross);
+    const double determinant = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
+    if (determinant > 1e-6) {         /* else they are parallel */
+        for (int j = 0; j < 3; j++) { /* Cramer's rule on a symmetric matrix */
+            double m[9];
+            memcpy(m, a, sizeof m);
+            memcpy(m + 3 * j, b, sizeof b);
+            judge__cross(m + 3, m + 6, cross);
+            x[j] = (m[0] * cross[0] + m[1] * cross[1] + m[2] * cross[2]) / determinant;
+        }
+        for (int i = 0; i < k->count; i++) {
+            const ssdgs_camera *camera = &k->photos[i].camera;
+            const judge__silhouette *s = silhouettes + i;
+            double seen[3];
+            judge__to_camera(camera, x, 1, seen);
+            if (!s->whole) continue;
+            double wide = 0.5 * seen[2] * (s->right + 1 - s->left) / (double)camera->fx;
+            const double high = 0.5 * seen[2] * (s->bottom + 1 - s->top) / (double)camera->fy;
+            wide = wide > high ? wide : high;
+            half = wide > half ? wide : half;
+            behind += wide < 0;
+        }
+        for (int j = 0; j < 3; j++)
+            for (miss -= 2 * b[j] * x[j], l = 0; l < 3; l++) miss += x[j] * a[3 * j + l] * x[l];
+        miss = sqrt(miss > 0 ? miss / rays : 0);
     }
+    free(silhouettes);
+    const int doubtful = determinant > 1e-6 && miss > 0.5 * half;
+    if (doubtful && behind > rays / 2)
+        judge__note(k, "what the photographs show lies behind the cameras: are their axes right?");
+    else if (doubtful)
+        judge__note(k,
+                    "what the photographs show is in no one place, lines of sight to it miss each other by "
+                    "%g where it is %g "
+                    "wide: are the cameras' poses, axes and lenses right?",
+                    miss, 2 * half);
+    if (within)
+        judge__note(
+            k, "%d cameras of %d stand within bounds_min .. bounds_max, which should hold the object alone",
+            within, k->count);
+    if (outside > 0.1 * shown && !doubtful)
+        judge__note(k,
+                    "of what the photographs show %d in 100 pixels lie outside of bounds_min .. bounds_max",
+                    (int)(100 * outside / shown));
+    if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return 0;
+    const double step = pow(10, floor(log10(half)) - 1);
+    for (int j = 0; j < 3; j++) x[j] += (double)k->settings->origin[j];
+    judge__note(k, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g",
+                step * floor((x[0] - half) / step), step * floor((x[1] - half) / step),
+                step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
+                step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));
+    return 0;
+}
+
+/* ---- shading and lights ---- */
+
+/* Of one photograph, for whether its shading agrees with its light. In camera axes. */
+typedef struct judge__shading {
+    double rotation[9]; /* world to camera */
+    double eye[3];      /* from the bounds' centre, world */
+    double position[3]; /* as given: of the light, or towards it */
+    double shift[2];    /* of the brightness' middle from the silhouette's, in the silhouette's standard
+                           deviations */
+    double brightness;  /* mean, over the light's intensity */
+    int directional;
+} judge__shading;
+
+/* The stored colour of a pixel laid over black. */
+static inline void judge__over_black(const ssdgs_photo *photo, int transfer, size_t pixel, double stored[3]) {
     for (int c = 0; c < 3; c++)
-        k.low[c] = (double)options->bounds_min[c],
-        k.cell[c] = ((double)options->bounds_max[c] - k.low[c]) / JUDGE__GRID;
-    if (!failed) failed = judge__hull(&k) || judge__edges(&k);
-    if (!failed) judge__numbers(&k);
-    free(k.views), free(k.curve), free(k.edges), free(k.hull), free(k.points), free(k.cells), free(k.ratio),
-        free(k.due), free(k.kind);
+        stored[c] = judge__alpha(photo, pixel) * judge__value(photo, transfer, pixel, c);
+}
+
+/* About the light of a pixel laid over black; 0 where it has the colour of the first one. */
+static inline double judge__lightness(const ssdgs_photo *photo, int transfer, const double corner[3],
+                                      size_t pixel) {
+    double value = 0, apart = 0, stored[3];
+    judge__over_black(photo, transfer, pixel, stored);
+    for (int c = 0; c < 3; c++) {
+        value += stored[c] * stored[c];
+        apart = fabs(stored[c] - corner[c]) > apart ? fabs(stored[c] - corner[c]) : apart;
+    }
+    return apart < 0.02 ? 0 : value;
+}
+
+/* What a photograph shows of its light; 0 where it shows nothing. An opaque one's silhouette is the picture.
+   Pixels of the first one's colour count as dark, those brighter than all that lie three pixels away as the
+   brightest of these. */
+static inline int judge__shading_of(const ssdgs_photo *photo, int transfer, const double centre[3],
+                                    judge__shading *s) {
+    const ssdgs_camera *camera = &photo->camera;
+    const int w = camera->width, h = camera->height, step = 1 + (w > h ? w : h) / 128; /* some pixels tell */
+    double area = 0, light = 0, middle[2] = {0, 0}, square[2] = {0, 0}, bright[2] = {0, 0}, intensity = 0;
+    double corner[3];
+    judge__over_black(photo, transfer, 0, corner);
+    for (int y = step / 2; y < h; y += step)
+        for (int x = step / 2; x < w; x += step) {
+            const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
+            const double alpha = judge__alpha(photo, pixel);
+            const double at[2] = {(x + 0.5 - (double)camera->cx) / (double)camera->fx,
+                                  (y + 0.5 - (double)camera->cy) / (double)camera->fy};
+            double value = judge__lightness(photo, transfer, corner, pixel), around = 0;
+            for (int side = 0; side < 9 && value > around; side++) { /* a hot pixel is not the object's */
+                const int u = x + 3 * (side % 3 - 1), v = y + 3 * (side / 3 - 1);
+                if (side == 4 || u < 0 || u >= w || v < 0 || v >= h) continue;
+                const double there =
+                    judge__lightness(photo, transfer, corner, (size_t)v * (size_t)w + (size_t)u);
+                around = there > around ? there : around;
+            }
+            value = value < around ? value : around;
+            area += alpha;
+            light += value;
+            for (int c = 0; c < 2; c++) {
+                middle[c] += alpha * at[c];
+                square[c] += alpha * at[c] * at[c];
+                bright[c] += value * at[c];
+            }
+        }
+    for (int c = 0; c < 3; c++) intensity += (double)photo->light.intensity[c] / 3;
+    if (!(area > 0) || !(light > 0) || !(intensity > 0)) return 0;
+    for (int c = 0; c < 2; c++) {
+        const double variance = square[c] / area - middle[c] / area * (middle[c] / area);
+        s->shift[c] = (bright[c] / light - middle[c] / area) / sqrt(variance > 1e-12 ? variance : 1e-12);
+    }
+    s->brightness = light / area / intensity;
+    s->directional = photo->light.kind == SSDGS_LIGHT_DIRECTIONAL;
+    judge__light_place(&photo->light, s->position);
+    judge__camera_centre(camera, s->eye);
+    for (int c = 0; c < 3; c++) {
+        s->eye[c] -= centre[c];
+        for (int l = 0; l < 3; l++) s->rotation[3 * c + l] = (double)camera->view[4 * c + l];
+    }
+    return 1;
+}
+
+/* A way to read three numbers as a light's position: axis[c] and sign[c] tell which is the c-th coordinate,
+   then in world or camera axes, from the world's origin or the camera. */
+typedef struct judge__reading {
+    int axis[3], in_camera, from_camera;
+    double sign[3];
+} judge__reading;
+
+/* Where the light stands from the bounds' centre: its direction in world axes, and its squared distance. */
+static inline double judge__read_light(const judge__shading *s, const judge__reading *r,
+                                       const double centre[3], double direction[3]) {
+    double p[3], distance2 = 0;
+    for (int c = 0; c < 3; c++) p[c] = r->sign[c] * s->position[r->axis[c]];
+    for (int c = 0; c < 3; c++) {
+        direction[c] = r->in_camera ? 0 : p[c];
+        for (int l = 0; l < 3 && r->in_camera; l++) direction[c] += s->rotation[3 * l + c] * p[l];
+        if (!s->directional) direction[c] += r->from_camera ? s->eye[c] : -centre[c];
+        distance2 += direction[c] * direction[c];
+    }
+    for (int c = 0; c < 3; c++) direction[c] /= sqrt(distance2) + 1e-12;
+    return s->directional ? 1 : distance2;
+}
+
+/* The correlation of (n, width) numbers with others, each less their means; *spread: the first ones' standard
+   deviation. */
+static inline double judge__correlation(const double *a, const double *b, int n, int width, double *spread) {
+    double ab = 0, aa = 0, bb = 0;
+    for (int c = 0; c < width; c++) {
+        double a_mean = 0, b_mean = 0;
+        for (int i = 0; i < n; i++) a_mean += a[i * width + c] / n, b_mean += b[i * width + c] / n;
+        for (int i = 0; i < n; i++) {
+            const double x = a[i * width + c] - a_mean, y = b[i * width + c] - b_mean;
+            ab += x * y, aa += x * x, bb += y * y;
+        }
+    }
+    *spread = sqrt(aa / n);
+    return ab / sqrt(aa * bb + 1e-30);
+}
+
+/* How well shading follows the lights, a correlation: a picture is brightest on the light's side, and bright
+   as a whole where the light is on the camera's side. On a floor seen from above only two axes tell of the
+   former. 1 where nothing tells. *facing: how far the lights are on the camera's side, on average, plus twice
+   its error. scratch: (n, 6). */
+static inline double judge__agreement(const judge__shading *s, int n, const judge__reading *reading,
+                                      const double centre[3], double *scratch, double *facing) {
+    double *toward = scratch, *shift = scratch + 2 * n, *front = scratch + 4 * n, *bright = scratch + 5 * n;
+    double sideways = -2, brightness = 0, front_mean = 0;
+    for (int flat = 0; flat < 4; flat++) { /* which axis tells nothing; 3: all tell */
+        double lights = 0, shown = 0;
+        int above = 0;
+        for (int i = 0; i < n; i++) {
+            double d[3], eye2 = 0, towards_eye = 0;
+            const double distance2 = judge__read_light(s + i, reading, centre, d);
+            for (int c = 0; c < 3; c++) {
+                towards_eye += d[c] * s[i].eye[c];
+                eye2 += s[i].eye[c] * s[i].eye[c];
+            }
+            front[i] = towards_eye / (sqrt(eye2) + 1e-12);
+            bright[i] = s[i].brightness * distance2;
+            if (flat < 3) {
+                lights += d[flat];
+                above += s[i].eye[flat] > 0;
+                d[flat] = 0;
+            }
+            for (int c = 0; c < 2; c++) {
+                shift[2 * i + c] = s[i].shift[c];
+                int l;
+                for (l = 0, toward[2 * i + c] = 0; l < 3; l++)
+                    toward[2 * i + c] += s[i].rotation[3 * c + l] * d[l];
+            }
+        }
+        if (flat < 3 && (above == 0 ? lights > 0 : above < n || lights < 0))
+            continue; /* neither a floor nor a ceiling */
+        const double r = judge__correlation(toward, shift, n, 2, &shown);
+        sideways = shown > 0.1 && r > sideways ? r : sideways;
+    }
+    for (int i = 0; i < n; i++) brightness += bright[i] / n, front_mean += front[i] / n;
+    for (int i = 0; i < n; i++)
+        bright[i] /= bright[i] + brightness + 1e-30; /* a few highlights must not count for all */
+    double spread;
+    const double frontal = judge__correlation(front, bright, n, 1, &spread);
+    *facing = front_mean + 2 * spread / sqrt((double)n);
+    if (!(spread > 0.2))
+        return sideways < -1 ? 1 : sideways; /* where lights hardly change sides brightness tells nothing */
+    return sideways < -1 ? frontal : 0.5 * (sideways + frontal);
+}
+
+/* Notes where the photographs' shading contradicts their lights: axes, signs or origins are wrong. Right
+   captures agree to 0.8 and more, wrong readings to 0.5 or so; on a floor seen from above one that puts the
+   lights below it may agree to 0.86. */
+static inline int judge__note_shading(const judge__capture *k, const double centre[3]) {
+    enum { few = 6, enough = 12 };
+    static const judge__reading as_given = {{0, 1, 2}, 0, 0, {1, 1, 1}};
+    static const char *const axes[2][3] = {{"x", "y", "z"}, {"-x", "-y", "-z"}};
+    const size_t room = (size_t)k->count * (sizeof(judge__shading) + 6 * sizeof(double));
+    judge__shading *s = (judge__shading *)malloc(room);
+    if (!s) return 1;
+    double *scratch = (double *)(s + k->count), agrees = 1, facing = 1, best = 0;
+    judge__reading found = as_given;
+    int n = 0;
+    for (int i = 0; i < k->count; i++) n += judge__shading_of(k->photos + i, k->transfer, centre, s + n);
+    if (n >= few) agrees = judge__agreement(s, n, &as_given, centre, scratch, &facing);
+    judge__reading reading;
+    for (int way = 0; way < 4 && n >= enough; way++)
+        for (int order = 0; order < 6; order++)
+            for (int signs = 0; signs < 8; signs++) {
+                for (int i = 0; i < 3; i++) {
+                    reading.axis[i] = order < 3 ? (order + i) % 3 : (order - i) % 3;
+                    reading.sign[i] = signs >> i & 1 ? -1 : 1;
+                }
+                reading.in_camera = way & 1;
+                reading.from_camera = way >> 1;
+                double facing_so;
+                const double agrees_so = judge__agreement(s, n, &reading, centre, scratch, &facing_so);
+                /* a place beside the camera mixes in the camera's direction, of which much is right in any
+                   reading */
+                if (facing_so < -0.1 ||
+                    agrees_so < best + (reading.from_camera != found.from_camera ? 0.2 : 0))
+                    continue;
+                best = agrees_so;
+                found = reading;
+            }
+    const int behind = n >= enough && agrees < 0.88 && facing < -0.1;
+    const int contradicts = agrees < 0.5 || (best > 0.75 && best > agrees + 0.2 && !behind);
+    if (contradicts)
+        judge__note(k,
+                    "the photographs' shading contradicts their lights: its correlation with their "
+                    "directions is %g, and near 1 "
+                    "where these are right",
+                    floor(100 * agrees + 0.5) / 100);
+    else if (behind)
+        judge__note(
+            k, "the lights stand behind the object as most cameras see it: are their axes and signs right?");
+    if ((contradicts || behind) && best > 0.7 && best > agrees + 0.03)
+        judge__note(k, "read as (%s, %s, %s) in %s axes%s, the lights would agree with the shading (%g)",
+                    axes[found.sign[0] < 0][found.axis[0]], axes[found.sign[1] < 0][found.axis[1]],
+                    axes[found.sign[2] < 0][found.axis[2]],
+                    found.in_camera ? "each camera's (right, down, forward)" : "the world's",
+                    found.from_camera ? ", from the camera" : "", floor(100 * best + 0.5) / 100);
+    free(s);
+    return 0;
+}
+
+/* Notes lights within the bounds and, where lights tell what other lights do, shading that contradicts them.
+   They do not where they hardly move, or hardly move in the camera's axes: the trainer tells that. */
+static inline int judge__lights(const judge__capture *k) {
+    const int n = k->count;
+    double centre[3], mean[3] = {0, 0, 0}, held[3] = {0, 0, 0}, spread = 0, apart = 0, away = 0, lit_from = 0;
+    int within = 0, points = 0, several = 0;
+    judge__bounds_centre(k->options, centre);
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < n; i++) {
+            const ssdgs_photo *photo = k->photos + i;
+            const int point = photo->light.kind != SSDGS_LIGHT_DIRECTIONAL;
+            double eye[3], p[3], seen[3], sums[4] = {0, 0, 0, 0};
+            judge__camera_centre(&photo->camera, eye);
+            judge__light_place(&photo->light, p);
+            judge__to_camera(&photo->camera, p, point, seen);
+            for (int j = 0; j < 3; j++) {
+                sums[0] += (p[j] - mean[j]) * (p[j] - mean[j]);
+                sums[1] += (seen[j] - held[j]) * (seen[j] - held[j]);
+                sums[2] += (eye[j] - centre[j]) * (eye[j] - centre[j]);
+                sums[3] += (p[j] - centre[j]) * (p[j] - centre[j]);
+            }
+            if (pass) {
+                spread = sums[0] > spread ? sums[0] : spread;
+                apart = sums[1] > apart ? sums[1] : apart;
+                away += (points ? sqrt(sums[2]) : 1) / n;
+                lit_from += (points ? sqrt(sums[3]) : 1) / n;
+                continue;
+            }
+            for (int j = 0; j < 3; j++) mean[j] += p[j] / n, held[j] += seen[j] / n;
+            within += point && judge__in_bounds(k->options, p);
+            points += point;
+            several |= photo->more_count > 0;
+        }
+    if (within)
+        judge__note(
+            k, "%d lights of %d stand within bounds_min .. bounds_max, which should hold the object alone",
+            within, n);
+    if (n < 2 || several || (points && points < n)) return 0;
+    if (points && k->radius > 1e-3 * k->unit && k->radius < away)
+        away = k->radius; /* bounds, and so away, may be wrong */
+    if (sqrt(spread) < 0.03 * lit_from || sqrt(apart) < 0.1 * away) return 0;
+    return judge__note_shading(k, centre);
+}
+
+/* ---- alpha ---- */
+
+/* Notes where colours are multiplied by alpha already: a half-transparent pixel then has not the colour that
+   the opaque ones beside it lead to, but that times alpha, as stored or as linear light. */
+static inline void judge__alphas(const judge__capture *k) {
+    const int transfer = k->transfer;
+    double straight = 0, times_alpha = 0, times_linear = 0, count = 0;
+    for (int i = 0; i < k->count; i++) {
+        const ssdgs_photo *photo = k->photos + i;
+        const int w = photo->camera.width, h = photo->camera.height;
+        for (int y = 0; y < h; y++)
+            for (int x = 3; x < w - 3; x++) {
+                const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
+                const double a = judge__alpha(photo, pixel);
+                if (a < 0.1 || a > 0.7) continue;
+                for (int side = 0; side < 4; side++) { /* right and left, next to it and one further */
+                    const int step = 1 + side / 2;
+                    const size_t next = side & 1 ? pixel - (size_t)step : pixel + (size_t)step,
+                                 further = side & 1 ? next - 1 : next + 1;
+                    if (judge__alpha(photo, next) < 0.99 || judge__alpha(photo, further) < 0.99) continue;
+                    for (int c = 0; c < 3; c++) {
+                        const double v = judge__value(photo, transfer, pixel, c),
+                                     beside = judge__value(photo, transfer, next, c);
+                        double n = beside + step * (beside - judge__value(photo, transfer, further, c));
+                        n = n < 0 ? 0 : n > 1 ? 1 : n;
+                        straight += fabs(v - n);
+                        times_alpha += fabs(v - a * n);
+                        times_linear += fabs(v - pow(a, 1 / 2.2) * n);
+                    }
+                    count++;
+                    break;
+                }
+            }
+    }
+    if (count >= 50 && (times_alpha < 0.5 * straight || times_linear < 0.5 * straight))
+        judge__note(k, "the photographs' colours look multiplied by alpha, which darkens "
+                       "outlines: they must be straight "
+                       "(divide by alpha, or export without premultiplication)");
+}
+
+/* Writes a note to the logger for each thing that is wrong. settings: transfer and origin are read; options:
+   the bounds. The photographs must be such as ssdgs_trainer_create() takes. 1: out of memory. */
+static inline int judge_photos(const ssdgs_photo *photos, int count, const ssdgs_settings *settings,
+                               const ssdgs_train_options *options, const ssdgs_logger *logger) {
+    judge__capture k = {photos, count, settings->transfer, settings, options, logger, 0, 0};
+    double mean[3] = {0, 0, 0}, eye[3];
+    int within = 0, failed = 0;
+    for (int i = 0; i < count; i++) {
+        judge__camera_centre(&photos[i].camera, eye);
+        for (int c = 0; c < 3; c++) mean[c] += eye[c] / count;
+        within += judge__in_bounds(options, eye);
+    }
+    for (int i = 0; i < count; i++) {
+        double away = 0;
+        judge__camera_centre(&photos[i].camera, eye);
+        for (int c = 0; c < 3; c++) away += (eye[c] - mean[c]) * (eye[c] - mean[c]);
+        k.radius = sqrt(away) > k.radius ? sqrt(away) : k.radius;
+    }
+    for (int c = 0; c < 3; c++) {
+        const double side = (double)options->bounds_max[c] - (double)options->bounds_min[c];
+        k.unit = side > k.unit ? side : k.unit;
+    }
+    if (k.radius >= 1e-3 * k.unit)
+        failed = judge__bounds(&k, within); /* else from one place: who can tell? */
+    failed = failed || judge__lights(&k);
+    if (!failed) judge__alphas(&k);
     return failed;
 }
 #endif

@@ -7,6 +7,7 @@
 #include "../ssdgs.h"
 #include "olat.h"
 #include "flip.h"
+#include "hull.h"
 #include "judge.h"
 #include "reduce.h"
 #include "picture.h"
@@ -646,7 +647,9 @@ static int train(job *j) {
                 "other "
                 "views and lights gain nothing. Try --iterations %d, or take more photographs\n",
                 j->options.iterations, j->train_set.count, 100 * j->train_set.count);
-    if (!j->photos || judge_capture(&j->train_set, &j->options, &j->desc.logger))
+    if (!j->photos || hull_judge(&j->train_set, &j->options, &j->desc.logger) ||
+        judge_photos(j->photos, j->train_set.count, j->model ? ssdgs_model_settings(j->model) : &j->settings,
+                     &j->options, &j->desc.logger))
         return fail("out of memory");
     for (int i = 0; i < j->train_set.count; i++) {
         if (j->photos[i].camera.width > width) width = j->photos[i].camera.width;

@@ -102,8 +102,8 @@ static void test_coverage(void) {
     k.sets[1].count = 2;
     CHECK(fabs(nearest(&k, offsetof(facts, light)) - 90) < 1e-6);
     double values[5] = {5, 1, 4, 2, 3};
-    CHECK(judge__quantile(values, 5, 0.5) == 3 && judge__quantile(values, 5, 0) == 1 &&
-          judge__quantile(values, 5, 1) == 5 && judge__quantile(values, 0, 0.5) == 0);
+    CHECK(hull__quantile(values, 5, 0.5) == 3 && hull__quantile(values, 5, 0) == 1 &&
+          hull__quantile(values, 5, 1) == 5 && hull__quantile(values, 0, 0.5) == 0);
 }
 
 int main(void) {

@@ -1,9 +1,10 @@
-/* examples/judge.h: what it says of right captures, which is nothing, and of each fault at several strengths;
+/* examples/hull.h: what it says of right captures, which is nothing, and of each fault at several strengths;
    the trainer's notes on hot pixels and forgotten bounds. cc -o build/t_judge tests/t_judge.c -lm -lpthread
    && build/t_judge */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "../examples/olat.h"
+#include "../examples/hull.h"
 #include "../examples/judge.h"
 #include "test.h"
 
@@ -129,7 +130,7 @@ static const char *said(int count) {
     set.frames = frames;
     set.count = count;
     heard[0] = 0;
-    CHECK(!judge_capture(&set, &options, &logger));
+    CHECK(!hull_judge(&set, &options, &logger));
     return heard;
 }
 
@@ -245,11 +246,11 @@ static void test_limits(void) {
     if (!CHECK(!olat_load_at("examples/data/waxcow", "transforms_train.json", 0, NULL, &reader, &set, error)))
         return;
     heard[0] = 0;
-    CHECK(!judge_capture(&set, &options, &logger) && !*heard);
+    CHECK(!hull_judge(&set, &options, &logger) && !*heard);
     olat_free(&set);
 }
 
-/* What the trainer notes of the photographs. */
+/* What judge.h and the trainer note of the photographs. */
 static const char *noted(void) {
     ssdgs_context_desc desc;
     ssdgs_context *own = NULL;
@@ -262,6 +263,8 @@ static const char *noted(void) {
     CHECK(!ssdgs_context_create(&desc, &own) && !ssdgs_model_create(own, NULL, 0, &fresh));
     heard[0] = 0;
     CHECK(!ssdgs_trainer_create(fresh, photos, MANY, NULL, &trainer));
+    const ssdgs_train_options standard = ssdgs_train_options_default();
+    CHECK(!judge_photos(photos, MANY, ssdgs_model_settings(fresh), &standard, &logger));
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(fresh);
     ssdgs_context_destroy(own);

@@ -2,6 +2,7 @@
    components add up to. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "../examples/judge.h"
 #include "test.h"
 
 #define PHOTOS 6
@@ -1839,6 +1840,16 @@ static void hear(void *user, ssdgs_result code, const char *message) {
                      cube + 1, cube + 2, cube + 3, cube + 4, cube + 5) == 6);
 }
 
+static const ssdgs_logger ear = {hear, NULL};
+
+/* Judges the photographs, then makes a trainer: both write notes. */
+static ssdgs_result judge_and_create(ssdgs_model *model, const ssdgs_photo *shots, int count,
+                                     const ssdgs_train_options *options, ssdgs_trainer **trainer) {
+    const ssdgs_result result = ssdgs_trainer_create(model, shots, count, options, trainer);
+    if (!result) CHECK(!judge_photos(shots, count, ssdgs_model_settings(model), options, &ear));
+    return result;
+}
+
 /* Photographs, cameras and bounds that do not suit each other are noted, and others are not; the ball's cube
    is found. */
 static void test_doubts(void) {
@@ -1885,7 +1896,7 @@ static void test_doubts(void) {
         memset(heard, 0, sizeof heard);
         told = 0;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
-        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        if (!CHECK(!judge_and_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         /* all have their lights beside the camera; 3 and 8 move the world, but not the lights */
         wanted[kind][kind == 3 || kind == 8 ? CONTRADICTED : LIGHT_MOVES] = 1;
         wanted[kind][LIT_WITHIN] = kind == 2;
@@ -2185,7 +2196,7 @@ static void test_wrong_outlines(void) {
         memset(heard, 0, sizeof heard);
         told = 0;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
-        if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
+        if (!CHECK(!judge_and_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
         for (int k = 0; k < cases[i].photographs; k++) {
             left_out += trainer->transparent[k] == 1;
             CHECK(trainer->transparent[k] == (k >= cases[i].photographs - cases[i].opaque ? 0 : 2) ||
@@ -2351,7 +2362,7 @@ static void test_light_notes(void) {
         memset(heard, 0, sizeof heard);
         reading[0] = 0;
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
-        if (!CHECK(!ssdgs_trainer_create(model, shots, SHOTS, &options, &trainer))) exit(1);
+        if (!CHECK(!judge_and_create(model, shots, SHOTS, &options, &trainer))) exit(1);
         for (int c = 0; c < NOTES; c++) total += heard[c];
         total -= cases[i].notes[1] == NOTES ? heard[READ_AS] : 0; /* what follows from those wanted */
         total -= cases[i].notes[0] == LIT_WITHIN ? heard[CONTRADICTED] : 0;
@@ -2411,7 +2422,7 @@ static void test_borders(void) {
         for (size_t k = 0; k < 3; k++) options.background[k] = (ssdgs_real)cases[i].background;
         memset(heard, 0, sizeof heard);
         CHECK(!ssdgs_model_create(context, NULL, 0, &model));
-        if (!CHECK(!ssdgs_trainer_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
+        if (!CHECK(!judge_and_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         if (!CHECK(heard[BACKDROP] == cases[i].backdrop && heard[FILLED] == !cases[i].backdrop &&
                    heard[ALIKE] == cases[i].alike && heard[NO_OUTLINES] == 1 &&
                    trainer->backdrop == cases[i].backdrop && trainer->filled == !cases[i].backdrop))
@@ -2833,7 +2844,7 @@ static void test_far_origin(void) {
         shots[i].pixels = bytes;
     }
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, NULL, 0, &model) &&
-          !ssdgs_trainer_create(model, shots, N, &options, &trainer));
+          !judge_and_create(model, shots, N, &options, &trainer));
     for (int i = 0; i < options.iterations && trainer; i++)
         CHECK(!ssdgs_trainer_step(trainer, &stats) && stats.skipped_steps == 0);
     ssdgs_trainer_destroy(trainer);
