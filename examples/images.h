@@ -1,4 +1,4 @@
-/* images.h - reads PNG and OpenEXR, writes PNG. MIT, see ssdgs.h.
+/* images.h - reads PNG and OpenEXR, writes PNG, animated too. MIT, see ssdgs.h.
 
    #include "ssdgs.h"
    #include "images.h"
@@ -460,7 +460,10 @@ enum {
     OLAT__PLTE = 0x504C5445,
     OLAT__IDAT = 0x49444154,
     OLAT__IEND = 0x49454E44,
-    OLAT__TRNS = 0x74524E53
+    OLAT__TRNS = 0x74524E53,
+    OLAT__ACTL = 0x6163544C, /* of animated ones: how many frames; of a frame; its pixels */
+    OLAT__FCTL = 0x6663544C,
+    OLAT__FDAT = 0x66644154
 };
 /* Chunks that tell about the picture: kept as they are, the first intact one of each kind. */
 enum { OLAT__GAMA, OLAT__CHRM, OLAT__SRGB, OLAT__ICCP, OLAT__CICP, OLAT__PHYS, OLAT__EXIF, OLAT__TELLING };
@@ -825,25 +828,24 @@ static unsigned char *olat__put_chunk(unsigned char *p, uint32_t type, size_t le
     return p + 12 + length;
 }
 
-/* Writes (h,w,channels) bytes as PNG: 1 grey, 3 RGB, 4 RGBA. The file appears whole or not at all. */
-OLAT__API int olat_write_png(const char *path, int width, int height, int channels,
-                             const unsigned char *pixels, char error[512]) {
+/* Writes (count,h,w,channels) bytes as PNG: 1 grey, 3 RGB, 4 RGBA. Of several pictures it makes an animated
+   PNG, as PNG's third edition has it: each is shown for `delay` <= 65535 milliseconds, again and again;
+   programs that know nothing of that show the first. The file appears whole or not at all. */
+OLAT__API int olat_write_pngs(const char *path, int width, int height, int channels,
+                              const unsigned char *pixels, int count, int delay, char error[512]) {
     const size_t row = (size_t)width * (size_t)channels, raw_size = (size_t)height * (row + 1);
-    if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE ||
-        height > OLAT__MAX_PIXELS / width || (channels != 1 && channels != 3 && channels != 4)) {
-        return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels", olat__tail(path), width,
-                          height, channels);
+    if (width < 1 || height < 1 || width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE || count < 1 ||
+        height > OLAT__MAX_PIXELS / width / count || delay < 0 || delay > 65535 ||
+        (channels != 1 && channels != 3 && channels != 4)) {
+        return olat__fail(error, "%s: cannot write %d x %d pixels of %d channels, %d pictures",
+                          olat__tail(path), width, height, channels, count);
     }
     unsigned char *raw = (unsigned char *)malloc(raw_size);
-    unsigned char *file =
-        (unsigned char *)malloc(raw_size + raw_size / 8 + 128); /* nine bits a byte, and the chunks */
-    uint32_t *table = (uint32_t *)calloc(65536, sizeof *table);
+    unsigned char *file = /* nine bits a byte, and the chunks */
+        (unsigned char *)malloc((size_t)count * (raw_size + raw_size / 8 + 128) + 128);
+    uint32_t *table = (uint32_t *)malloc(65536 * sizeof *table), sequence = 0;
     int failed;
     if (raw && file && table) {
-        for (int y = 0; y < height; y++) {
-            const unsigned char *from = pixels + (size_t)y * row;
-            olat__filter_row(from, y ? from - row : NULL, row, (size_t)channels, raw + (size_t)y * (row + 1));
-        }
         memcpy(file, olat__signature, 8);
         unsigned char *p = file + 8;
         memset(p + 16, 0, 5);
@@ -852,7 +854,29 @@ OLAT__API int olat_write_png(const char *path, int width, int height, int channe
         p[16] = 8;
         p[17] = (unsigned char)(channels == 1 ? 0 : channels == 3 ? 2 : 6);
         p = olat__put_chunk(p, OLAT__IHDR, 13);
-        p = olat__put_chunk(p, OLAT__IDAT, olat__deflate(raw, raw_size, p + 8, table));
+        if (count > 1) {
+            olat__put_be32(p + 8, (uint32_t)count);
+            olat__put_be32(p + 12, 0); /* for ever */
+            p = olat__put_chunk(p, OLAT__ACTL, 8);
+        }
+        for (int i = 0; i < count; i++) {
+            for (int y = 0; y < height; y++, pixels += row)
+                olat__filter_row(pixels, y ? pixels - row : NULL, row, (size_t)channels,
+                                 raw + (size_t)y * (row + 1));
+            if (count > 1) { /* all of the picture, which replaces the one before */
+                memset(p + 8, 0, 26);
+                olat__put_be32(p + 8, sequence++);
+                olat__put_be32(p + 12, (uint32_t)width);
+                olat__put_be32(p + 16, (uint32_t)height);
+                olat__put_be32(p + 28, (uint32_t)delay << 16 | 1000);
+                p = olat__put_chunk(p, OLAT__FCTL, 26);
+            }
+            unsigned char *packed = p + 8;
+            if (i) olat__put_be32(packed, sequence++), packed += 4;
+            memset(table, 0, 65536 * sizeof *table);
+            packed += olat__deflate(raw, raw_size, packed, table);
+            p = olat__put_chunk(p, i ? OLAT__FDAT : OLAT__IDAT, (size_t)(packed - p - 8));
+        }
         p = olat__put_chunk(p, OLAT__IEND, 0);
         failed = olat__write_file(path, file, (size_t)(p - file), error);
     } else failed = olat__fail(error, "%s: out of memory", olat__tail(path));
@@ -860,6 +884,12 @@ OLAT__API int olat_write_png(const char *path, int width, int height, int channe
     free(file);
     free(table);
     return failed;
+}
+
+/* The same of one picture. */
+OLAT__API int olat_write_png(const char *path, int width, int height, int channels,
+                             const unsigned char *pixels, char error[512]) {
+    return olat_write_pngs(path, width, height, channels, pixels, 1, 0, error);
 }
 
 /* ==== OpenEXR: scan lines or tiles; plain, RLE, ZIPS, ZIP, PIZ, PXR24; half and float ==== */

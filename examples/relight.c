@@ -5,6 +5,7 @@
 #include "olat.h"
 #include "flip.h"
 #include "reduce.h"
+#include "sky.h"
 #include <ctype.h>
 
 #define PI 3.14159265358979323846
@@ -20,14 +21,17 @@ enum {
     NETWORKS,
     REDUCE,
     AMBIENT,
+    SKY,
+    ANIMATION,
+    SIZE,
     TRAJECTORY, /* it and those after it take no value */
     COMPONENTS,
     FIT,
     OPTION_COUNT
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "--split",    "--out",    "--background", "--sheet",      "--threads",    "--isa",
-    "--networks", "--reduce", "--ambient",    "--trajectory", "--components", "--fit"};
+    "--split",   "--out", "--background", "--sheet", "--threads",    "--isa",        "--networks", "--reduce",
+    "--ambient", "--sky", "--animation",  "--size",  "--trajectory", "--components", "--fit"};
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
@@ -44,6 +48,10 @@ static const char *const help[] = {
     "  --sheet FILE.png         a contact sheet of up to four views: photograph, rendering, terms,",
     "                           shadow, normal",
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
+    "  --animation FILE.png     the light's first round on that path, as one animated PNG",
+    "  --size PIXELS            width of the path's pictures; that of the photographs",
+    "  --sky MAP                an environment map, OpenEXR or PNG, lights all frames in place of lamps and",
+    "                           room: 16 lights and ambient light; its rows lie round the upward axis",
     "  --ambient FACTOR         of the light from the room that the model's photographs had; 1, 0 leaves",
     "                           it out",
     "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
@@ -72,7 +80,10 @@ static int fail_with(const ssdgs_context *context, ssdgs_result result) {
 
 /* What is written for a view; the first columns of the sheet come first. */
 enum { PHOTO, IMAGE, DIFFUSE, SPECULAR, SCATTERING, SHADOW, NORMAL, DEPTH, ALPHA, OUTPUT_COUNT };
-enum { FIT_STEPS = 200, SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160 };
+enum { FIT_STEPS = 200, SHEET_COLUMNS = DEPTH, SHEET_ROWS = 4, SHEET_CELL = 160, SKY_LIGHTS = 16 };
+/* Pictures of the light's way round on the path; every second one is the animation's, which takes five
+   seconds. */
+enum { ROUND = 150, FILM_STEP = 2, FILM_FRAMES = ROUND / FILM_STEP, FILM_DELAY = 67 };
 static const char *const suffixes[OUTPUT_COUNT] = {
     "_photo", "", "_diffuse", "_specular", "_scattering", "_shadow", "_normal", "_depth", "_alpha"};
 
@@ -87,7 +98,7 @@ typedef struct job {
     const char *given[OPTION_COUNT], *model_path, *dataset, *out;
     ssdgs_context_desc desc;
     ssdgs_real background[3];
-    int reduce; /* Gaussians to be left; 0 = all */
+    int reduce, size; /* Gaussians to be left, width of the path's pictures; 0 = all, the photographs' */
     double ambient;
     ssdgs_context *context;
     ssdgs_model *model;
@@ -98,9 +109,23 @@ typedef struct job {
     ssdgs_real *memory, *image,
         *photo; /* what planes point into; (h,w,3) stored values of the rendering and the photograph */
     int black;  /* pictures so far */
-    unsigned char *bytes, *sheet;                    /* (h,w,3) */
+    unsigned char *bytes, *sheet, *film;             /* (h,w,3), film FILM_FRAMES of them */
     int sheet_rows, cell_width, cell_height, shrink; /* so many pixels each way become one of the sheet */
+    ssdgs_light sky[SKY_LIGHTS];                     /* and the ambient light of the map that --sky names */
+    ssdgs_real sky_ambient[9][3];
 } job;
+
+/* Reads the whole number of an option that is given. */
+static int parse_number(const job *j, int option, long low, long high, int *number) {
+    char *end, problem[80];
+    if (!j->given[option]) return 0;
+    const long value = strtol(j->given[option], &end, 10);
+    *number = (int)value;
+    if (end != j->given[option] && !*end && value >= low && value <= high) return 0;
+    snprintf(problem, sizeof problem, "%s needs a number from %ld to %ld, not", option_names[option], low,
+             high);
+    return usage(problem, j->given[option]);
+}
 
 static int parse(job *j, int argc, char **argv) {
     int isa = 0;
@@ -122,6 +147,13 @@ static int parse(job *j, int argc, char **argv) {
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     if (j->given[TRAJECTORY] && (j->given[SPLIT] || j->given[FIT]))
         return usage("--trajectory has no photographs, so it takes no", j->given[FIT] ? "--fit" : "--split");
+    if (!j->given[TRAJECTORY] && (j->given[ANIMATION] || j->given[SIZE]))
+        return usage("--trajectory is needed for", j->given[SIZE] ? "--size" : "--animation");
+    if (j->given[SKY] && (j->given[FIT] || j->given[AMBIENT] || j->given[ANIMATION]))
+        return usage("--sky is all the light there is, and stands still, so it takes no",
+                     j->given[FIT]       ? "--fit"
+                     : j->given[AMBIENT] ? "--ambient"
+                                         : "--animation");
     const char *value = j->given[SPLIT];
     if (!value) j->given[SPLIT] = "test";
     else if (strcmp(value, "test") && strcmp(value, "train") && strcmp(value, "valid"))
@@ -129,20 +161,9 @@ static int parse(job *j, int argc, char **argv) {
     value = j->given[BACKGROUND];
     if (value && !strcmp(value, "white")) j->background[0] = j->background[1] = j->background[2] = 1;
     else if (value && strcmp(value, "black")) return usage("no such background:", value);
-    value = j->given[THREADS];
-    if (value) {
-        long threads = strtol(value, &end, 10);
-        if (end == value || *end || threads < 0 || threads > 1024)
-            return usage("--threads needs a number from 0 to 1024, not", value);
-        j->desc.threads = (int)threads;
-    }
-    value = j->given[REDUCE];
-    if (value) {
-        const long count = strtol(value, &end, 10);
-        if (end == value || *end || count < 1 || count > 1000000000)
-            return usage("--reduce needs a number from 1 on, not", value);
-        j->reduce = (int)count;
-    }
+    if (parse_number(j, THREADS, 0, 1024, &j->desc.threads) ||
+        parse_number(j, REDUCE, 1, 1000000000, &j->reduce) || parse_number(j, SIZE, 1, 4096, &j->size))
+        return 2;
     value = j->given[AMBIENT];
     j->ambient = value ? strtod(value, &end) : 1;
     if (value && (*end || end == value || !(j->ambient >= 0 && j->ambient <= 1e6)))
@@ -201,10 +222,10 @@ static int check_outputs(job *j) {
     static const char *const splits[3] = {"transforms_train.json", "transforms_test.json",
                                           "transforms_valid.json"};
     char error[512] = "";
-    const char *const models[2] = {j->model_path, j->given[NETWORKS]};
+    const char *const inputs[3] = {j->model_path, j->given[NETWORKS], j->given[SKY]};
     int ok = 1;
     for (int i = 0; i < 3; i++)
-        if ((i < 2 && models[i] && olat_guard_input(&j->guard, models[i], error)) ||
+        if ((inputs[i] && olat_guard_input(&j->guard, inputs[i], error)) ||
             olat_guard_folder(&j->guard, j->dataset, splits[i], error))
             return !fail(error);
     for (int i = 0; i < j->data.count && ok; i++)
@@ -220,8 +241,11 @@ static int check_outputs(job *j) {
         ok = !written[i] || check_output(j, path);
         free(path);
     }
-    if (!ok || !j->given[SHEET]) return ok;
-    return check_output(j, j->given[SHEET]) && (!olat_check_writable(j->given[SHEET], error) || !fail(error));
+    const char *const files[2] = {j->given[SHEET], j->given[ANIMATION]};
+    for (int i = 0; i < 2 && ok; i++)
+        ok = !files[i] ||
+             (check_output(j, files[i]) && (!olat_check_writable(files[i], error) || !fail(error)));
+    return ok;
 }
 
 static void write_numbers(olat__writer *w, const score *s) {
@@ -316,9 +340,16 @@ static int make_trajectory(job *j) {
     olat_dataset *data = &j->data;
     double intensity[3] = {0, 0, 0};
     const ssdgs_model_view model = ssdgs_model_peek(j->model);
-    int count = 2 * (150 + 90);
+    int count = 2 * (ROUND + 90);
     if (data->count < 1) return !fail("the dataset holds no cameras to make the path from");
     ssdgs_camera first = data->frames[0].camera;
+    if (j->size) {
+        const double by = (double)j->size / first.width;
+        first.width = j->size;
+        first.height = (int)ceil(by * first.height);
+        first.fx *= (ssdgs_real)by;
+        first.fy *= (ssdgs_real)by;
+    }
     ssdgs_light light = data->frames[0].light;
     light.focus = 0; /* it shines to all sides on its way */
     double axes[3][3];
@@ -359,8 +390,8 @@ static int make_trajectory(job *j) {
     if (!frames) return !fail("out of memory");
     for (int i = 0; i < count; i++) {
         int half = i / 240, step = i % 240 + 1;
-        double light_turn = step < 150 ? 2.4 * step : 0,
-               camera_turn = (step > 150 ? 2.0 * (step - 150) : 0) + 180 * half;
+        double light_turn = step < ROUND ? 360.0 / (double)ROUND * step : 0,
+               camera_turn = (step > ROUND ? 2.0 * (step - ROUND) : 0) + 180 * half;
         ssdgs_camera *camera = &frames[i].camera;
         orbit_at(&camera_orbit, axes, camera_turn, eye);
         *camera = ssdgs_camera_look_at(eye, centre, up,
@@ -406,7 +437,13 @@ static int make_planes(job *j) {
         j->sheet = (unsigned char *)calloc((size_t)j->cell_width * SHEET_COLUMNS,
                                            (size_t)(j->cell_height * j->sheet_rows) * 3);
     }
-    if (!j->scores[0] || !j->scores[1] || !j->memory || !j->bytes || (j->sheet_rows && !j->sheet))
+    if (j->given[ANIMATION]) {
+        if (most > OLAT__MAX_PIXELS / FILM_FRAMES)
+            return !fail("the pictures are too large for --animation: give a smaller --size");
+        j->film = (unsigned char *)calloc(FILM_FRAMES, 3 * most);
+    }
+    if ((j->given[ANIMATION] && !j->film) || !j->scores[0] || !j->scores[1] || !j->memory || !j->bytes ||
+        (j->sheet_rows && !j->sheet))
         return !fail("out of memory");
     j->image = next;
     j->photo = next += 3 * most;
@@ -431,7 +468,8 @@ static void tell_black(job *j, const olat_frame *frame, const ssdgs_render_stats
                       : !stats->visible ? "no Gaussian is in the picture: is this the model's dataset?"
                       : !stats->shaded  ? "the Gaussians in the picture are too faint or too small to show"
                       : stats->blackened == stats->shaded ? "the Gaussians' colours are not finite"
-                      : !baked && !frame->more_count && !(light[0] > 0) && !(light[1] > 0) && !(light[2] > 0)
+                      : !baked && !j->given[SKY] && !frame->more_count && !(light[0] > 0) &&
+                              !(light[1] > 0) && !(light[2] > 0)
                           ? "the light's intensity is 0"
                           : "no light reaches what the camera sees: is the light where it should be, and its "
                             "intensity in the model's unit?";
@@ -457,8 +495,14 @@ static ssdgs_result render(job *j, int index, int components) {
     ssdgs_render_stats stats;
     ssdgs_light lights[OLAT_MOST_LIGHTS];
     const ssdgs_photo photo = olat_photo(frame);
-    const ssdgs_result result = ssdgs_render_ex(j->model, &photo.camera, lights, olat_lights(&photo, lights),
-                                                &options, &planes, &stats);
+    int count = olat_lights(&photo, lights);
+    if (j->given[SKY]) {
+        memcpy(lights, j->sky, sizeof j->sky);
+        memcpy(options.ambient, j->sky_ambient, sizeof j->sky_ambient);
+        count = SKY_LIGHTS;
+    }
+    const ssdgs_result result =
+        ssdgs_render_ex(j->model, &photo.camera, lights, count, &options, &planes, &stats);
     if (result) return result;
     size_t i;
     for (i = 0; i < 3 * pixels && !(planes.color[i] > (ssdgs_real)1.5e-4); i++) {} /* less is the byte 0 */
@@ -610,6 +654,40 @@ static int load_frames(job *j) {
     return (!path_wanted || make_trajectory(j)) && name_frames(&j->data);
 }
 
+/* The map that --sky names becomes lights. A white thing shows the numbers of a map that is alike all around,
+   whatever unit the model's photographs had. No photograph was taken in this light: none is scored. */
+static int load_sky(job *j) {
+    char error[512] = "";
+    int width, height;
+    ssdgs_pixels format;
+    void *map;
+    olat__found found;
+    memset(&found, 0, sizeof found);
+    if (olat__image_file(j->given[SKY], 0, &width, &height, &format, &map, &found, error))
+        return !fail(error);
+    double axes[3][3];
+    ssdgs_real to_world[9];
+    find_axes(&j->data, axes);
+    for (int k = 0; k < 9; k++) to_world[k] = (ssdgs_real)axes[k % 3][k / 3];
+    const size_t count = 3 * (size_t)width * (size_t)height;
+    ssdgs_real *pixels = (ssdgs_real *)malloc(count * sizeof *pixels);
+    for (size_t i = 0; pixels && i < count; i++) {
+        const ssdgs_real value = olat__number(map, format, 4 * (i / 3) + i % 3);
+        pixels[i] = olat__is_light(format) ? value : ssdgs_srgb_decode(value);
+    }
+    const char *wrong = pixels
+                            ? sky_lights(pixels, width, height, to_world, j->sky, SKY_LIGHTS, j->sky_ambient)
+                            : "out of memory";
+    free(pixels);
+    free(map);
+    if (wrong) return !fail(wrong);
+    const ssdgs_real unit = 1 / ssdgs_model_settings(j->model)->light_scale;
+    for (int k = 0; k < 3 * SKY_LIGHTS; k++) j->sky[k / 3].intensity[k % 3] *= unit;
+    for (int k = 0; k < 27; k++) j->sky_ambient[k / 3][k % 3] *= unit;
+    for (int i = 0; i < j->data.count; i++) j->data.frames[i].has_image = 0;
+    return 1;
+}
+
 static int save_model(job *j, const char *name) {
     char *path = output_path(j, NULL, name);
     if (!path) return 0;
@@ -636,7 +714,7 @@ static int relight(job *j) {
         if (result) return fail(ssdgs_error_message(j->context));
         fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", j->given[NETWORKS]);
     }
-    if (!load_frames(j)) return 1;
+    if (!load_frames(j) || (j->given[SKY] && !load_sky(j))) return 1;
     if (olat_make_folder(j->out, error))
         return fail(error); /* so that paths can be told apart by what they are */
     if (!check_outputs(j) || !make_planes(j)) return 1;
@@ -659,6 +737,10 @@ static int relight(job *j) {
             show(j, frame, output);
             if (written && !write_image(j, frame, suffixes[output])) return 1;
             if (pasted) paste(j, frame, row, output);
+            if (output == IMAGE && j->film && i < ROUND && i % FILM_STEP == 0) {
+                const size_t size = 3 * (size_t)frame->camera.width * (size_t)frame->camera.height;
+                memcpy(j->film + (size_t)(i / FILM_STEP) * size, j->bytes, size);
+            }
         }
         row += on_sheet;
         if (!frame->has_image) continue;
@@ -673,6 +755,9 @@ static int relight(job *j) {
     }
     if (j->sheet && olat_write_png(j->given[SHEET], SHEET_COLUMNS * j->cell_width,
                                    j->sheet_rows * j->cell_height, 3, j->sheet, error))
+        return fail(error);
+    if (j->film && olat_write_pngs(j->given[ANIMATION], j->data.frames->camera.width,
+                                   j->data.frames->camera.height, 3, j->film, FILM_FRAMES, FILM_DELAY, error))
         return fail(error);
     for (int k = 0; k < (j->given[FIT] ? 2 : 1) && scored; k++) {
         means[k].is.psnr /= scored;
@@ -708,5 +793,6 @@ int main(int argc, char **argv) {
     free(j.memory);
     free(j.bytes);
     free(j.sheet);
+    free(j.film);
     return status;
 }

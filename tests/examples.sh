@@ -96,6 +96,15 @@ check "--ambient" says 2 "--ambient needs a number" relight --out "$out/reduced"
 check "--ambient --fit" says 2 "takes the room's light as it is" relight --out "$out/reduced" --ambient 0 --fit
 check "--reduce 0" says 2 "--reduce needs a number" relight --out "$out/reduced" --reduce 0
 
+# a light that goes round in one file, a sky; neither changes what lies beside
+check "--animation" says 0 "480 images" relight --out "$out/path" --trajectory --size 40 --animation "$out/path/turning.png"
+check "is larger than its pictures" test "$(wc -c <"$out/path/turning.png")" -gt "$(($(wc -c <"$out/path/0000.png") * 20))"
+cp "$out/sheet.png" "$out/lit.png"
+check "--sky" says 0 "4 images" relight --out "$out/lit" --sky "$out/lit.png"
+check "another picture, too" differs "$out/lit/r_000.png" "$out/relit/r_000.png"
+check "without scores" test ! -e "$out/lit/metrics.json"
+check "over the map" says 1 "would replace an input" relight --out "$out/lit" --sky "$out/lit.png" --sheet "$out/lit.png"
+
 # several photographs a step: how far it is, and checkpoints
 check "--set batch=3" says 0 "iterations left" "$build/train" "$set" -o "$out/batch.ply" --iterations 180 --points 200 --threads 1 --set batch=3 --checkpoint-every 100
 check "a checkpoint after the hundredth" grep -q SSDGSCK "$out/batch.ply.ckpt"
@@ -129,6 +138,16 @@ cp "$out/names.kept" "$set/transforms_test.json"
 rm -f "$set/test/r_000_depth_depth.png"
 check "--trajectory --fit" says 2 "--trajectory has no photographs" relight --out "$out/names2" --trajectory --fit
 check "--trajectory --split" says 2 "--trajectory has no photographs" relight --out "$out/names2" --trajectory --split test
+check "--animation alone" says 2 "--trajectory is needed for --animation" relight --out "$out/names2" --animation "$out/a.png"
+check "--size alone" says 2 "--trajectory is needed for --size" relight --out "$out/names2" --size 32
+check "--size 0" says 2 "--size needs a number from 1 to 4096" relight --out "$out/names2" --trajectory --size 0
+check "--sky --fit" says 2 "so it takes no --fit" relight --out "$out/names2" --sky "$out/sheet.png" --fit
+check "--sky --ambient" says 2 "so it takes no --ambient" relight --out "$out/names2" --sky "$out/sheet.png" --ambient 1
+check "--sky of no picture" says 1 "model.ply: byte 0" relight --out "$out/names2" --sky "$model"
+check "--sky of nothing" says 1 "none.png: cannot be opened" relight --out "$out/names2" --sky "$out/none.png"
+check "an animation that cannot be written" says 1 "cannot be written" relight --out "$out/unmoved" --trajectory --animation "$out/no/such/a.png"
+check "an animation over an input" says 1 "would replace an input" relight --out "$out/unmoved" --trajectory --animation "$set/train/r_000.png"
+check "is told before a picture is made" test ! -e "$out/unmoved/0000.png"
 check "a sheet that cannot be written" says 1 "cannot be written" relight --out "$out/unsheeted" --sheet "$out/no/such/sheet.png"
 check "is told before a picture is made" test ! -e "$out/unsheeted/r_000.png"
 cp "$out/kept.json" "$set/transforms_test.json"

@@ -530,6 +530,58 @@ static void test_writer(void) {
     CHECK(file_bytes(FOLDER "/x.png") < 0 && live == 0);
 }
 
+/* Chunk by chunk what the standard says of an animated PNG. Each frame, alone in a file, is its picture, the
+   first one to all readers. */
+static void test_animation(void) {
+    enum { WIDE = 17, HIGH = 9, FRAMES = 4, SIZE = WIDE * HIGH * 3 };
+    static const char *const order[2 * FRAMES + 3] = {"IHDR", "acTL", "fcTL", "IDAT", "fcTL", "fdAT",
+                                                      "fcTL", "fdAT", "fcTL", "fdAT", "IEND"};
+    static unsigned char pixels[FRAMES][SIZE], bytes[1 << 14];
+    for (int i = 0; i < FRAMES * SIZE; i++) pixels[i / SIZE][i % SIZE] = (unsigned char)(i % (90 + i / SIZE));
+    CHECK(!olat_write_pngs(FOLDER "/moves.png", WIDE, HIGH, 3, pixels[0], FRAMES, 67, error));
+    FILE *stream = fopen(FOLDER "/moves.png", "rb");
+    const size_t size = stream ? fread(bytes, 1, sizeof bytes, stream) : 0;
+    if (stream) fclose(stream);
+    size_t at = 8;
+    uint32_t sequence = 0;
+    for (int i = 0, frame = 0; i < 2 * FRAMES + 3; i++) {
+        unsigned char *chunk = bytes + at, *data = chunk + 8;
+        const size_t length = olat__be32(chunk);
+        if (!CHECK(at + 12 <= size && length <= size - at - 12 && !memcmp(chunk + 4, order[i], 4))) return;
+        CHECK(olat__be32(data + length) == olat__crc32(chunk + 4, length + 4));
+        if (i == 1) CHECK(length == 8 && olat__be32(data) == FRAMES && olat__be32(data + 4) == 0);
+        if (chunk[4] == 'f') CHECK(olat__be32(data) == sequence++);
+        if (chunk[4] == 'f' && chunk[5] == 'c') {
+            static const unsigned char whole[22] = {0, 0, 0, WIDE, 0, 0, 0,  HIGH,      0,          0, 0,
+                                                    0, 0, 0, 0,    0, 0, 67, 1000 >> 8, 1000 & 255, 0, 0};
+            CHECK(length == 26 && !memcmp(data + 4, whole, sizeof whole));
+        }
+        if (!memcmp(chunk + 5, "DAT", 3)) {
+            const size_t head = frame ? 4 : 0;
+            int width = 0, height = 0, wrong = 0;
+            ssdgs_pixels format;
+            void *got = NULL;
+            put_header(WIDE, HIGH, 8, 2, 0);
+            put_chunk("IDAT", data + head, length - head);
+            put_chunk("IEND", NULL, 0);
+            const int failed =
+                frame ? olat_decode_png(file, file_size, &width, &height, &format, &got, error)
+                      : olat_read_png(FOLDER "/moves.png", &width, &height, &format, &got, error);
+            for (int k = 0; k < SIZE && !failed; k++)
+                wrong += ((unsigned char *)got)[k / 3 * 4 + k % 3] != pixels[frame][k];
+            CHECK(!failed && width == WIDE && height == HIGH && !wrong);
+            meter_free(got);
+            frame++;
+        }
+        at += 12 + length;
+    }
+    CHECK(at == size);
+    CHECK(olat_write_pngs(FOLDER "/x.png", 1, 1, 3, pixels[0], 0, 67, error) &&
+          olat_write_pngs(FOLDER "/x.png", 1, 1, 3, pixels[0], 2, 65536, error) &&
+          olat_write_pngs(FOLDER "/x.png", 1 << 13, 1 << 13, 3, pixels[0], 5, 67, error));
+    CHECK(file_bytes(FOLDER "/x.png") < 0 && live == 0);
+}
+
 /* ---- JSON ---- */
 
 static olat__json json;
@@ -3694,6 +3746,7 @@ int main(void) {
     TEST_ROW("75", "streams that deflate forbids", test_streams());
     TEST_ROW("72,73", "PNG's chunks, sizes and ends", (test_chunks(), test_splits()));
     test_writer();
+    test_animation();
     TEST_ROW("76", "JSON good and bad", (test_json(), test_strings(), test_write_string()));
     TEST_ROW("77", "numbers, correctly rounded", test_numbers());
     TEST_ROW("78,79", "datasets and paths, good and bad", (test_datasets(), test_lenses(), test_rounding()));

@@ -161,12 +161,51 @@ static void encode(const ssdgs_real *values, double scale, unsigned char *bytes)
         bytes[i] = byte_of((double)ssdgs_srgb_encode((ssdgs_real)(scale * (double)values[i])));
 }
 
+/* Views of the dataset lit by a map alone: its sixteen lights and ambient light, a white thing as bright as
+ * the map. */
+static void check_sky(ssdgs_model *model, const olat_dataset *data) {
+    enum { ACROSS = 16, DOWN = 8 };
+    unsigned char map[3 * ACROSS * DOWN];
+    ssdgs_real linear[3 * ACROSS * DOWN], *planes = (ssdgs_real *)malloc(sizeof *planes * N * 7);
+    static unsigned char want[3 * N];
+    static char said[7][40] = {"relight", FOLDER "/model.ply", FOLDER "/set", "--out", FOLDER "/lit",
+                               "--sky",   FOLDER "/map.png"};
+    char *arguments[7], error[512] = "", name[64];
+    for (int i = 0; i < 7; i++) arguments[i] = said[i];
+    for (int i = 0; i < 3 * ACROSS * DOWN; i++) {
+        map[i] = (unsigned char)(i % 48 == 7 ? 255 : 40 + i % 90);
+        linear[i] = ssdgs_srgb_decode((ssdgs_real)(map[i] / 255.0));
+    }
+    CHECK(!olat_write_png(FOLDER "/map.png", ACROSS, DOWN, 3, map, error) && !relight_main(7, arguments));
+    ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_light lights[16];
+    CHECK(!sky_lights(linear, ACROSS, DOWN, NULL, lights, 16, options.ambient));
+    const ssdgs_real unit = 1 / ssdgs_model_settings(model)->light_scale, black[3] = {0, 0, 0};
+    for (int i = 0; i < 48; i++) lights[i / 3].intensity[i % 3] *= unit;
+    for (int i = 0; i < 27; i++) options.ambient[i / 3][i % 3] *= unit;
+    for (int v = 0; v < VIEWS && planes; v++) {
+        ssdgs_image image;
+        memset(&image, 0, sizeof image);
+        image.color = planes;
+        image.alpha = planes + 3 * N;
+        CHECK(!ssdgs_render_ex(model, &data->frames[v].camera, lights, 16, &options, &image, NULL));
+        ssdgs_compose(image.color, image.alpha, N, SSDGS_TRANSFER_SRGB, black, planes + 4 * N);
+        for (int i = 0; i < 3 * N; i++) want[i] = byte_of((double)planes[4 * N + i]);
+        snprintf(name, sizeof name, "lit/%d.png", v);
+        check_picture(name, want);
+    }
+    FILE *file = fopen(FOLDER "/lit/metrics.json", "r"); /* no photograph is of this light */
+    if (!CHECK(!file)) fclose(file);
+    free(planes);
+}
+
 /* A model and a dataset on disk, relit on white with everything; then what the files hold. */
 static void test_pictures(void) {
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     ssdgs_settings settings = ssdgs_settings_default();
     for (int k = 0; k < 3; k++) settings.ambient[k] = (ssdgs_real)(0.1 + 0.05 * k);
+    settings.light_scale = (ssdgs_real)1.25;
     CHECK(!ssdgs_context_create(NULL, &context) && !ssdgs_model_create(context, &settings, 200, &model));
     ssdgs_model_view m = ssdgs_model_arrays(model);
     for (int i = 0; i < 200; i++) {
@@ -286,6 +325,7 @@ static void test_pictures(void) {
     double told = 0;
     CHECK(file && fscanf(file, " { \"mean\" : {\"psnr\": %lf", &told) == 1 && fabs(told - psnr) < 1e-3);
     if (file) fclose(file);
+    check_sky(model, &data);
     free(sheet);
     free(planes);
     olat_free(&data);
