@@ -1,4 +1,4 @@
-/* ssdgs.h - v0.2.5 - relightable Gaussian splatting in C - MIT, see the end
+/* ssdgs.h - v0.3.0 - relightable Gaussian splatting in C - MIT, see the end
 
 Trains 3D Gaussians on photographs that each show an object under known light. Renders them from new views
 under new lights, with shadows, anisotropic highlights and subsurface scattering. The method is that of
@@ -64,104 +64,83 @@ WHAT IT COMPUTES
   S      light that arrives (eqs. 6, 7), refined by the shadow network (eq. 8)
   f_sss  a dipole (eq. 5) of the optical parameters that the scattering network predicts (eq. 4)
   ssdgs_settings_published() is the paper's model. ssdgs_settings_default() differs in what measured as
-  better: it shades in linear light, highlights and shadows' edges are found per pixel from what Gaussians
-  blend to (deferred), and the scattering network is smaller and also sees what true dipole transport
-  brings.
+  better. It shades in linear light. Highlights and shadow edges are computed per pixel, from blended
+Gaussians
+  ("deferred"). The scattering network is smaller and has five more inputs: the light that a true dipole
+  brings from elsewhere on the object.
 
 CONVENTIONS
-  camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens
-          distortion.
+  camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens distortion.
   world   right-handed (scenes: either), any unit, the same for cameras, lights and Gaussians. Floats hold
           seven digits: if a scene lies 1,000 times its size from 0, subtract a nearby point from all
           positions and set settings.origin to it.
-  light   cone, range and focus lessen a point's E; directional and ambient light's is light_scale x
-          intensity.
-          Intensities have the unit of the photographs': training sets light_scale such that E is 1 at the
-          centre of the bounds, in the geometric mean.
-  colour  renders are linear light, never encoded or clamped, and multiplied by alpha ("premultiplied");
+  light   a spot's cone, a range and a focus reduce E. For directional and ambient light E is light_scale x
+          intensity. Give intensities in the unit used for the photographs: training sets light_scale so that
+          the geometric mean of E at the centre of the bounds is 1.
+  colour  renders are linear light, never encoded or clamped, multiplied by alpha ("premultiplied").
           ssdgs_to_pixels(), ssdgs_blend_pixels() and ssdgs_to_bytes() encode them. Photographs,
-          options.background and ssdgs_evaluate() deal in stored values, which settings.transfer relates to
-          linear ones. A photograph's alpha blends stored values, as ssdgs_compose() does.
+          options.background and ssdgs_evaluate() use stored values; settings.transfer relates these to linear
+          ones. A photograph's alpha blends stored values, as ssdgs_compose() does.
   images  row-major, top row first, up to 32768 px a side.
 
-MEMORY
-  All comes from desc.allocator, on the thread that called the library; what libc needs itself is not in it.
-  Buffers only grow: the same frame again allocates nothing, another only what it has more of than any
-  before: pixels, lights, Gaussians, tiles that they meet. What a frame keeps for the next belongs to its
-  model or scene, the rest to the context. Pixels, planes and paths stay the caller's. Contexts, models,
-  scenes and trainers may be destroyed in any order.
-
-THREADS
+MEMORY, THREADS, DETERMINISM
+  Memory comes from desc.allocator, on the thread that called the library; libc's own is not in it.
+  A frame allocates only where it is larger than every earlier one: in pixels, lights, Gaussians or tile
+  entries. Pixels, planes and paths stay the caller's. Objects may be destroyed in any order.
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
   allocator, log, tracer and progress run on the caller's thread, an occluder on any. A call made while
-  another is at work on the context, from a hook or another thread, returns ERR_ARGUMENT; progress may call
-  all but the trainer's destruction. After fork() the child may use its copies, without threads, unless a
-  call was at work on them. A call or a task needs up to 96 KiB of stack, unoptimised 150.
-
-DETERMINISM
-  The same calls give the same bits for any number of threads, and of processes that share the batches of
-  training (options.sum has the rule). AVX2, AVX-512 and NEON give the same bits, and so do SSE2, SIMD128 of
-  WebAssembly and scalar code; the two groups differ, as FMA rounds once. Builds agree as far as their libm
-  does; not so clang's with -ffast-math or -ffp-contract=fast, nor x87. The pool's threads keep the rounding
-  mode in which their context was made: where the host changes its own, bits depend on the threads.
+  another is at work on the context returns ERR_ARGUMENT; progress may call all but the trainer's destruction.
+  After fork() the child can use its copies on one thread, unless a call was running at the fork. A call or a
+  task needs up to 96 KiB of stack, unoptimised 150.
+  The same calls give the same bits for any number of threads, and of processes that share training's batches
+  (options.sum). AVX2, AVX-512 and NEON give the same bits; so do SSE2, WebAssembly and scalar code; the two
+  groups differ, as FMA rounds once. Builds agree as far as their libm does, but not with clang's -ffast-math
+  or -ffp-contract=fast, nor on x87. Threads keep the rounding mode in which their context was made.
 
 ERRORS
-  Calls return SSDGS_OK, which is 0, or a code; ssdgs_error_message() names the file, byte, argument or
-  parameter. Where making or loading something fails, *out becomes NULL. Nothing exits or prints. What is
-  used of cameras, lights, networks and ASG must be finite. Gaussians that are not finite are not drawn, or
-  black; infinite sizes and opacities are clamped. A training step with a gradient that is not finite changes
-  nothing; ssdgs_trainer_run() ends after ten in a row.
+  Calls return SSDGS_OK, which is 0, or a code. ssdgs_error_message() names the file, byte, argument or
+  parameter. Where making or loading something fails, *out becomes NULL. Nothing exits or prints.
+  All values that a call reads of cameras, lights, networks and ASG must be finite. Gaussians that are not are
+  not drawn, or black; infinite sizes and opacities are clamped. A training step whose gradient is not finite
+  changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
-  A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters
-  added, then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. PlayCanvas' tools, three,
-  Babylon, Spark, GaussianSplats3D and loaders.gl read it; gsplat and spz-js take nothing behind the
-  vertices: examples/export.c writes files for them. x y z are relative to settings.origin. Reading takes
-  ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
-  (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties. A plain
-  splat file loads as baked colours: drawn as they are, not trained. Editors of splats drop what lies behind
-  the vertices, and move these: ssdgs_model_adopt() mends that. Checkpoints have native byte order and are
-  refused by other versions, precisions, options, settings or photographs; the message names the first that
-  differs. Files are written under another name and renamed when complete: a link is replaced, not followed.
-  A process that is killed may leave a file PATH.tmp.*
-
-OUTLINES
-  Photographs should be transparent where the object is not. One shows an outline where more than a hundredth
-  of its pixels, but not all, are wholly transparent; of eight outlines or more those that contradict the
-  others are left out. With too few outlines borders decide: if they have options.background's colour, that
-  colour is empty and Gaussians of it fade; else all is opaque. A note says which.
+  A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters added,
+  then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. x y z are relative to settings.origin.
+  PlayCanvas' tools, three, Babylon, Spark, GaussianSplats3D and loaders.gl read it; examples/export.c writes
+  files for gsplat and spz-js, which take nothing behind the vertices. Models of older versions load. A plain
+  splat file loads as baked colours: drawn as they are, not trained.
+  Reading takes ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
+  (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties.
+  Editors of splats drop what lies behind the vertices, and move these: ssdgs_model_adopt() mends that.
+  Checkpoints have native byte order, and fit one version, precision, set of options and photographs.
+  Files are written under another name and renamed when complete: a link is replaced, not followed. A process
+  that is killed may leave a file PATH.tmp.*
 
 SCENES, as engines have them: examples/engine.c is one
-  ssdgs_scene_render() draws models placed in the world, ssdgs_object, in one frame: sorted and blended
-  together, shadowing each other. What the networks predict and what true dipole transport brings stays
-  within an object and its own space. Pixels light objects of other lobes one by one, so that none blends
-  with what is behind it before it is lit. A frame:
+  ssdgs_scene_render() draws placed models, ssdgs_object, in one frame: sorted and blended together, shadowing
+  each other. Scattered light stays within an object. A frame:
       ssdgs_camera_from_matrices()   the engine's view and projection
       ssdgs_scene_light()            the lights' maps
       draw the meshes, with shadows of splats by ssdgs_scene_shadow()
       ssdgs_scene_render()           with the meshes' depth as image.scene_depth, their shadows on splats
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
-  A light's map covers what it reaches, by default with up to 1024 pixels a side. So give lights a range:
-  they cost what they reach, and keep their maps while nothing there moves. A directional light's map covers
-  all objects of the array: leave out what is far away. What is nearer to a surface than the largest object's
-  light_map.bias casts no shadow on it: leave giants out. All maps are made anew when the number of lights or
-  objects, a model, options.stop, alpha_threshold or light_detail changes. When a light goes dark those of the
-  lights behind it in the array are: let lights that flicker be last. Lights without shadow have no map.
-  Lights and ambient light are multiplied by each model's own settings.light_scale. Where models differ in
-  it, tints make up for it.
-  options.ambient is light from all around; examples/sky.h makes lights of an environment map.
-  An object says how rough, bright and translucent its model is here. In models made in code
-  settings.medium scatters light, and ssdgs_gaussian_mirror() makes metal and gloss: a ball of
-  wax has 28 dB beside path tracing, 22 lit from the side; balls of metal of roughness 0.15, 0.3 and 0.6
-  have 37, 30 and 17 beside microfacets.
+  A light's map covers what it reaches, with up to 1024 pixels a side by default. So give lights a range: they
+  cost what they reach, and keep their maps while nothing there moves. A directional light's map covers all
+  objects of the array: leave out what is far away.
+  All objects share the largest one's shadow bias: a very large model removes contact shadows of small ones.
+  All maps are made again when the number of lights or objects, a model, options.stop, alpha_threshold or
+  light_detail changes. When a light's intensity becomes 0, the maps of all later lights are made again: put
+  flickering lights last.
+  If models have different settings.light_scale, set object.tint to compensate.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with the
-  number of Gaussians: examples/reduce.h makes levels of detail, for what is far away or must be quick.
-  Left out without changing a bit: what no pixel blends, neurons that are 0 for 64 neighbours, terms nobody
-  asked for, and what the last frame found.
+number of Gaussians: examples/reduce.h makes levels of detail. Skipped without changing any bit: Gaussians
+that no pixel blends, neurons that are 0 in a whole block of 64 Gaussians, terms not asked for, results of the
+last frame that still hold.
 
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
@@ -171,30 +150,21 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_TRAINER *    rendering only: half of the code and of the time to compile
   SSDGS_NO_STDIO *      no functions with a path
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
-  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD; SSDGS_SCALAR  fewer kernels; scalar ones beside them
+  SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD  leave these kernels out; SSDGS_SCALAR adds the scalar ones
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
-ssdgs.h DOES NOT
-  find cameras or lights (it corrects small errors: options.refine), read datasets or images
-  (examples/olat.h does), trace light between objects, undistort lenses, contain GPU kernels
-  (examples/gpu_gl.c does), compress models, or evaluate spherical harmonics beyond degree 0.
+BESIDE IT, in examples/, headers on this interface
+  judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps, olat.h
+  reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3.
+  Nothing finds cameras or lights (options.refine corrects small errors), traces light between objects,
+  undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
 
-CHANGES
-  0.2.5  Directional lights shine along `direction`, as spots do: set it to -position. Opacity fades near
-         near_plane and beside wide pictures, where Gaussians popped, in PROJECT of GPU stages too. Models
-         that went through an editor come back (ssdgs_model_adopt(), settings.placement); positions in files
-         are relative to settings.origin. What differs from a checkpoint's run is named, changed photographs
-         too.
-  0.2.4  Needles, thousands of pixels long, are drawn and trained as exactly as other Gaussians. For GPU
-         stages: a record holds ux, uy, wy, no longer xx, xy, yy; gradients are summed in their terms.
-  0.2.3  Gaussians far from the world's origin train on every CPU; narrow spots stay within their cones; dark
-         lights cost nothing; scene_depth of 0 or NaN hides nothing. Files of 2^28 Gaussians; broken rows are
-         named. ssdgs_model_count(). A forked child is kept from half-made state.
-  0.2.2  The scattering network is 128 wide, not 64: metal and plastic train better. The trainer's options
-         densify_shadow and prune_weight are gone; they had come to be worth nothing. What a spot, range or
-         focus misses no longer darkens what it blends with; ambient highlights are as bright as lamps'.
-  Models of older versions load, their checkpoints do not.
+CHANGES, for programs written for 0.2.5
+  ssdgs_model_reduce(model, n)   reduce_model(context, &model, n) of examples/reduce.h: another model
+  ssdgs_environment(context, ..) sky_lights(..) of examples/sky.h, which returns what is wrong
+  notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
+  {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
@@ -204,7 +174,12 @@ CONTENTS, search for the tag
   >>scene >>loss >>ply               placed models; loss and metrics; model files
   >>trainer >>density                one photograph and Adam; clone, split, prune
   >>steps >>checkpoint               the trainer's public functions; a run's whole state
-  >>kernels >>vmath >>*_kernel       vector macros, elementary functions, the kernels */
+  >>kernels >>vmath >>*_kernel       vector macros, elementary functions, the kernels
+  eq. 1  project, composite_layers    eq. 3  colour; deferred: highlight    eq. 4  network_forward
+  eq. 5  dipole                       eq. 6, 7  walk_light                  eq. 8  shadow_factor
+  eq. 9  reflect; highlight           eq. 10  half_vector                   eq. 12  asg; deferred: glow
+  eq. 14  colour                      loss  ssim_row                        Adam  adam_lanes
+  each X with X_backward behind it */
 
 /* ==== the interface ==== */
 
@@ -215,7 +190,7 @@ CONTENTS, search for the tag
 #include <stddef.h>
 #include <stdint.h>
 
-#define SSDGS_VERSION 205 /* 0.2.5; written into files */
+#define SSDGS_VERSION 300 /* 0.3.0; written into files */
 
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
@@ -383,7 +358,8 @@ typedef struct ssdgs_settings {
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
     } medium; /* of models made in code, where scattering.layers is 0 and transport 1: light travels in it by
-                 true transport, without a network. Lengths are told apart from 0.04 to 0.64 length_unit */
+                 true transport, without a network. Lengths are told apart from 0.04 to 0.64 length_unit. A
+                 ball of wax has 28 dB beside path tracing, 22 lit from the side */
 } ssdgs_settings;
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void);
@@ -423,6 +399,7 @@ SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void); /* grey, opacity 0.1, 0.0
 /* Gives a Gaussian, of a model made in code, the highlight of a mirror of microfacets: roughness, along its
    first and second axis, is Beckmann's alpha. Sets sharpness and specular, and gives the model the one lobe
    that this needs, for all its Gaussians. For metals let f0 be 0.9 and multiply specular by their colour.
+   Balls of metal of roughness 0.15, 0.3 and 0.6 have 37, 30 and 17 dB beside microfacets.
    ERR_ARGUMENT: highlights are not deferred, or a roughness is not 0.01 .. 1. */
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                              ssdgs_gaussian *gaussian);
@@ -752,9 +729,14 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
-    ssdgs_real prune_outside;    /* share of photographs that must show background at its centre before one is
-                                     removed, as is one that none shows, see OUTLINES in the manual; 0.02 */
-    ssdgs_real adam_epsilon;     /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
+    /* A Gaussian is removed if more than this share of the photographs that see its centre show background
+       there, or if none sees it; 0.02. Photographs should be transparent where the object is not. One has an
+       outline if more than 1 % of its pixels, but not all, have alpha 0. Of eight outlines or more those that
+       contradict the rest are ignored. With too few the pictures' borders decide: if most border pixels have
+       `background`'s colour, that colour means empty, and Gaussians of it fade. Otherwise every pixel shows
+       the object. The log says which. */
+    ssdgs_real prune_outside;
+    ssdgs_real adam_epsilon; /* Adam's, as a share of a one-byte error's gradient; 0.1; 0 = 1e-15 */
     ssdgs_real finish; /* factor of the model's rates in the last tenth of the iterations; 0.3; 1 = none */
     ssdgs_rates rates;
     ssdgs_sum sum; /* none */
@@ -867,7 +849,7 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
 /* ==== stages of a frame, seen with SSDGS_STAGES: for GPUs and engines that run some of their own ====
 
    ssdgs_context_desc.gpu replaces stages; NULL leaves one to the CPU. A stage reads and writes the
-   ssdgs_frame as its members say. examples/gpu_gl.c replaces all that a rendering takes.
+   ssdgs_frame as its members say. examples/gpu replaces all that a rendering takes.
 
    What a stage writes in ssdgs_splat_view has no memory before it: a hook points the members at its own. All
    else has memory. A hook need not write there what it keeps on a device: before the CPU reads what hooks may
@@ -887,58 +869,7 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    tile_list and tile_seen. In training SHADE and SHADE_BACKWARD are replaced together or not at all: the CPU
    keeps activations in between.
 
-   What the CPU's stages agree on, as stages beside them must:
-
-   PROJECT  Raw scales and opacities are clamped to +-20. A Gaussian is drawn where its opacity reaches
-   options.alpha_threshold, it lies between near_plane and 1e30, its covariance's determinant between 0 and
-   1e37, and its box reaches a pixel's centre. What is not finite is not drawn. In perspective its opacity is
-   first multiplied by min(1, z / near_plane - 1) (1 - d (1 - b^2)). d is (variance along z / z^2 - 0.02) /
-   0.04, clamped to 0 .. 1. b is the product, for x and y, of (1 + e^2) / (1 + s^2): s is x / z, and e is s
-   clamped to the picture's borders, or to -1 .. 1 where these are narrower.
-
-   SORT  By the depth's bits as whole numbers, ties by index.
-
-   BIN  Tile t is column t % tiles_x of row t / tiles_x. Bit b of a mask is the 4x4 pixels of column b % 4,
-   row b / 4 of the tile. A mask may have bits too many, never too few. A Gaussian's instances are in the
-   order of tiles.
-
-   WALK, COMPOSITE  u = ux dx + uy dy, w = wy dy, p = log2_opacity - u^2 - w^2; alpha = 2^p, at most 0.999,
-   and 0 where p < log2 alpha_threshold. A pixel's transmittance T becomes T - alpha T from entry to entry.
-   Below options.stop nothing more is blended; with scene_depth only what is nearer.
-
-   WALK of the camera  A pixel passes over weights alpha T up to max_error / 32 while all that it passes over
-   sum to no more than max_error. What a pixel blends otherwise is SSDGS_SEEN, the rest SSDGS_SKIPPED.
-
-   WALK of a light  v is the mean of T, weighted by 2^p where that reaches alpha_threshold, over a Gaussian's
-   pixels in all views of the light; T has everything nearer than its own depth - bias[0]. depth_cue is the
-   same mean of the sum of alpha T x (its depth - theirs) over those. Without weights v is 1, depth_cue 0.
-   flux sums solid angle x alpha T, where T has all that is ahead in the list. What lies behind 4x4 pixels
-   that are all darker than options.stop may be left out.
-
-   Light maps  The distance of a place from the light, less bias[1], a millionth of itself, and `nearest`,
-   asks four pixels, whose answers have bilinear weights. One pixel's answer is 1 ahead of its first fall and
-   `behind` after its last. Between two it is what the first one left up to bias[1] ahead of the second, and
-   from there goes in a straight line to what there was before the second. In training COMPOSITE_BACKWARD
-   reads the maps, too: a pixel's dL/dv goes to its depth and to the camera. The maps are held fixed.
-
-   SHADE  In E 1 / distance^2 is at most 1e6 / length_unit^2. The shadow network sees position (3 octaves), wi
-   (3), v and the material; the scattering network position (4), wo and wi (settings.octaves), normal,
-   material and then, if settings ask for them, depth_cue (4) and what true transport brings in each length,
-   over 1 / distance^2. x of n octaves is x, sin 2^i x of all coordinates and i, cos 2^i x alike; positions
-   are relative to settings.centre: the shadow network's in length_units with residual_shadow, the scattering
-   network's with depth_cue or transport. Cues always are. Layers are out x in weights, then biases, with
-   max(0, x) but behind the last. S is sigmoid(answer), with residual_shadow sigmoid(answer + logit v), v
-   within 0.01 .. 0.99. Of sigmoids u the optics are sigma_s, sigma_a = 2 u + 0.05 and r = 3 u + 0.1. A light
-   out of whose reach are all 64 neighbours of a block leaves it out: there S is 1.
-
-   What SSDGS_SKIPPED Gaussians show is the colour and the layers of the one of their object that was shaded
-   before them or, without one, after. A Gaussian whose colour is not finite is black.
-
-   True transport brings from each Gaussian's flux e^(-d / l) / (2 pi l d), d^2 = distance^2 + s^2, with
-   s = 0.02 and l = 0.04 to 0.64 length units, each twice the last. Under lights without shadow it is max(0,
-   n.wi) e^(-s / l).
-
-   Highlights  >>highlight_kernel has the formula, in which exponents of lobes' widths are within +-12. */
+   What the CPU's stages agree on, and stages beside them must, is in examples/gpu/STAGES.md. */
 
 typedef enum ssdgs_stage {
     SSDGS_STAGE_PROJECT = 0, /* Gaussians -> records and depths of every view */
@@ -1178,7 +1109,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS_SELF "ssdgs.h" /* how this file includes itself: keep its name, or define this */
 #endif
 
-/* Rounding must not depend on the user's flags: fuse multiplications and additions only where VFMA says
+/* Rounding must not depend on the user's flags: fuse multiplications and additions only where V_FMA says
    so. */
 #if defined(__clang__)
 #if __clang_major__ >= 12
@@ -1684,41 +1615,15 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* ---- the tables ---- */
 
-/* The kernels have short names for vectors. An includer's macros of these names are put away until the tables
-   are made. */
+/* The kernels' shortest names; an includer's macros of these are put away until the tables are made. */
 #pragma push_macro("R")
 #pragma push_macro("V")
 #pragma push_macro("VM")
-#pragma push_macro("VLOAD")
-#pragma push_macro("VSTORE")
-#pragma push_macro("VSET")
-#pragma push_macro("VADD")
-#pragma push_macro("VSUB")
-#pragma push_macro("VMUL")
-#pragma push_macro("VDIV")
-#pragma push_macro("VFMA")
-#pragma push_macro("VFNMA")
-#pragma push_macro("VMIN")
-#pragma push_macro("VMAX")
-#pragma push_macro("VSQRT")
-#pragma push_macro("VLT")
-#pragma push_macro("VGE")
-#pragma push_macro("VAND")
-#pragma push_macro("VBITS")
-#pragma push_macro("VSEL")
-#pragma push_macro("VROUND")
-#pragma push_macro("VLDEXP")
-#pragma push_macro("VEXPONENT")
-#pragma push_macro("VEXP")
-#pragma push_macro("VLOG")
-#pragma push_macro("VNEG")
-#pragma push_macro("VUNROLL")
-#pragma push_macro("VABS")
-#pragma push_macro("VDOT3")
 #pragma push_macro("F")
-#define SSDGS__ISA 0 /* undefines them */
-#include SSDGS_SELF
-#undef SSDGS__ISA
+#undef R
+#undef V
+#undef VM
+#undef F
 #define SSDGS__ISA SSDGS__ISA_SCALAR
 #include SSDGS_SELF
 #undef SSDGS__ISA
@@ -1751,32 +1656,6 @@ static int ssdgs__finite(ssdgs_real x) {
 #pragma pop_macro("R")
 #pragma pop_macro("V")
 #pragma pop_macro("VM")
-#pragma pop_macro("VLOAD")
-#pragma pop_macro("VSTORE")
-#pragma pop_macro("VSET")
-#pragma pop_macro("VADD")
-#pragma pop_macro("VSUB")
-#pragma pop_macro("VMUL")
-#pragma pop_macro("VDIV")
-#pragma pop_macro("VFMA")
-#pragma pop_macro("VFNMA")
-#pragma pop_macro("VMIN")
-#pragma pop_macro("VMAX")
-#pragma pop_macro("VSQRT")
-#pragma pop_macro("VLT")
-#pragma pop_macro("VGE")
-#pragma pop_macro("VAND")
-#pragma pop_macro("VBITS")
-#pragma pop_macro("VSEL")
-#pragma pop_macro("VROUND")
-#pragma pop_macro("VLDEXP")
-#pragma pop_macro("VEXPONENT")
-#pragma pop_macro("VEXP")
-#pragma pop_macro("VLOG")
-#pragma pop_macro("VNEG")
-#pragma pop_macro("VUNROLL")
-#pragma pop_macro("VABS")
-#pragma pop_macro("VDOT3")
 #pragma pop_macro("F")
 
 /* ==== >>memory  contexts, errors, aligned allocation ==== */
@@ -12337,12 +12216,10 @@ SSDGS__SMALL_END
 #endif
 #endif /* SSDGS_IMPLEMENTATION */
 #else  /* SSDGS__ISA: the kernels, included once per instruction set */
-#if SSDGS__ISA
-
 /* ==== >>kernels  one body for every instruction set ==== */
 
-/* V holds SSDGS__VW lanes of R, VM is a mask. Where a or b is NaN, VMIN(a, b) and VMAX(a, b) are b. Kernels
-   call no libm (except in the double build) and fuse only through VFMA, so a forward and its backward round
+/* V holds SSDGS__VW lanes of R, VM is a mask. Where a or b is NaN, V_MIN(a, b) and V_MAX(a, b) are b. Kernels
+   call no libm (except in the double build) and fuse only through V_FMA, so a forward and its backward round
    alike. */
 
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
@@ -12354,26 +12231,26 @@ SSDGS__SMALL_END
 #define V ssdgs_real
 #define VM int
 #define SSDGS__VW 1
-#define VLOAD(p) (*(p))
-#define VSTORE(p, v) (*(p) = (v))
-#define VSET(c) ((R)(c))
-#define VADD(a, b) ((a) + (b))
-#define VSUB(a, b) ((a) - (b))
-#define VMUL(a, b) ((a) * (b))
-#define VDIV(a, b) ((a) / (b))
-#define VFMA(a, b, c) ((a) * (b) + (c))
-#define VFNMA(a, b, c) ((c) - (a) * (b))
-#define VMIN(a, b) ((a) < (b) ? (a) : (b))
-#define VMAX(a, b) ((a) > (b) ? (a) : (b))
-#define VSQRT(a) SSDGS__SQRT(a)
-#define VLT(a, b) ((a) < (b))
-#define VGE(a, b) ((a) >= (b))
-#define VAND(m, n) ((m) & (n))
-#define VBITS(m) (m)
-#define VSEL(m, a, b) ((m) ? (a) : (b))
-#define VROUND(a) ssdgs__round(a)
-#define VLDEXP(x, n) ((x)*ssdgs__pow2(n))
-#define VEXPONENT(x) ssdgs__exponent(x)
+#define V_LOAD(p) (*(p))
+#define V_STORE(p, v) (*(p) = (v))
+#define V_SET(c) ((R)(c))
+#define V_ADD(a, b) ((a) + (b))
+#define V_SUB(a, b) ((a) - (b))
+#define V_MUL(a, b) ((a) * (b))
+#define V_DIV(a, b) ((a) / (b))
+#define V_FMA(a, b, c) ((a) * (b) + (c))
+#define V_FNMA(a, b, c) ((c) - (a) * (b))
+#define V_MIN(a, b) ((a) < (b) ? (a) : (b))
+#define V_MAX(a, b) ((a) > (b) ? (a) : (b))
+#define V_SQRT(a) SSDGS__SQRT(a)
+#define V_LT(a, b) ((a) < (b))
+#define V_GE(a, b) ((a) >= (b))
+#define V_AND(m, n) ((m) & (n))
+#define V_BITS(m) (m)
+#define V_SEL(m, a, b) ((m) ? (a) : (b))
+#define V_ROUND(a) ssdgs__round(a)
+#define V_LDEXP(x, n) ((x)*ssdgs__pow2(n))
+#define V_EXPONENT(x) ssdgs__exponent(x)
 
 #elif SSDGS__ISA == SSDGS__ISA_SSE2
 #define SSDGS__NAME(name) ssdgs__##name##_sse2
@@ -12384,27 +12261,27 @@ SSDGS__SMALL_END
 #define V __m128
 #define VM __m128
 #define SSDGS__VW 4
-#define VLOAD(p) _mm_loadu_ps(p)
-#define VSTORE(p, v) _mm_storeu_ps(p, v)
-#define VSET(c) _mm_set1_ps((float)(c))
-#define VADD(a, b) _mm_add_ps(a, b)
-#define VSUB(a, b) _mm_sub_ps(a, b)
-#define VMUL(a, b) _mm_mul_ps(a, b)
-#define VDIV(a, b) _mm_div_ps(a, b)
-#define VFMA(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
-#define VFNMA(a, b, c) _mm_sub_ps(c, _mm_mul_ps(a, b))
-#define VMIN(a, b) _mm_min_ps(a, b)
-#define VMAX(a, b) _mm_max_ps(a, b)
-#define VSQRT(a) _mm_sqrt_ps(a)
-#define VLT(a, b) _mm_cmplt_ps(a, b)
-#define VGE(a, b) _mm_cmpge_ps(a, b)
-#define VAND(m, n) _mm_and_ps(m, n)
-#define VBITS(m) _mm_movemask_ps(m)
-#define VSEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
-#define VROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
-#define VLDEXP(x, n) \
+#define V_LOAD(p) _mm_loadu_ps(p)
+#define V_STORE(p, v) _mm_storeu_ps(p, v)
+#define V_SET(c) _mm_set1_ps((float)(c))
+#define V_ADD(a, b) _mm_add_ps(a, b)
+#define V_SUB(a, b) _mm_sub_ps(a, b)
+#define V_MUL(a, b) _mm_mul_ps(a, b)
+#define V_DIV(a, b) _mm_div_ps(a, b)
+#define V_FMA(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
+#define V_FNMA(a, b, c) _mm_sub_ps(c, _mm_mul_ps(a, b))
+#define V_MIN(a, b) _mm_min_ps(a, b)
+#define V_MAX(a, b) _mm_max_ps(a, b)
+#define V_SQRT(a) _mm_sqrt_ps(a)
+#define V_LT(a, b) _mm_cmplt_ps(a, b)
+#define V_GE(a, b) _mm_cmpge_ps(a, b)
+#define V_AND(m, n) _mm_and_ps(m, n)
+#define V_BITS(m) _mm_movemask_ps(m)
+#define V_SEL(m, a, b) _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b))
+#define V_ROUND(a) _mm_cvtepi32_ps(_mm_cvtps_epi32(a))
+#define V_LDEXP(x, n) \
     _mm_castsi128_ps(_mm_add_epi32(_mm_castps_si128(x), _mm_slli_epi32(_mm_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) \
+#define V_EXPONENT(x) \
     _mm_cvtepi32_ps(_mm_sub_epi32(_mm_srli_epi32(_mm_castps_si128(x), 23), _mm_set1_epi32(127)))
 
 #elif SSDGS__ISA == SSDGS__ISA_AVX2
@@ -12416,28 +12293,28 @@ SSDGS__SMALL_END
 #define V __m256
 #define VM __m256
 #define SSDGS__VW 8
-#define VLOAD(p) _mm256_loadu_ps(p)
-#define VSTORE(p, v) _mm256_storeu_ps(p, v)
-#define VSET(c) _mm256_set1_ps((float)(c))
-#define VADD(a, b) _mm256_add_ps(a, b)
-#define VSUB(a, b) _mm256_sub_ps(a, b)
-#define VMUL(a, b) _mm256_mul_ps(a, b)
-#define VDIV(a, b) _mm256_div_ps(a, b)
-#define VFMA(a, b, c) _mm256_fmadd_ps(a, b, c)
-#define VFNMA(a, b, c) _mm256_fnmadd_ps(a, b, c)
-#define VMIN(a, b) _mm256_min_ps(a, b)
-#define VMAX(a, b) _mm256_max_ps(a, b)
-#define VSQRT(a) _mm256_sqrt_ps(a)
-#define VLT(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
-#define VGE(a, b) _mm256_cmp_ps(a, b, _CMP_GE_OQ)
-#define VAND(m, n) _mm256_and_ps(m, n)
-#define VBITS(m) _mm256_movemask_ps(m)
-#define VSEL(m, a, b) _mm256_blendv_ps(b, a, m)
-#define VROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
-#define VLDEXP(x, n) \
+#define V_LOAD(p) _mm256_loadu_ps(p)
+#define V_STORE(p, v) _mm256_storeu_ps(p, v)
+#define V_SET(c) _mm256_set1_ps((float)(c))
+#define V_ADD(a, b) _mm256_add_ps(a, b)
+#define V_SUB(a, b) _mm256_sub_ps(a, b)
+#define V_MUL(a, b) _mm256_mul_ps(a, b)
+#define V_DIV(a, b) _mm256_div_ps(a, b)
+#define V_FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
+#define V_FNMA(a, b, c) _mm256_fnmadd_ps(a, b, c)
+#define V_MIN(a, b) _mm256_min_ps(a, b)
+#define V_MAX(a, b) _mm256_max_ps(a, b)
+#define V_SQRT(a) _mm256_sqrt_ps(a)
+#define V_LT(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
+#define V_GE(a, b) _mm256_cmp_ps(a, b, _CMP_GE_OQ)
+#define V_AND(m, n) _mm256_and_ps(m, n)
+#define V_BITS(m) _mm256_movemask_ps(m)
+#define V_SEL(m, a, b) _mm256_blendv_ps(b, a, m)
+#define V_ROUND(a) _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)
+#define V_LDEXP(x, n) \
     _mm256_castsi256_ps( \
         _mm256_add_epi32(_mm256_castps_si256(x), _mm256_slli_epi32(_mm256_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) \
+#define V_EXPONENT(x) \
     _mm256_cvtepi32_ps( \
         _mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(x), 23), _mm256_set1_epi32(127)))
 
@@ -12450,29 +12327,29 @@ SSDGS__SMALL_END
 #define V __m512
 #define VM __mmask16
 #define SSDGS__VW 16
-#define VLOAD(p) _mm512_loadu_ps(p)
-#define VSTORE(p, v) _mm512_storeu_ps(p, v)
-#define VSET(c) _mm512_set1_ps((float)(c))
-#define VADD(a, b) _mm512_add_ps(a, b)
-#define VSUB(a, b) _mm512_sub_ps(a, b)
-#define VMUL(a, b) _mm512_mul_ps(a, b)
-#define VDIV(a, b) _mm512_div_ps(a, b)
-#define VFMA(a, b, c) _mm512_fmadd_ps(a, b, c)
-#define VFNMA(a, b, c) _mm512_fnmadd_ps(a, b, c)
-#define VMIN(a, b) _mm512_min_ps(a, b)
-#define VMAX(a, b) _mm512_max_ps(a, b)
-#define VSQRT(a) _mm512_sqrt_ps(a)
-#define VLT(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
-#define VGE(a, b) _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ)
-#define VAND(m, n) ((__mmask16)((m) & (n)))
-#define VBITS(m) ((int)(m))
-#define VSEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
-#define VROUND(a) \
+#define V_LOAD(p) _mm512_loadu_ps(p)
+#define V_STORE(p, v) _mm512_storeu_ps(p, v)
+#define V_SET(c) _mm512_set1_ps((float)(c))
+#define V_ADD(a, b) _mm512_add_ps(a, b)
+#define V_SUB(a, b) _mm512_sub_ps(a, b)
+#define V_MUL(a, b) _mm512_mul_ps(a, b)
+#define V_DIV(a, b) _mm512_div_ps(a, b)
+#define V_FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
+#define V_FNMA(a, b, c) _mm512_fnmadd_ps(a, b, c)
+#define V_MIN(a, b) _mm512_min_ps(a, b)
+#define V_MAX(a, b) _mm512_max_ps(a, b)
+#define V_SQRT(a) _mm512_sqrt_ps(a)
+#define V_LT(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
+#define V_GE(a, b) _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ)
+#define V_AND(m, n) ((__mmask16)((m) & (n)))
+#define V_BITS(m) ((int)(m))
+#define V_SEL(m, a, b) _mm512_mask_blend_ps(m, b, a)
+#define V_ROUND(a) \
     _mm512_cvtepi32_ps(_mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC))
-#define VLDEXP(x, n) \
+#define V_LDEXP(x, n) \
     _mm512_castsi512_ps( \
         _mm512_add_epi32(_mm512_castps_si512(x), _mm512_slli_epi32(_mm512_cvtps_epi32(n), 23)))
-#define VEXPONENT(x) \
+#define V_EXPONENT(x) \
     _mm512_cvtepi32_ps( \
         _mm512_sub_epi32(_mm512_srli_epi32(_mm512_castps_si512(x), 23), _mm512_set1_epi32(127)))
 
@@ -12485,27 +12362,27 @@ SSDGS__SMALL_END
 #define V float32x4_t
 #define VM uint32x4_t
 #define SSDGS__VW 4
-#define VLOAD(p) vld1q_f32(p)
-#define VSTORE(p, v) vst1q_f32(p, v)
-#define VSET(c) vdupq_n_f32((float)(c))
-#define VADD(a, b) vaddq_f32(a, b)
-#define VSUB(a, b) vsubq_f32(a, b)
-#define VMUL(a, b) vmulq_f32(a, b)
-#define VDIV(a, b) vdivq_f32(a, b)
-#define VFMA(a, b, c) vfmaq_f32(c, a, b)
-#define VFNMA(a, b, c) vfmsq_f32(c, a, b)
-#define VMIN(a, b) vbslq_f32(vcltq_f32(a, b), a, b)
-#define VMAX(a, b) vbslq_f32(vcgtq_f32(a, b), a, b)
-#define VSQRT(a) vsqrtq_f32(a)
-#define VLT(a, b) vcltq_f32(a, b)
-#define VGE(a, b) vcgeq_f32(a, b)
-#define VAND(m, n) vandq_u32(m, n)
-#define VBITS(m) ((int)vaddvq_u32(vandq_u32(m, vld1q_u32(ssdgs__lane_bits))))
-#define VSEL(m, a, b) vbslq_f32(m, a, b)
-#define VROUND(a) vrndnq_f32(a)
-#define VLDEXP(x, n) \
+#define V_LOAD(p) vld1q_f32(p)
+#define V_STORE(p, v) vst1q_f32(p, v)
+#define V_SET(c) vdupq_n_f32((float)(c))
+#define V_ADD(a, b) vaddq_f32(a, b)
+#define V_SUB(a, b) vsubq_f32(a, b)
+#define V_MUL(a, b) vmulq_f32(a, b)
+#define V_DIV(a, b) vdivq_f32(a, b)
+#define V_FMA(a, b, c) vfmaq_f32(c, a, b)
+#define V_FNMA(a, b, c) vfmsq_f32(c, a, b)
+#define V_MIN(a, b) vbslq_f32(vcltq_f32(a, b), a, b)
+#define V_MAX(a, b) vbslq_f32(vcgtq_f32(a, b), a, b)
+#define V_SQRT(a) vsqrtq_f32(a)
+#define V_LT(a, b) vcltq_f32(a, b)
+#define V_GE(a, b) vcgeq_f32(a, b)
+#define V_AND(m, n) vandq_u32(m, n)
+#define V_BITS(m) ((int)vaddvq_u32(vandq_u32(m, vld1q_u32(ssdgs__lane_bits))))
+#define V_SEL(m, a, b) vbslq_f32(m, a, b)
+#define V_ROUND(a) vrndnq_f32(a)
+#define V_LDEXP(x, n) \
     vreinterpretq_f32_s32(vaddq_s32(vreinterpretq_s32_f32(x), vshlq_n_s32(vcvtnq_s32_f32(n), 23)))
-#define VEXPONENT(x) \
+#define V_EXPONENT(x) \
     vcvtq_f32_s32( \
         vsubq_s32(vreinterpretq_s32_u32(vshrq_n_u32(vreinterpretq_u32_f32(x), 23)), vdupq_n_s32(127)))
 
@@ -12518,27 +12395,27 @@ SSDGS__SMALL_END
 #define V v128_t
 #define VM v128_t
 #define SSDGS__VW 4
-#define VLOAD(p) wasm_v128_load(p)
-#define VSTORE(p, v) wasm_v128_store(p, v)
-#define VSET(c) wasm_f32x4_splat((float)(c))
-#define VADD(a, b) wasm_f32x4_add(a, b)
-#define VSUB(a, b) wasm_f32x4_sub(a, b)
-#define VMUL(a, b) wasm_f32x4_mul(a, b)
-#define VDIV(a, b) wasm_f32x4_div(a, b)
-#define VFMA(a, b, c) wasm_f32x4_add(wasm_f32x4_mul(a, b), c)
-#define VFNMA(a, b, c) wasm_f32x4_sub(c, wasm_f32x4_mul(a, b))
-#define VMIN(a, b) wasm_f32x4_pmin(b, a) /* a < b ? a : b */
-#define VMAX(a, b) wasm_f32x4_pmax(b, a)
-#define VSQRT(a) wasm_f32x4_sqrt(a)
-#define VLT(a, b) wasm_f32x4_lt(a, b)
-#define VGE(a, b) wasm_f32x4_ge(a, b)
-#define VAND(m, n) wasm_v128_and(m, n)
-#define VBITS(m) ((int)wasm_i32x4_bitmask(m))
-#define VSEL(m, a, b) wasm_v128_bitselect(a, b, m)
-#define VROUND(a) wasm_f32x4_nearest(a)
+#define V_LOAD(p) wasm_v128_load(p)
+#define V_STORE(p, v) wasm_v128_store(p, v)
+#define V_SET(c) wasm_f32x4_splat((float)(c))
+#define V_ADD(a, b) wasm_f32x4_add(a, b)
+#define V_SUB(a, b) wasm_f32x4_sub(a, b)
+#define V_MUL(a, b) wasm_f32x4_mul(a, b)
+#define V_DIV(a, b) wasm_f32x4_div(a, b)
+#define V_FMA(a, b, c) wasm_f32x4_add(wasm_f32x4_mul(a, b), c)
+#define V_FNMA(a, b, c) wasm_f32x4_sub(c, wasm_f32x4_mul(a, b))
+#define V_MIN(a, b) wasm_f32x4_pmin(b, a) /* a < b ? a : b */
+#define V_MAX(a, b) wasm_f32x4_pmax(b, a)
+#define V_SQRT(a) wasm_f32x4_sqrt(a)
+#define V_LT(a, b) wasm_f32x4_lt(a, b)
+#define V_GE(a, b) wasm_f32x4_ge(a, b)
+#define V_AND(m, n) wasm_v128_and(m, n)
+#define V_BITS(m) ((int)wasm_i32x4_bitmask(m))
+#define V_SEL(m, a, b) wasm_v128_bitselect(a, b, m)
+#define V_ROUND(a) wasm_f32x4_nearest(a)
 /* the float 1.5 x 2^23 + n has n in its low bits */
-#define VLDEXP(x, n) wasm_i32x4_add(x, wasm_i32x4_shl(VADD(n, VSET(12582912)), 23))
-#define VEXPONENT(x) wasm_f32x4_convert_i32x4(wasm_i32x4_sub(wasm_u32x4_shr(x, 23), wasm_i32x4_splat(127)))
+#define V_LDEXP(x, n) wasm_i32x4_add(x, wasm_i32x4_shl(V_ADD(n, V_SET(12582912)), 23))
+#define V_EXPONENT(x) wasm_f32x4_convert_i32x4(wasm_i32x4_sub(wasm_u32x4_shr(x, 23), wasm_i32x4_splat(127)))
 #endif
 
 #define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
@@ -12551,19 +12428,19 @@ SSDGS__SMALL_END
 #define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
 #define F(name) SSDGS__NAME(name)
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
-#define VUNROLL SSDGS__UNROLL_SCALAR
+#define V_UNROLL SSDGS__UNROLL_SCALAR
 #else
-#define VUNROLL SSDGS__UNROLL
+#define V_UNROLL SSDGS__UNROLL
 #endif
-#define VNEG(a) VSUB(VSET(0), a)
-#define VABS(a) VMAX(a, VNEG(a))
-#define VDOT3(ax, ay, az, bx, by, bz) VFMA(az, bz, VFMA(ay, by, VMUL(ax, bx)))
+#define V_NEG(a) V_SUB(V_SET(0), a)
+#define V_ABS(a) V_MAX(a, V_NEG(a))
+#define V_DOT3(ax, ay, az, bx, by, bz) V_FMA(az, bz, V_FMA(ay, by, V_MUL(ax, bx)))
 
 /* Sums over lanes are sums of sixteen, SSDGS__NV vectors of them, by halves whatever the width: all
    instruction sets that fuse products and sums give the same bits, and so do all that do not. */
 SSDGS__FI R F(sum)(const V *v) {
     R lane[16];
-    for (int i = 0; i < SSDGS__NV; i++) VSTORE(lane + i * SSDGS__VW, v[i]);
+    for (int i = 0; i < SSDGS__NV; i++) V_STORE(lane + i * SSDGS__VW, v[i]);
     for (int n = 8; n > 0; n /= 2)
         for (int i = 0; i < n; i++) lane[i] += lane[i + n];
     return lane[0];
@@ -12598,11 +12475,14 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
     _mm_storeu_ps(out,
                   _mm_add_ps(_mm_loadu_ps(out), _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab))));
 #elif SSDGS__ISA == SSDGS__ISA_WASM
-    const v128_t a1 = VADD(VADD(a[0], a[2]), VADD(a[1], a[3])), b1 = VADD(VADD(b[0], b[2]), VADD(b[1], b[3]));
-    const v128_t c1 = VADD(VADD(c[0], c[2]), VADD(c[1], c[3])), d1 = VADD(VADD(d[0], d[2]), VADD(d[1], d[3]));
-    const v128_t ab = VADD(wasm_i32x4_shuffle(a1, b1, 0, 4, 1, 5), wasm_i32x4_shuffle(a1, b1, 2, 6, 3, 7));
-    const v128_t cd = VADD(wasm_i32x4_shuffle(c1, d1, 0, 4, 1, 5), wasm_i32x4_shuffle(c1, d1, 2, 6, 3, 7));
-    VSTORE(out, VADD(VLOAD(out), VADD(wasm_i64x2_shuffle(ab, cd, 0, 2), wasm_i64x2_shuffle(ab, cd, 1, 3))));
+    const v128_t a1 = V_ADD(V_ADD(a[0], a[2]), V_ADD(a[1], a[3])),
+                 b1 = V_ADD(V_ADD(b[0], b[2]), V_ADD(b[1], b[3]));
+    const v128_t c1 = V_ADD(V_ADD(c[0], c[2]), V_ADD(c[1], c[3])),
+                 d1 = V_ADD(V_ADD(d[0], d[2]), V_ADD(d[1], d[3]));
+    const v128_t ab = V_ADD(wasm_i32x4_shuffle(a1, b1, 0, 4, 1, 5), wasm_i32x4_shuffle(a1, b1, 2, 6, 3, 7));
+    const v128_t cd = V_ADD(wasm_i32x4_shuffle(c1, d1, 0, 4, 1, 5), wasm_i32x4_shuffle(c1, d1, 2, 6, 3, 7));
+    V_STORE(out,
+            V_ADD(V_LOAD(out), V_ADD(wasm_i64x2_shuffle(ab, cd, 0, 2), wasm_i64x2_shuffle(ab, cd, 1, 3))));
 #else
     out[0] += F(sum)(a);
     out[1] += F(sum)(b);
@@ -12615,17 +12495,17 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
 SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_stride) {
 #if SSDGS__ISA == SSDGS__ISA_SSE2 || SSDGS__ISA == SSDGS__ISA_AVX2 || SSDGS__ISA == SSDGS__ISA_AVX512
     __m128 r[4];
-    VUNROLL for (int i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
+    V_UNROLL for (int i = 0; i < 4; i++) r[i] = _mm_loadu_ps(in + (size_t)i * in_stride);
     _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-    VUNROLL for (int i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
+    V_UNROLL for (int i = 0; i < 4; i++) _mm_storeu_ps(out + (size_t)i * out_stride, r[i]);
 #elif SSDGS__ISA == SSDGS__ISA_WASM
     for (int i = 0; i < 4; i += 2) {
-        const v128_t a = VLOAD(in), b = VLOAD(in + in_stride), c = VLOAD(in + 2 * in_stride),
-                     d = VLOAD(in + 3 * in_stride);
+        const v128_t a = V_LOAD(in), b = V_LOAD(in + in_stride), c = V_LOAD(in + 2 * in_stride),
+                     d = V_LOAD(in + 3 * in_stride);
         const v128_t ab = i ? wasm_i32x4_shuffle(a, b, 2, 6, 3, 7) : wasm_i32x4_shuffle(a, b, 0, 4, 1, 5);
         const v128_t cd = i ? wasm_i32x4_shuffle(c, d, 2, 6, 3, 7) : wasm_i32x4_shuffle(c, d, 0, 4, 1, 5);
-        VSTORE(out + (size_t)i * out_stride, wasm_i64x2_shuffle(ab, cd, 0, 2));
-        VSTORE(out + (size_t)(i + 1) * out_stride, wasm_i64x2_shuffle(ab, cd, 1, 3));
+        V_STORE(out + (size_t)i * out_stride, wasm_i64x2_shuffle(ab, cd, 0, 2));
+        V_STORE(out + (size_t)(i + 1) * out_stride, wasm_i64x2_shuffle(ab, cd, 1, 3));
     }
 #else
     for (int i = 0; i < 16; i++)
@@ -12639,7 +12519,7 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 /* The kernels call them; the host calls their scalar forms. */
 
 #ifdef SSDGS_REAL64
-SSDGS__FI V F(exp)(V x) { return exp(VMIN(700.0, x)); }
+SSDGS__FI V F(exp)(V x) { return exp(V_MIN(700.0, x)); }
 SSDGS__FI V F(exp2)(V x) { return exp(x * 0.69314718055994530942); }
 SSDGS__FI V F(log)(V x) { return log(x); }
 SSDGS__FI void F(sincos)(V x, V *s, V *c) {
@@ -12650,144 +12530,147 @@ SSDGS__FI V F(log1p)(V x) { return log1p(x); }
 #else
 /* 2^x for x up to 127, saturating below -126: degree 5 on [-1/2, 1/2], 2.4e-7 relative. */
 SSDGS__FI V F(exp2)(V x) {
-    x = VMAX(VSET(-126), x);
-    const V whole = VROUND(x);
-    const V f = VSUB(x, whole);
-    V p = VFMA(f, VSET(1.33908633e-3), VSET(9.67603177e-3));
-    p = VFMA(p, f, VSET(5.55035695e-2));
-    p = VFMA(p, f, VSET(2.40221068e-1));
-    p = VFMA(p, f, VSET(6.93147182e-1));
-    p = VFMA(p, f, VSET(1.00000012));
-    return VLDEXP(p, whole);
+    x = V_MAX(V_SET(-126), x);
+    const V whole = V_ROUND(x);
+    const V f = V_SUB(x, whole);
+    V p = V_FMA(f, V_SET(1.33908633e-3), V_SET(9.67603177e-3));
+    p = V_FMA(p, f, V_SET(5.55035695e-2));
+    p = V_FMA(p, f, V_SET(2.40221068e-1));
+    p = V_FMA(p, f, V_SET(6.93147182e-1));
+    p = V_FMA(p, f, V_SET(1.00000012));
+    return V_LDEXP(p, whole);
 }
 
 /* e^x, saturating beyond +-87; ln 2 in two parts keeps the error independent of |x|. */
 SSDGS__FI V F(exp)(V x) {
-    x = VMAX(VSET(-87), VMIN(VSET(87), x));
-    const V whole = VROUND(VMUL(x, VSET(1.44269504088896341)));
-    const V f = VFNMA(whole, VSET(-2.12194440e-4), VFNMA(whole, VSET(0.693359375), x));
-    V p = VFMA(f, VSET(1.9875691500e-4), VSET(1.3981999507e-3));
-    p = VFMA(p, f, VSET(8.3334519073e-3));
-    p = VFMA(p, f, VSET(4.1665795894e-2));
-    p = VFMA(p, f, VSET(1.6666665459e-1));
-    p = VFMA(p, f, VSET(5.0000001201e-1));
-    p = VADD(VFMA(p, VMUL(f, f), f), VSET(1));
-    return VLDEXP(p, whole);
+    x = V_MAX(V_SET(-87), V_MIN(V_SET(87), x));
+    const V whole = V_ROUND(V_MUL(x, V_SET(1.44269504088896341)));
+    const V f = V_FNMA(whole, V_SET(-2.12194440e-4), V_FNMA(whole, V_SET(0.693359375), x));
+    V p = V_FMA(f, V_SET(1.9875691500e-4), V_SET(1.3981999507e-3));
+    p = V_FMA(p, f, V_SET(8.3334519073e-3));
+    p = V_FMA(p, f, V_SET(4.1665795894e-2));
+    p = V_FMA(p, f, V_SET(1.6666665459e-1));
+    p = V_FMA(p, f, V_SET(5.0000001201e-1));
+    p = V_ADD(V_FMA(p, V_MUL(f, f), f), V_SET(1));
+    return V_LDEXP(p, whole);
 }
 
 /* ln x for normal x > 0: 2 atanh((m - 1) / (m + 1)) + e ln 2, m in [sqrt(1/2), sqrt 2). */
 SSDGS__FI V F(log)(V x) {
-    V e = VEXPONENT(x), m = VLDEXP(x, VNEG(e));
-    VM big = VLT(VSET(1.41421356), m);
-    m = VSEL(big, VMUL(m, VSET(0.5)), m);
-    e = VSEL(big, VADD(e, VSET(1)), e);
-    const V t = VDIV(VSUB(m, VSET(1)), VADD(m, VSET(1)));
-    const V t2 = VMUL(t, t);
-    V p = VFMA(t2, VSET(2.0 / 9), VSET(2.0 / 7));
-    p = VFMA(p, t2, VSET(2.0 / 5));
-    p = VFMA(p, t2, VSET(2.0 / 3));
-    p = VFMA(VMUL(p, t2), t, VMUL(t, VSET(2)));
-    return VFMA(e, VSET(0.693359375), VFMA(e, VSET(-2.12194440e-4), p));
+    V e = V_EXPONENT(x), m = V_LDEXP(x, V_NEG(e));
+    VM big = V_LT(V_SET(1.41421356), m);
+    m = V_SEL(big, V_MUL(m, V_SET(0.5)), m);
+    e = V_SEL(big, V_ADD(e, V_SET(1)), e);
+    const V t = V_DIV(V_SUB(m, V_SET(1)), V_ADD(m, V_SET(1)));
+    const V t2 = V_MUL(t, t);
+    V p = V_FMA(t2, V_SET(2.0 / 9), V_SET(2.0 / 7));
+    p = V_FMA(p, t2, V_SET(2.0 / 5));
+    p = V_FMA(p, t2, V_SET(2.0 / 3));
+    p = V_FMA(V_MUL(p, t2), t, V_MUL(t, V_SET(2)));
+    return V_FMA(e, V_SET(0.693359375), V_FMA(e, V_SET(-2.12194440e-4), p));
 }
 
 /* ln(1 + x) for 0 <= x <= 1, accurate near 0. */
 SSDGS__FI V F(log1p)(V x) {
-    V t = VDIV(x, VADD(x, VSET(2))), t2 = VMUL(t, t);
-    V p = VFMA(t2, VSET(2.0 / 17), VSET(2.0 / 15));
-    p = VFMA(p, t2, VSET(2.0 / 13));
-    p = VFMA(p, t2, VSET(2.0 / 11));
-    p = VFMA(p, t2, VSET(2.0 / 9));
-    p = VFMA(p, t2, VSET(2.0 / 7));
-    p = VFMA(p, t2, VSET(2.0 / 5));
-    p = VFMA(p, t2, VSET(2.0 / 3));
-    return VFMA(VMUL(p, t2), t, VMUL(t, VSET(2)));
+    V t = V_DIV(x, V_ADD(x, V_SET(2))), t2 = V_MUL(t, t);
+    V p = V_FMA(t2, V_SET(2.0 / 17), V_SET(2.0 / 15));
+    p = V_FMA(p, t2, V_SET(2.0 / 13));
+    p = V_FMA(p, t2, V_SET(2.0 / 11));
+    p = V_FMA(p, t2, V_SET(2.0 / 9));
+    p = V_FMA(p, t2, V_SET(2.0 / 7));
+    p = V_FMA(p, t2, V_SET(2.0 / 5));
+    p = V_FMA(p, t2, V_SET(2.0 / 3));
+    return V_FMA(V_MUL(p, t2), t, V_MUL(t, V_SET(2)));
 }
 
 /* Good to |x| about 1e5: pi/2 in three parts. */
 SSDGS__FI void F(sincos)(V x, V *s, V *c) {
-    V n = VROUND(VMUL(x, VSET(0.636619772367581)));
-    V r = VFNMA(n, VSET(1.5703125), x);
-    r = VFNMA(n, VSET(4.83751296997070e-4), r);
-    r = VFNMA(n, VSET(7.54978995489188e-8), r);
-    const V r2 = VMUL(r, r);
-    V ps = VFMA(r2, VSET(-1.9515295891e-4), VSET(8.3321608736e-3));
-    ps = VFMA(ps, r2, VSET(-1.6666654611e-1));
-    ps = VFMA(VMUL(ps, r2), r, r);
-    V pc = VFMA(r2, VSET(2.443315711809948e-5), VSET(-1.388731625493765e-3));
-    pc = VFMA(pc, r2, VSET(4.166664568298827e-2));
-    pc = VFMA(VMUL(pc, r2), r2, VFNMA(r2, VSET(0.5), VSET(1)));
-    const V q = VFNMA(VROUND(VFMA(n, VSET(0.25), VSET(-0.375))), VSET(4), n); /* quadrant 0..3 */
-    const VM odd = VLT(VABS(VSUB(VABS(VSUB(q, VSET(2))), VSET(1))), VSET(0.5));
-    const VM negative_s = VGE(q, VSET(1.5));
-    const VM negative_c = VLT(VABS(VSUB(q, VSET(1.5))), VSET(1));
-    *s = VSEL(odd, pc, ps);
-    *c = VSEL(odd, ps, pc);
-    *s = VSEL(negative_s, VNEG(*s), *s);
-    *c = VSEL(negative_c, VNEG(*c), *c);
+    V n = V_ROUND(V_MUL(x, V_SET(0.636619772367581)));
+    V r = V_FNMA(n, V_SET(1.5703125), x);
+    r = V_FNMA(n, V_SET(4.83751296997070e-4), r);
+    r = V_FNMA(n, V_SET(7.54978995489188e-8), r);
+    const V r2 = V_MUL(r, r);
+    V ps = V_FMA(r2, V_SET(-1.9515295891e-4), V_SET(8.3321608736e-3));
+    ps = V_FMA(ps, r2, V_SET(-1.6666654611e-1));
+    ps = V_FMA(V_MUL(ps, r2), r, r);
+    V pc = V_FMA(r2, V_SET(2.443315711809948e-5), V_SET(-1.388731625493765e-3));
+    pc = V_FMA(pc, r2, V_SET(4.166664568298827e-2));
+    pc = V_FMA(V_MUL(pc, r2), r2, V_FNMA(r2, V_SET(0.5), V_SET(1)));
+    const V q = V_FNMA(V_ROUND(V_FMA(n, V_SET(0.25), V_SET(-0.375))), V_SET(4), n); /* quadrant 0..3 */
+    const VM odd = V_LT(V_ABS(V_SUB(V_ABS(V_SUB(q, V_SET(2))), V_SET(1))), V_SET(0.5));
+    const VM negative_s = V_GE(q, V_SET(1.5));
+    const VM negative_c = V_LT(V_ABS(V_SUB(q, V_SET(1.5))), V_SET(1));
+    *s = V_SEL(odd, pc, ps);
+    *c = V_SEL(odd, ps, pc);
+    *s = V_SEL(negative_s, V_NEG(*s), *s);
+    *c = V_SEL(negative_c, V_NEG(*c), *c);
 }
 #endif
 
-#define VEXP(x) F(exp)(x)
-#define VLOG(x) F(log)(x)
+#define V_EXP(x) F(exp)(x)
+#define V_LOG(x) F(log)(x)
 
-SSDGS__FI V F(sigmoid)(V x) { return VDIV(VSET(1), VADD(VSET(1), VEXP(VNEG(x)))); }
-SSDGS__FI V F(softplus)(V x) { return VADD(VMAX(x, VSET(0)), F(log1p)(VEXP(VNEG(VABS(x))))); }
+SSDGS__FI V F(sigmoid)(V x) { return V_DIV(V_SET(1), V_ADD(V_SET(1), V_EXP(V_NEG(x)))); }
+SSDGS__FI V F(softplus)(V x) { return V_ADD(V_MAX(x, V_SET(0)), F(log1p)(V_EXP(V_NEG(V_ABS(x))))); }
 
 /* Unit quaternion q (w x y z) of a raw one and its row-major matrix r; returns 1 / |raw|. A zero one: the
    identity. */
 SSDGS__FI V F(rotation)(const V raw[4], V q[4], V r[9]) {
-    V largest = VMAX(VMAX(VABS(raw[0]), VABS(raw[1])), VMAX(VABS(raw[2]), VABS(raw[3])));
-    V least = VSET(1e-37), two = VSET(2), one = VSET(1);
-    V inverse = VSEL(VLT(largest, least), VSET(0), VDIV(one, VMAX(largest, least)));
+    V largest = V_MAX(V_MAX(V_ABS(raw[0]), V_ABS(raw[1])), V_MAX(V_ABS(raw[2]), V_ABS(raw[3])));
+    V least = V_SET(1e-37), two = V_SET(2), one = V_SET(1);
+    V inverse = V_SEL(V_LT(largest, least), V_SET(0), V_DIV(one, V_MAX(largest, least)));
     for (int i = 0; i < 4; i++)
-        q[i] = VMUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
-    V norm2 = VMAX(VFMA(q[0], q[0], VDOT3(q[1], q[2], q[3], q[1], q[2], q[3])), VSET(1e-30));
-    norm2 = VDIV(one, VSQRT(norm2));
-    for (int i = 0; i < 4; i++) q[i] = VMUL(q[i], norm2);
-    inverse = VMUL(inverse, norm2);
-    r[0] = VFNMA(two, VFMA(q[2], q[2], VMUL(q[3], q[3])), one);
-    r[1] = VMUL(two, VFNMA(q[0], q[3], VMUL(q[1], q[2])));
-    r[2] = VMUL(two, VFMA(q[0], q[2], VMUL(q[1], q[3])));
-    r[3] = VMUL(two, VFMA(q[0], q[3], VMUL(q[1], q[2])));
-    r[4] = VFNMA(two, VFMA(q[1], q[1], VMUL(q[3], q[3])), one);
-    r[5] = VMUL(two, VFNMA(q[0], q[1], VMUL(q[2], q[3])));
-    r[6] = VMUL(two, VFNMA(q[0], q[2], VMUL(q[1], q[3])));
-    r[7] = VMUL(two, VFMA(q[0], q[1], VMUL(q[2], q[3])));
-    r[8] = VFNMA(two, VFMA(q[1], q[1], VMUL(q[2], q[2])), one);
+        q[i] = V_MUL(raw[i], inverse); /* first by the largest: squares neither over- nor underflow */
+    V norm2 = V_MAX(V_FMA(q[0], q[0], V_DOT3(q[1], q[2], q[3], q[1], q[2], q[3])), V_SET(1e-30));
+    norm2 = V_DIV(one, V_SQRT(norm2));
+    for (int i = 0; i < 4; i++) q[i] = V_MUL(q[i], norm2);
+    inverse = V_MUL(inverse, norm2);
+    r[0] = V_FNMA(two, V_FMA(q[2], q[2], V_MUL(q[3], q[3])), one);
+    r[1] = V_MUL(two, V_FNMA(q[0], q[3], V_MUL(q[1], q[2])));
+    r[2] = V_MUL(two, V_FMA(q[0], q[2], V_MUL(q[1], q[3])));
+    r[3] = V_MUL(two, V_FMA(q[0], q[3], V_MUL(q[1], q[2])));
+    r[4] = V_FNMA(two, V_FMA(q[1], q[1], V_MUL(q[3], q[3])), one);
+    r[5] = V_MUL(two, V_FNMA(q[0], q[1], V_MUL(q[2], q[3])));
+    r[6] = V_MUL(two, V_FNMA(q[0], q[2], V_MUL(q[1], q[3])));
+    r[7] = V_MUL(two, V_FMA(q[0], q[1], V_MUL(q[2], q[3])));
+    r[8] = V_FNMA(two, V_FMA(q[1], q[1], V_MUL(q[2], q[2])), one);
     return inverse;
 }
 
 /* d_raw = d(rotation)/d(raw)^T dr: through the matrix, then projected off the radial direction. */
 SSDGS__FI void F(rotation_backward)(V d_raw[4], const V q[4], V inverse, const V dr[9]) {
     V w = q[0], x = q[1], y = q[2], z = q[3], g[4];
-    V a = VSUB(dr[7], dr[5]), b = VSUB(dr[2], dr[6]), c = VSUB(dr[3], dr[1]);
-    V xy = VADD(dr[1], dr[3]), xz = VADD(dr[2], dr[6]), yz = VADD(dr[5], dr[7]);
-    g[0] = VDOT3(x, y, z, a, b, c);
-    g[1] = VSUB(VFMA(w, a, VFMA(y, xy, VMUL(z, xz))), VMUL(VMUL(VSET(2), x), VADD(dr[4], dr[8])));
-    g[2] = VSUB(VFMA(w, b, VFMA(x, xy, VMUL(z, yz))), VMUL(VMUL(VSET(2), y), VADD(dr[0], dr[8])));
-    g[3] = VSUB(VFMA(w, c, VFMA(x, xz, VMUL(y, yz))), VMUL(VMUL(VSET(2), z), VADD(dr[0], dr[4])));
-    for (int i = 0; i < 4; i++) g[i] = VMUL(VSET(2), g[i]);
-    const V radial = VFMA(w, g[0], VDOT3(x, y, z, g[1], g[2], g[3]));
-    for (int i = 0; i < 4; i++) d_raw[i] = VMUL(inverse, VFNMA(q[i], radial, g[i]));
+    V a = V_SUB(dr[7], dr[5]), b = V_SUB(dr[2], dr[6]), c = V_SUB(dr[3], dr[1]);
+    V xy = V_ADD(dr[1], dr[3]), xz = V_ADD(dr[2], dr[6]), yz = V_ADD(dr[5], dr[7]);
+    g[0] = V_DOT3(x, y, z, a, b, c);
+    g[1] = V_SUB(V_FMA(w, a, V_FMA(y, xy, V_MUL(z, xz))), V_MUL(V_MUL(V_SET(2), x), V_ADD(dr[4], dr[8])));
+    g[2] = V_SUB(V_FMA(w, b, V_FMA(x, xy, V_MUL(z, yz))), V_MUL(V_MUL(V_SET(2), y), V_ADD(dr[0], dr[8])));
+    g[3] = V_SUB(V_FMA(w, c, V_FMA(x, xz, V_MUL(y, yz))), V_MUL(V_MUL(V_SET(2), z), V_ADD(dr[0], dr[4])));
+    for (int i = 0; i < 4; i++) g[i] = V_MUL(V_SET(2), g[i]);
+    const V radial = V_FMA(w, g[0], V_DOT3(x, y, z, g[1], g[2], g[3]));
+    for (int i = 0; i < 4; i++) d_raw[i] = V_MUL(inverse, V_FNMA(q[i], radial, g[i]));
 }
 
 /* sRGB encoding; with slope also its derivative. Negative values take the linear part. */
 SSDGS__FN void F(srgb_encode)(R *out, R *slope, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
-        const V x = VLOAD(in + i), safe = VMAX(x, VSET(0.0031308));
-        const VM curved = VAND(VGE(x, VSET(0.0031308)), VLT(VSUB(x, x), VSET(1))); /* NaN and infinity stay */
-        const V power = VMUL(VSET(1.055), VEXP(VMUL(VLOG(safe), VSET(1 / 2.4))));
-        VSTORE(out + i, VSEL(curved, VSUB(power, VSET(0.055)), VMUL(x, VSET(12.92))));
-        if (slope) VSTORE(slope + i, VSEL(curved, VDIV(power, VMUL(safe, VSET(2.4))), VSET(12.92)));
+        const V x = V_LOAD(in + i), safe = V_MAX(x, V_SET(0.0031308));
+        const VM curved =
+            V_AND(V_GE(x, V_SET(0.0031308)), V_LT(V_SUB(x, x), V_SET(1))); /* NaN and infinity stay */
+        const V power = V_MUL(V_SET(1.055), V_EXP(V_MUL(V_LOG(safe), V_SET(1 / 2.4))));
+        V_STORE(out + i, V_SEL(curved, V_SUB(power, V_SET(0.055)), V_MUL(x, V_SET(12.92))));
+        if (slope) V_STORE(slope + i, V_SEL(curved, V_DIV(power, V_MUL(safe, V_SET(2.4))), V_SET(12.92)));
     }
 }
 
 SSDGS__FN void F(srgb_decode)(R *out, const R *in, size_t n) {
     for (size_t i = 0; i < n; i += SSDGS__VW) {
-        const V x = VLOAD(in + i), base = VMUL(VADD(VMAX(x, VSET(0.04045)), VSET(0.055)), VSET(1 / 1.055));
-        const V power = VEXP(VMUL(VLOG(base), VSET(2.4)));
-        const VM curved = VAND(VGE(x, VSET(0.04045)), VLT(VSUB(x, x), VSET(1))); /* NaN and infinity stay */
-        VSTORE(out + i, VSEL(curved, power, VMUL(x, VSET(1 / 12.92))));
+        const V x = V_LOAD(in + i),
+                base = V_MUL(V_ADD(V_MAX(x, V_SET(0.04045)), V_SET(0.055)), V_SET(1 / 1.055));
+        const V power = V_EXP(V_MUL(V_LOG(base), V_SET(2.4)));
+        const VM curved =
+            V_AND(V_GE(x, V_SET(0.04045)), V_LT(V_SUB(x, x), V_SET(1))); /* NaN and infinity stay */
+        V_STORE(out + i, V_SEL(curved, power, V_MUL(x, V_SET(1 / 12.92))));
     }
 }
 
@@ -12817,137 +12700,138 @@ SSDGS__FI void F(rim_of)(const ssdgs__projection *k, F(rim) * rim) {
         const R focal = i ? k->fy : k->fx, centre = i ? k->cy : k->cx,
                 most = (R)1e9; /* products of two squares are finite */
         const R low = -centre / focal, high = ((R)(i ? k->height : k->width) - centre) / focal;
-        rim->low[i] = VSET(low > -SSDGS__STEEP ? -SSDGS__STEEP : low > -most ? low : -most);
-        rim->high[i] = VSET(high < SSDGS__STEEP ? SSDGS__STEEP : high < most ? high : most);
+        rim->low[i] = V_SET(low > -SSDGS__STEEP ? -SSDGS__STEEP : low > -most ? low : -most);
+        rim->high[i] = V_SET(high < SSDGS__STEEP ? SSDGS__STEEP : high < most ? high : most);
     }
-    rim->inverse_near = VSET(k->near_plane > (R)1e-30 ? 1 / k->near_plane : (R)1e30);
+    rim->inverse_near = V_SET(k->near_plane > (R)1e-30 ? 1 / k->near_plane : (R)1e30);
 }
 
 /* What opacity is multiplied by: less and less from twice near_plane down to it, and beside the picture where
    the Gaussian is deep, by the squares of (1 + edge^2) / (1 + slope^2), which are cos^4 of angles: none pops
    when the camera turns. */
 SSDGS__FI void F(fade)(const ssdgs__projection *k, const F(rim) * rim, F(projection) * p) {
-    const V one = VSET(1);
+    const V one = V_SET(1);
     p->fade = one;
     if (k->orthographic) return;
-    V away = VMAX(VSET(0), VSUB(VSET(2 * k->near_plane), p->t[2]));
+    V away = V_MAX(V_SET(0), V_SUB(V_SET(2 * k->near_plane), p->t[2]));
     for (int i = 0; i < 2; i++) {
-        p->slope[i] = VMUL(p->t[i], p->inverse_z);
-        p->edge[i] = VMAX(rim->low[i], VMIN(rim->high[i], p->slope[i]));
-        away = VADD(away, VABS(VSUB(p->slope[i], p->edge[i])));
+        p->slope[i] = V_MUL(p->t[i], p->inverse_z);
+        p->edge[i] = V_MAX(rim->low[i], V_MIN(rim->high[i], p->slope[i]));
+        away = V_ADD(away, V_ABS(V_SUB(p->slope[i], p->edge[i])));
     }
-    if (!VBITS(VLT(VSET(0), away))) return;
-    p->back = VSET(0);
+    if (!V_BITS(V_LT(V_SET(0), away))) return;
+    p->back = V_SET(0);
     for (int j = 0; j < 3; j++) {
-        p->axis[j] =
-            VMUL(VMUL(p->s[j], p->inverse_z), VDOT3(VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]),
-                                                    p->r[j], p->r[3 + j], p->r[6 + j]));
-        p->back = VFMA(p->axis[j], p->axis[j], p->back);
+        p->axis[j] = V_MUL(V_MUL(p->s[j], p->inverse_z),
+                           V_DOT3(V_SET(k->view[8]), V_SET(k->view[9]), V_SET(k->view[10]), p->r[j],
+                                  p->r[3 + j], p->r[6 + j]));
+        p->back = V_FMA(p->axis[j], p->axis[j], p->back);
     }
-    p->beside = VDIV(VMUL(VFMA(p->edge[0], p->edge[0], one), VFMA(p->edge[1], p->edge[1], one)),
-                     VMUL(VFMA(p->slope[0], p->slope[0], one), VFMA(p->slope[1], p->slope[1], one)));
-    p->beside = VMUL(p->beside, p->beside);
-    p->deep =
-        VMAX(VSET(0),
-             VMIN(one, VMUL(VSUB(p->back, VSET(SSDGS__BACK)), VSET(1 / (SSDGS__FAR_BACK - SSDGS__BACK)))));
-    p->rise = VMAX(VSET(0), VMIN(one, VMUL(VSUB(p->t[2], VSET(k->near_plane)), rim->inverse_near)));
-    p->fade = VMUL(p->rise, VFNMA(p->deep, VSUB(one, p->beside), one));
+    p->beside = V_DIV(V_MUL(V_FMA(p->edge[0], p->edge[0], one), V_FMA(p->edge[1], p->edge[1], one)),
+                      V_MUL(V_FMA(p->slope[0], p->slope[0], one), V_FMA(p->slope[1], p->slope[1], one)));
+    p->beside = V_MUL(p->beside, p->beside);
+    p->deep = V_MAX(V_SET(0), V_MIN(one, V_MUL(V_SUB(p->back, V_SET(SSDGS__BACK)),
+                                               V_SET(1 / (SSDGS__FAR_BACK - SSDGS__BACK)))));
+    p->rise = V_MAX(V_SET(0), V_MIN(one, V_MUL(V_SUB(p->t[2], V_SET(k->near_plane)), rim->inverse_near)));
+    p->fade = V_MUL(p->rise, V_FNMA(p->deep, V_SUB(one, p->beside), one));
 }
 
 /* Lanes in `off` get neutral parameters: what is not drawn must not reach the others, whatever it holds. */
 SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, const R *g, size_t stride,
                                 VM off) {
     for (int i = 0; i < 3; i++)
-        p->x[i] = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
+        p->x[i] = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)(SSDGS_POSITION + i) * stride));
     V raw[4];
     for (int i = 0; i < 4; i++)
-        raw[i] = VSEL(off, VSET(i == 0), VLOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
+        raw[i] = V_SEL(off, V_SET(i == 0), V_LOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
     for (int i = 0; i < 3; i++) {
-        V log_scale = VSEL(off, VSET(0), VLOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
-        p->s[i] = VEXP(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), log_scale)));
-        p->t[i] = VADD(VDOT3(VSET(k->view[4 * i]), VSET(k->view[4 * i + 1]), VSET(k->view[4 * i + 2]),
-                             p->x[0], p->x[1], p->x[2]),
-                       VSET(k->view[4 * i + 3]));
+        V log_scale = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
+        p->s[i] = V_EXP(V_MAX(V_SET(-SSDGS__MOST_RAW), V_MIN(V_SET(SSDGS__MOST_RAW), log_scale)));
+        p->t[i] = V_ADD(V_DOT3(V_SET(k->view[4 * i]), V_SET(k->view[4 * i + 1]), V_SET(k->view[4 * i + 2]),
+                               p->x[0], p->x[1], p->x[2]),
+                        V_SET(k->view[4 * i + 3]));
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
-    p->inverse_z = k->orthographic ? VSET(1) : VDIV(VSET(1), VMAX(p->t[2], VSET(k->near_plane)));
-    p->inverse_z = VSEL(off, VSET(0), p->inverse_z); /* the world's 0 may be behind the camera */
-    for (int i = 0; i < 2; i++) {                    /* rows of J W */
-        V focal = VMUL(VSET(i ? k->fy : k->fx), p->inverse_z);
-        V slope = k->orthographic ? VSET(0) : VMUL(p->t[i], p->inverse_z);
+    p->inverse_z = k->orthographic ? V_SET(1) : V_DIV(V_SET(1), V_MAX(p->t[2], V_SET(k->near_plane)));
+    p->inverse_z = V_SEL(off, V_SET(0), p->inverse_z); /* the world's 0 may be behind the camera */
+    for (int i = 0; i < 2; i++) {                      /* rows of J W */
+        V focal = V_MUL(V_SET(i ? k->fy : k->fx), p->inverse_z);
+        V slope = k->orthographic ? V_SET(0) : V_MUL(p->t[i], p->inverse_z);
         for (int j = 0; j < 3; j++)
-            p->row[i][j] = VMUL(focal, VFNMA(slope, VSET(k->view[8 + j]), VSET(k->view[4 * i + j])));
+            p->row[i][j] = V_MUL(focal, V_FNMA(slope, V_SET(k->view[8 + j]), V_SET(k->view[4 * i + j])));
         for (int j = 0; j < 3; j++) /* m = J W R S */
-            p->m[i][j] = VMUL(
-                p->s[j], VDOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
+            p->m[i][j] = V_MUL(
+                p->s[j], V_DOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
     }
-    p->a = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
-    p->b = VDOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
-    p->c = VDOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
+    p->a = V_DOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
+    p->b = V_DOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
+    p->c = V_DOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
     /* difference of products, its rounding error put back by the fused operation */
     for (int i = 0; i < 3; i++) {
         V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3],
           v1 = p->m[1][(i + 1) % 3];
-        V product = VMUL(u1, v1);
-        p->cross[i] = VADD(VFMA(u0, v0, VNEG(product)), VFNMA(u1, v1, product));
+        V product = V_MUL(u1, v1);
+        p->cross[i] = V_ADD(V_FMA(u0, v0, V_NEG(product)), V_FNMA(u1, v1, product));
     }
-    p->det0 = VDOT3(p->cross[0], p->cross[1], p->cross[2], p->cross[0], p->cross[1], p->cross[2]);
+    p->det0 = V_DOT3(p->cross[0], p->cross[1], p->cross[2], p->cross[0], p->cross[1], p->cross[2]);
     if (k->blur == SSDGS_BLUR_ADD) {
-        p->h = VSET(k->variance);
+        p->h = V_SET(k->variance);
     } else {
-        V mean = VMUL(VSET(0.5), VADD(p->a, p->c)), half = VMUL(VSET(0.5), VSUB(p->a, p->c));
-        V largest = VADD(mean, VSQRT(VFMA(half, half, VMUL(p->b, p->b))));
-        p->h = VMAX(VSET(0), VSUB(VSET(k->variance), VDIV(p->det0, VMAX(largest, VSET(1e-30)))));
+        V mean = V_MUL(V_SET(0.5), V_ADD(p->a, p->c)), half = V_MUL(V_SET(0.5), V_SUB(p->a, p->c));
+        V largest = V_ADD(mean, V_SQRT(V_FMA(half, half, V_MUL(p->b, p->b))));
+        p->h = V_MAX(V_SET(0), V_SUB(V_SET(k->variance), V_DIV(p->det0, V_MAX(largest, V_SET(1e-30)))));
     }
-    p->det = VADD(p->det0, VMUL(p->h, VADD(VADD(p->a, p->c), p->h)));
-    p->inverse_det = VDIV(VSET(1), p->det);
-    const V high = VADD(p->c, p->h), inverse_high = VDIV(VSET(1), high);
-    p->ux = VSQRT(VMUL(high, p->inverse_det));
-    p->uy = VMUL(p->ux, VNEG(VMUL(p->b, inverse_high)));
-    p->wy = VSQRT(inverse_high);
-    p->opacity = VSEL(off, VSET(0), VLOAD(g + (size_t)SSDGS_OPACITY * stride));
-    p->clear = VEXP(VNEG(VMAX(VSET(-SSDGS__MOST_RAW), VMIN(VSET(SSDGS__MOST_RAW), p->opacity))));
-    p->opacity = VDIV(VSET(1), VADD(VSET(1), p->clear));
-    p->clear = VMUL(p->clear, p->opacity);
+    p->det = V_ADD(p->det0, V_MUL(p->h, V_ADD(V_ADD(p->a, p->c), p->h)));
+    p->inverse_det = V_DIV(V_SET(1), p->det);
+    const V high = V_ADD(p->c, p->h), inverse_high = V_DIV(V_SET(1), high);
+    p->ux = V_SQRT(V_MUL(high, p->inverse_det));
+    p->uy = V_MUL(p->ux, V_NEG(V_MUL(p->b, inverse_high)));
+    p->wy = V_SQRT(inverse_high);
+    p->opacity = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)SSDGS_OPACITY * stride));
+    p->clear = V_EXP(V_NEG(V_MAX(V_SET(-SSDGS__MOST_RAW), V_MIN(V_SET(SSDGS__MOST_RAW), p->opacity))));
+    p->opacity = V_DIV(V_SET(1), V_ADD(V_SET(1), p->clear));
+    p->clear = V_MUL(p->clear, p->opacity);
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
                           size_t end, ssdgs_record *record, R *depth) {
-    const V log2e = VSET(1.44269504088896341), unit = VSET(0.84932180028801904); /* sqrt(log2(e) / 2) */
+    const V log2e = V_SET(1.44269504088896341), unit = V_SET(0.84932180028801904); /* sqrt(log2(e) / 2) */
     F(rim) rim;
     F(rim_of)(k, &rim);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
         F(projection) p;
-        F(project_lanes)(&p, k, gaussians + i, stride, VLT(VSET(1), VSET(0)));
+        F(project_lanes)(&p, k, gaussians + i, stride, V_LT(V_SET(1), V_SET(0)));
         F(fade)(k, &rim, &p);
-        V opacity = VMUL(p.opacity, p.fade);
-        if (k->compensate) opacity = VMUL(opacity, VSQRT(VMUL(p.det0, p.inverse_det)));
-        const V log2_opacity = VMUL(VLOG(VMAX(opacity, VSET(1e-30))), log2e);
-        const V x = VFMA(VMUL(VSET(k->fx), p.t[0]), p.inverse_z, VSET(k->cx));
-        const V y = VFMA(VMUL(VSET(k->fy), p.t[1]), p.inverse_z, VSET(k->cy));
-        const V reach =
-            VMAX(VSET(0), VMUL(VSET(2 * 0.69314718055994531), VSUB(log2_opacity, VSET(k->log2_threshold))));
-        const V ex = VSQRT(VMUL(reach, VADD(p.a, p.h)));
-        const V ey = VSQRT(VMUL(reach, VADD(p.c, p.h)));
-        const V d = k->by_distance ? VSQRT(VDOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
+        V opacity = V_MUL(p.opacity, p.fade);
+        if (k->compensate) opacity = V_MUL(opacity, V_SQRT(V_MUL(p.det0, p.inverse_det)));
+        const V log2_opacity = V_MUL(V_LOG(V_MAX(opacity, V_SET(1e-30))), log2e);
+        const V x = V_FMA(V_MUL(V_SET(k->fx), p.t[0]), p.inverse_z, V_SET(k->cx));
+        const V y = V_FMA(V_MUL(V_SET(k->fy), p.t[1]), p.inverse_z, V_SET(k->cy));
+        const V reach = V_MAX(
+            V_SET(0), V_MUL(V_SET(2 * 0.69314718055994531), V_SUB(log2_opacity, V_SET(k->log2_threshold))));
+        const V ex = V_SQRT(V_MUL(reach, V_ADD(p.a, p.h)));
+        const V ey = V_SQRT(V_MUL(reach, V_ADD(p.c, p.h)));
+        const V d = k->by_distance ? V_SQRT(V_DOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
         /* NaN fails every comparison, so nothing that is not finite is drawn */
-        VM drawn = VAND(VGE(log2_opacity, VSET(k->log2_threshold)),
-                        VAND(VLT(VSET(k->near_plane), p.t[2]), VLT(p.t[2], VSET(1e30))));
-        drawn = VAND(drawn, VLT(VADD(ex, ey), VSET(1e9)));
-        drawn = VAND(drawn, VAND(VLT(VSET(0), p.det), VLT(p.det, VSET(1e37))));
-        drawn = VAND(drawn, VAND(VGE(VADD(x, ex), VSET(0.5)), VGE(VSET((R)k->width - (R)0.5), VSUB(x, ex))));
-        drawn = VAND(drawn, VAND(VGE(VADD(y, ey), VSET(0.5)), VGE(VSET((R)k->height - (R)0.5), VSUB(y, ey))));
-        VSTORE(depth + i, VSEL(drawn, VMUL(d, VSET(k->depth_scale)), VSET(-1)));
-        if (!VBITS(drawn)) continue;
+        VM drawn = V_AND(V_GE(log2_opacity, V_SET(k->log2_threshold)),
+                         V_AND(V_LT(V_SET(k->near_plane), p.t[2]), V_LT(p.t[2], V_SET(1e30))));
+        drawn = V_AND(drawn, V_LT(V_ADD(ex, ey), V_SET(1e9)));
+        drawn = V_AND(drawn, V_AND(V_LT(V_SET(0), p.det), V_LT(p.det, V_SET(1e37))));
+        drawn = V_AND(drawn,
+                      V_AND(V_GE(V_ADD(x, ex), V_SET(0.5)), V_GE(V_SET((R)k->width - (R)0.5), V_SUB(x, ex))));
+        drawn = V_AND(
+            drawn, V_AND(V_GE(V_ADD(y, ey), V_SET(0.5)), V_GE(V_SET((R)k->height - (R)0.5), V_SUB(y, ey))));
+        V_STORE(depth + i, V_SEL(drawn, V_MUL(d, V_SET(k->depth_scale)), V_SET(-1)));
+        if (!V_BITS(drawn)) continue;
         R fields[8][SSDGS__VW];
-        VSTORE(fields[0], x);
-        VSTORE(fields[1], y);
-        VSTORE(fields[2], VMUL(unit, p.ux));
-        VSTORE(fields[3], VMUL(unit, p.uy));
-        VSTORE(fields[4], VMUL(unit, p.wy));
-        VSTORE(fields[5], log2_opacity);
-        VSTORE(fields[6], ex);
-        VSTORE(fields[7], ey);
+        V_STORE(fields[0], x);
+        V_STORE(fields[1], y);
+        V_STORE(fields[2], V_MUL(unit, p.ux));
+        V_STORE(fields[3], V_MUL(unit, p.uy));
+        V_STORE(fields[4], V_MUL(unit, p.wy));
+        V_STORE(fields[5], log2_opacity);
+        V_STORE(fields[6], ex);
+        V_STORE(fields[7], ey);
 #if SSDGS__VW >= 4
         for (int f = 0; f < 8; f += 4)
             for (int l = 0; l < SSDGS__VW; l += 4)
@@ -12964,29 +12848,29 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
 SSDGS__FI void F(fade_backward)(const ssdgs__projection *k, const F(rim) * rim, const F(projection) * p, V g,
                                 const R *raw, size_t stride, R *gradient, size_t gradient_stride, V dr[9],
                                 V push[3], V view_sum[12][SSDGS__NV], size_t v) {
-    const V zero = VSET(0), one = VSET(1);
-    const V dq = VDIV(g, VMAX(VFNMA(p->deep, VSUB(one, p->beside), one), VSET(1e-20)));
+    const V zero = V_SET(0), one = V_SET(1);
+    const V dq = V_DIV(g, V_MAX(V_FNMA(p->deep, V_SUB(one, p->beside), one), V_SET(1e-20)));
     for (int i = 0; i < 2; i++) { /* beside = ((1 + edge^2) / (1 + slope^2))^2 .. */
-        const V down = VDIV(VMUL(VSET(-4), p->slope[i]), VFMA(p->slope[i], p->slope[i], one));
-        push[i] = VSEL(VLT(zero, VABS(VSUB(p->slope[i], p->edge[i]))),
-                       VMUL(VMUL(dq, p->deep), VMUL(p->beside, down)), zero);
+        const V down = V_DIV(V_MUL(V_SET(-4), p->slope[i]), V_FMA(p->slope[i], p->slope[i], one));
+        push[i] = V_SEL(V_LT(zero, V_ABS(V_SUB(p->slope[i], p->edge[i]))),
+                        V_MUL(V_MUL(dq, p->deep), V_MUL(p->beside, down)), zero);
     }
     /* axis_j = s_j / z (view row 2 . r_j) */
     const V steep =
-        VSEL(VAND(VLT(zero, p->deep), VLT(p->deep, one)),
-             VMUL(VMUL(dq, VSUB(one, p->beside)), VSET(-2 / (SSDGS__FAR_BACK - SSDGS__BACK))), zero);
-    push[2] = VMUL(VNEG(VMUL(steep, p->back)), p->inverse_z);
-    push[2] = VADD(push[2], VSEL(VAND(VLT(zero, p->rise), VLT(p->rise, one)),
-                                 VDIV(VMUL(g, rim->inverse_near), VMAX(p->rise, VSET(1e-20))), zero));
+        V_SEL(V_AND(V_LT(zero, p->deep), V_LT(p->deep, one)),
+              V_MUL(V_MUL(dq, V_SUB(one, p->beside)), V_SET(-2 / (SSDGS__FAR_BACK - SSDGS__BACK))), zero);
+    push[2] = V_MUL(V_NEG(V_MUL(steep, p->back)), p->inverse_z);
+    push[2] = V_ADD(push[2], V_SEL(V_AND(V_LT(zero, p->rise), V_LT(p->rise, one)),
+                                   V_DIV(V_MUL(g, rim->inverse_near), V_MAX(p->rise, V_SET(1e-20))), zero));
     for (int j = 0; j < 3; j++) {
-        const V by_axis = VMUL(steep, p->axis[j]), along = VMUL(by_axis, VMUL(p->s[j], p->inverse_z));
+        const V by_axis = V_MUL(steep, p->axis[j]), along = V_MUL(by_axis, V_MUL(p->s[j], p->inverse_z));
         R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride;
-        const V held = VABS(VLOAD(raw + (size_t)(SSDGS_LOG_SCALE + j) * stride));
-        VSTORE(d_scale,
-               VADD(VLOAD(d_scale), VSEL(VLT(held, VSET(SSDGS__MOST_RAW)), VMUL(by_axis, p->axis[j]), zero)));
+        const V held = V_ABS(V_LOAD(raw + (size_t)(SSDGS_LOG_SCALE + j) * stride));
+        V_STORE(d_scale, V_ADD(V_LOAD(d_scale),
+                               V_SEL(V_LT(held, V_SET(SSDGS__MOST_RAW)), V_MUL(by_axis, p->axis[j]), zero)));
         for (int l = 0; l < 3; l++) {
-            dr[3 * l + j] = VFMA(along, VSET(k->view[8 + l]), dr[3 * l + j]);
-            view_sum[8 + l][v] = VFMA(along, p->r[3 * l + j], view_sum[8 + l][v]);
+            dr[3 * l + j] = V_FMA(along, V_SET(k->view[8 + l]), dr[3 * l + j]);
+            view_sum[8 + l][v] = V_FMA(along, p->r[3 * l + j], view_sum[8 + l][v]);
         }
     }
 }
@@ -13000,7 +12884,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
     const size_t gradient_stride = out->stride;
     V view_sum[12][SSDGS__NV];
     for (int j = 0; j < 12; j++)
-        for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = VSET(0);
+        for (int l = 0; l < SSDGS__NV; l++) view_sum[j][l] = V_SET(0);
     F(rim) rim;
     F(rim_of)(k, &rim);
     for (size_t i = begin; i < end; i += SSDGS__VW) {
@@ -13009,21 +12893,21 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         for (int l = 0; l < SSDGS__VW; l++)
             for (int j = 0; j < 8; j++)
                 lane[j][l] = j == 6 ? 0 : splat[(i + (size_t)l) * SSDGS__SPLAT + (size_t)j];
-        V total = VSET(0);
+        V total = V_SET(0);
         V g[8];
         for (int j = 0; j < 8; j++) {
-            g[j] = VLOAD(lane[j]);
-            total = VADD(total, VABS(g[j]));
+            g[j] = V_LOAD(lane[j]);
+            total = V_ADD(total, V_ABS(g[j]));
         }
-        const VM off = VGE(VSET(0), total); /* NaN stays in, to be refused */
-        if (VBITS(off) == (1 << SSDGS__VW) - 1) continue;
+        const VM off = V_GE(V_SET(0), total); /* NaN stays in, to be refused */
+        if (V_BITS(off) == (1 << SSDGS__VW) - 1) continue;
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, off);
         F(fade)(k, &rim, &p);
-        const V ux_by_high = VMUL(p.ux, VMUL(p.wy, p.wy));
-        const V inverse_det0 = VDIV(VSET(1), VMAX(p.det0, VSET(1e-20)));
+        const V ux_by_high = V_MUL(p.ux, V_MUL(p.wy, p.wy));
+        const V inverse_det0 = V_DIV(V_SET(1), V_MAX(p.det0, V_SET(1e-20)));
         V du[2][3];
-        for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = VSET(0);
+        for (int j = 0; j < 3; j++) du[0][j] = du[1][j] = V_SET(0);
         /* m = (J W) (R S), covariance C = m m' + h, conic K = 1 / C = U' U. With M = sum of dL/d(ln alpha) v
            v', v = U (pixel - centre), and n = U m: dL/dm = U' M n, dL/d(ln s_j) = n_j.M n_j. Multiplied
            out, U m and K m of a thin Gaussian cancel; det K m = h m + (m1 x X, X x m0), X = m0 x m1, does
@@ -13031,73 +12915,75 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         V dr[9];
         for (int j = 0; j < 3; j++) {
             const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            const V across0 = VFNMA(p.m[1][j2], p.cross[j1], VMUL(p.m[1][j1], p.cross[j2])),
-                    along0 = VFMA(p.h, p.m[0][j], across0);
-            const V n0 = VMUL(ux_by_high, along0), n1 = VMUL(p.wy, p.m[1][j]);
-            const V mn0 = VFMA(g[2], n0, VMUL(g[3], n1)), mn1 = VFMA(g[3], n0, VMUL(g[4], n1));
-            V dm0 = VMUL(p.ux, mn0), dm1 = VFMA(p.uy, mn0, VMUL(p.wy, mn1));
+            const V across0 = V_FNMA(p.m[1][j2], p.cross[j1], V_MUL(p.m[1][j1], p.cross[j2])),
+                    along0 = V_FMA(p.h, p.m[0][j], across0);
+            const V n0 = V_MUL(ux_by_high, along0), n1 = V_MUL(p.wy, p.m[1][j]);
+            const V mn0 = V_FMA(g[2], n0, V_MUL(g[3], n1)), mn1 = V_FMA(g[3], n0, V_MUL(g[4], n1));
+            V dm0 = V_MUL(p.ux, mn0), dm1 = V_FMA(p.uy, mn0, V_MUL(p.wy, mn1));
             R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
-            V raw = VLOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
-              ds = VFMA(n0, mn0, VMUL(n1, mn1));
+            V raw = V_LOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
+              ds = V_FMA(n0, mn0, V_MUL(n1, mn1));
             if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
-                const V across1 = VFNMA(p.m[0][j1], p.cross[j2], VMUL(p.m[0][j2], p.cross[j1])),
-                        along1 = VFMA(p.h, p.m[1][j], across1);
-                const V push0 = VMUL(g[5], VFNMA(along0, p.inverse_det, VMUL(across0, inverse_det0))),
-                        push1 = VMUL(g[5], VFNMA(along1, p.inverse_det, VMUL(across1, inverse_det0)));
-                dm0 = VADD(dm0, push0);
-                dm1 = VADD(dm1, push1);
-                ds = VFMA(push0, p.m[0][j], VFMA(push1, p.m[1][j], ds));
+                const V across1 = V_FNMA(p.m[0][j1], p.cross[j2], V_MUL(p.m[0][j2], p.cross[j1])),
+                        along1 = V_FMA(p.h, p.m[1][j], across1);
+                const V push0 = V_MUL(g[5], V_FNMA(along0, p.inverse_det, V_MUL(across0, inverse_det0))),
+                        push1 = V_MUL(g[5], V_FNMA(along1, p.inverse_det, V_MUL(across1, inverse_det0)));
+                dm0 = V_ADD(dm0, push0);
+                dm1 = V_ADD(dm1, push1);
+                ds = V_FMA(push0, p.m[0][j], V_FMA(push1, p.m[1][j], ds));
             }
-            VSTORE(d_scale, VADD(VLOAD(d_scale), VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), ds, VSET(0))));
-            dm0 = VMUL(dm0, p.s[j]);
-            dm1 = VMUL(dm1, p.s[j]);
+            V_STORE(d_scale,
+                    V_ADD(V_LOAD(d_scale), V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__MOST_RAW)), ds, V_SET(0))));
+            dm0 = V_MUL(dm0, p.s[j]);
+            dm1 = V_MUL(dm1, p.s[j]);
             for (int l = 0; l < 3; l++) {
-                dr[3 * l + j] = VFMA(dm0, p.row[0][l], VMUL(dm1, p.row[1][l]));
-                du[0][l] = VFMA(dm0, p.r[3 * l + j], du[0][l]);
-                du[1][l] = VFMA(dm1, p.r[3 * l + j], du[1][l]);
+                dr[3 * l + j] = V_FMA(dm0, p.row[0][l], V_MUL(dm1, p.row[1][l]));
+                du[0][l] = V_FMA(dm0, p.r[3 * l + j], du[0][l]);
+                du[1][l] = V_FMA(dm1, p.r[3 * l + j], du[1][l]);
             }
         }
         V push[3];
-        for (int j = 0; j < 3; j++) push[j] = VSET(0);
-        if (VBITS(VLT(p.fade, VSET(1)))) F(fade_backward)
+        for (int j = 0; j < 3; j++) push[j] = V_SET(0);
+        if (V_BITS(V_LT(p.fade, V_SET(1)))) F(fade_backward)
         (k, &rim, &p, g[5], gaussians + i, stride, gradient + i, gradient_stride, dr, push, view_sum, v);
         V dq[4];
         F(rotation_backward)(dq, p.q, p.inverse_q, dr);
         for (int j = 0; j < 4; j++) {
             R *d = gradient + (size_t)(SSDGS_ROTATION + j) * gradient_stride + i;
-            VSTORE(d, VADD(VLOAD(d), dq[j]));
+            V_STORE(d, V_ADD(V_LOAD(d), dq[j]));
         }
         { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
             R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
-            V raw = VLOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
-            V logit = VSEL(VLT(VABS(raw), VSET(SSDGS__MOST_RAW)), VMUL(g[5], p.clear), VSET(0));
-            VSTORE(d, VADD(VLOAD(d), logit));
+            V raw = V_LOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
+            V logit = V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__MOST_RAW)), V_MUL(g[5], p.clear), V_SET(0));
+            V_STORE(d, V_ADD(V_LOAD(d), logit));
         }
         V dt[3];
-        dt[2] = VADD(g[7], push[2]);
+        dt[2] = V_ADD(g[7], push[2]);
         for (int l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
-            V focal = VSET(l ? k->fy : k->fx), scaled = VMUL(focal, p.inverse_z),
-              slope = VMUL(p.t[l], p.inverse_z);
-            V w0 = VSET(k->view[4 * l]), w1 = VSET(k->view[4 * l + 1]), w2 = VSET(k->view[4 * l + 2]);
-            V dj = VDOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
-            V dj2 =
-                VDOT3(du[l][0], du[l][1], du[l][2], VSET(k->view[8]), VSET(k->view[9]), VSET(k->view[10]));
-            V dslope = VADD(push[l], VFNMA(scaled, dj2, VMUL(focal, g[l]))); /* slope = t / z stands in J and
-                                                                               in the centre, and fades */
-            dt[l] = VMUL(dslope, p.inverse_z);
-            dt[2] = VFNMA(VMUL(dslope, slope), p.inverse_z, dt[2]);
-            dt[2] = VFNMA(VMUL(scaled, p.inverse_z), VFNMA(slope, dj2, dj), dt[2]);
+            V focal = V_SET(l ? k->fy : k->fx), scaled = V_MUL(focal, p.inverse_z),
+              slope = V_MUL(p.t[l], p.inverse_z);
+            V w0 = V_SET(k->view[4 * l]), w1 = V_SET(k->view[4 * l + 1]), w2 = V_SET(k->view[4 * l + 2]);
+            V dj = V_DOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
+            V dj2 = V_DOT3(du[l][0], du[l][1], du[l][2], V_SET(k->view[8]), V_SET(k->view[9]),
+                           V_SET(k->view[10]));
+            V dslope = V_ADD(push[l], V_FNMA(scaled, dj2, V_MUL(focal, g[l]))); /* slope = t / z stands in J
+                                                                               and in the centre, and fades */
+            dt[l] = V_MUL(dslope, p.inverse_z);
+            dt[2] = V_FNMA(V_MUL(dslope, slope), p.inverse_z, dt[2]);
+            dt[2] = V_FNMA(V_MUL(scaled, p.inverse_z), V_FNMA(slope, dj2, dj), dt[2]);
             for (int j = 0; j < 3; j++) {
-                view_sum[4 * l + j][v] = VFMA(scaled, du[l][j], view_sum[4 * l + j][v]);
-                view_sum[8 + j][v] = VFNMA(VMUL(scaled, slope), du[l][j], view_sum[8 + j][v]);
+                view_sum[4 * l + j][v] = V_FMA(scaled, du[l][j], view_sum[4 * l + j][v]);
+                view_sum[8 + j][v] = V_FNMA(V_MUL(scaled, slope), du[l][j], view_sum[8 + j][v]);
             }
         }
         for (int j = 0; j < 3; j++) {
             R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
-            V dx = VDOT3(dt[0], dt[1], dt[2], VSET(k->view[j]), VSET(k->view[4 + j]), VSET(k->view[8 + j]));
-            VSTORE(d, VADD(VLOAD(d), dx));
-            for (int l = 0; l < 3; l++) view_sum[4 * j + l][v] = VFMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
-            view_sum[4 * j + 3][v] = VADD(view_sum[4 * j + 3][v], dt[j]);
+            V dx =
+                V_DOT3(dt[0], dt[1], dt[2], V_SET(k->view[j]), V_SET(k->view[4 + j]), V_SET(k->view[8 + j]));
+            V_STORE(d, V_ADD(V_LOAD(d), dx));
+            for (int l = 0; l < 3; l++) view_sum[4 * j + l][v] = V_FMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
+            view_sum[4 * j + 3][v] = V_ADD(view_sum[4 * j + 3][v], dt[j]);
         }
     }
     for (int j = 0; j < 12; j++) view_slot[j] = F(sum)(view_sum[j]);
@@ -13111,7 +12997,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
    nearest dx with the best dy for it, or nearest dy with the best dx. */
 SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R log2_threshold, int begin,
                           int end, uint32_t at) {
-    const V zero = VSET(0), side = VSET(3);
+    const V zero = V_SET(0), side = V_SET(3);
     for (int g = begin; g < end; g++) {
         const ssdgs_record *record = view->record + g;
         const uint16_t *box = boxes + 4 * (size_t)g;
@@ -13120,25 +13006,27 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
         of->first = at;
         of->count = 0;
         if (!left) continue;
-        const V ux = VSET(record->ux), uy = VSET(record->uy), wy = VSET(record->wy);
-        const V best_x = VSET(-record->uy / record->ux);
-        const V best_y = VSET(-record->ux * record->uy / (record->uy * record->uy + record->wy * record->wy));
-        const V terms = VFMA(ux, VSET(record->extent_x), VMUL(VABS(uy), VSET(record->extent_y)));
+        const V ux = V_SET(record->ux), uy = V_SET(record->uy), wy = V_SET(record->wy);
+        const V best_x = V_SET(-record->uy / record->ux);
+        const V best_y =
+            V_SET(-record->ux * record->uy / (record->uy * record->uy + record->wy * record->wy));
+        const V terms = V_FMA(ux, V_SET(record->extent_x), V_MUL(V_ABS(uy), V_SET(record->extent_y)));
         /* with more than the rounding of u^2 + w^2, so no pixel that blends is missed */
-        const V most = VFMA(VSET(4e-6), terms, VSET(record->log2_opacity - log2_threshold + (R)1e-3));
+        const V most = V_FMA(V_SET(4e-6), terms, V_SET(record->log2_opacity - log2_threshold + (R)1e-3));
         for (; left; left--) { /* one loop: its end is the only branch that is hard to foresee */
             unsigned touched = 0;
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                V x0 = VADD(VLOAD(ssdgs__micro_x + v * SSDGS__VW), VSET((R)(16 * tx) - record->x)),
-                  x1 = VADD(x0, side);
-                V y0 = VADD(VLOAD(ssdgs__micro_y + v * SSDGS__VW), VSET((R)(16 * ty) - record->y)),
-                  y1 = VADD(y0, side);
-                V near_x = VMAX(x0, VMIN(zero, x1)), near_y = VMAX(y0, VMIN(zero, y1));
-                V on_x = VMAX(x0, VMIN(VMUL(best_x, near_y), x1)),
-                  on_y = VMAX(y0, VMIN(VMUL(best_y, near_x), y1));
-                V u = VMIN(VABS(VFMA(ux, near_x, VMUL(uy, on_y))), VABS(VFMA(ux, on_x, VMUL(uy, near_y))));
-                V w = VMUL(wy, on_y); /* where the second side has the least value, on_y is near_y */
-                touched |= (unsigned)VBITS(VGE(most, VFMA(u, u, VMUL(w, w)))) << v * SSDGS__VW;
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V x0 = V_ADD(V_LOAD(ssdgs__micro_x + v * SSDGS__VW), V_SET((R)(16 * tx) - record->x)),
+                  x1 = V_ADD(x0, side);
+                V y0 = V_ADD(V_LOAD(ssdgs__micro_y + v * SSDGS__VW), V_SET((R)(16 * ty) - record->y)),
+                  y1 = V_ADD(y0, side);
+                V near_x = V_MAX(x0, V_MIN(zero, x1)), near_y = V_MAX(y0, V_MIN(zero, y1));
+                V on_x = V_MAX(x0, V_MIN(V_MUL(best_x, near_y), x1)),
+                  on_y = V_MAX(y0, V_MIN(V_MUL(best_y, near_x), y1));
+                V u = V_MIN(V_ABS(V_FMA(ux, near_x, V_MUL(uy, on_y))),
+                            V_ABS(V_FMA(ux, on_x, V_MUL(uy, near_y))));
+                V w = V_MUL(wy, on_y); /* where the second side has the least value, on_y is near_y */
+                touched |= (unsigned)V_BITS(V_GE(most, V_FMA(u, u, V_MUL(w, w)))) << v * SSDGS__VW;
             }
             view->instance[at].place = (uint32_t)(ty * view->tiles_x + tx);
             view->instance[at].mask = touched;
@@ -13178,7 +13066,7 @@ SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
         __m128i half[2];
         half[0] = _mm_packus_epi16(_mm_and_si128(a, low), _mm_and_si128(b, low));
         half[1] = _mm_packus_epi16(_mm_srli_epi16(a, 8), _mm_srli_epi16(b, 8));
-        VUNROLL for (int micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
+        V_UNROLL for (int micro = 15; micro >= 0; micro--) { /* the top bits of sixteen bytes at a time */
             batch->entries[micro] |= (uint64_t)(unsigned)_mm_movemask_epi8(half[micro / 8]) << i;
             half[micro / 8] = _mm_add_epi8(half[micro / 8], half[micro / 8]);
         }
@@ -13190,7 +13078,7 @@ SSDGS__FI void F(batch_transpose)(F(batch) * batch, int count) {
         v128_t half[2];
         half[0] = wasm_i8x16_shuffle(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
         half[1] = wasm_i8x16_shuffle(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-        VUNROLL for (int micro = 15; micro >= 0; micro--) {
+        V_UNROLL for (int micro = 15; micro >= 0; micro--) {
             batch->entries[micro] |= (uint64_t)wasm_i8x16_bitmask(half[micro / 8]) << i;
             half[micro / 8] = wasm_i8x16_add(half[micro / 8], half[micro / 8]);
         }
@@ -13229,30 +13117,30 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
 /* alpha of one record at VW pixels, 0 where below the threshold; *drawn is that test. */
 SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V *u, V *w, V *raw,
                      VM *drawn) {
-    const V dx = VSUB(px, VSET(record->x)), dy = VSUB(py, VSET(record->y));
-    *u = VFMA(VSET(record->ux), dx, VMUL(VSET(record->uy), dy));
-    *w = VMUL(VSET(record->wy), dy);
-    const V p = VFNMA(*u, *u, VFNMA(*w, *w, VSET(record->log2_opacity)));
-    *drawn = VGE(p, log2_threshold);
+    const V dx = V_SUB(px, V_SET(record->x)), dy = V_SUB(py, V_SET(record->y));
+    *u = V_FMA(V_SET(record->ux), dx, V_MUL(V_SET(record->uy), dy));
+    *w = V_MUL(V_SET(record->wy), dy);
+    const V p = V_FNMA(*u, *u, V_FNMA(*w, *w, V_SET(record->log2_opacity)));
+    *drawn = V_GE(p, log2_threshold);
     *raw = F(exp2)(p);
-    return VSEL(*drawn, VMIN(*raw, VSET(SSDGS__ALPHA_MAX)), VSET(0));
+    return V_SEL(*drawn, V_MIN(*raw, V_SET(SSDGS__ALPHA_MAX)), V_SET(0));
 }
 
 /* alpha, but 0 and not drawn where the entry is not nearer than scene_depth. */
 SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, R depth, V alpha, VM *drawn) {
-    const VM nearer = VLT(VSET(depth), VLOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
-    *drawn = VAND(*drawn, nearer);
-    return VSEL(nearer, alpha, VSET(0));
+    const VM nearer = V_LT(V_SET(depth), V_LOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
+    *drawn = V_AND(*drawn, nearer);
+    return V_SEL(nearer, alpha, V_SET(0));
 }
 
 /* Within a batch transmittance runs on below the stop: no select in the chain of products. Between batches
    -1 marks a pixel that has stopped. */
-SSDGS__FI V F(unstopped)(V t, V stop) { return VSEL(VGE(t, stop), t, VSET(-1)); }
+SSDGS__FI V F(unstopped)(V t, V stop) { return V_SEL(V_GE(t, stop), t, V_SET(-1)); }
 
 SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py) {
     for (int v = 0; v < SSDGS__NV; v++) {
-        px[v] = VADD(VLOAD(ssdgs__lane_x + v * SSDGS__VW), VSET(tile->x + 4 * (micro & 3)));
-        py[v] = VADD(VLOAD(ssdgs__lane_y + v * SSDGS__VW), VSET(tile->y + 4 * (micro >> 2)));
+        px[v] = V_ADD(V_LOAD(ssdgs__lane_x + v * SSDGS__VW), V_SET(tile->x + 4 * (micro & 3)));
+        py[v] = V_ADD(V_LOAD(ssdgs__lane_y + v * SSDGS__VW), V_SET(tile->y + 4 * (micro >> 2)));
     }
 }
 
@@ -13261,8 +13149,8 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
    so what no pixel needs adds up to no more than that in any. */
 SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed) {
     const int thrifty = needed != NULL;
-    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
-    const V budget = VSET(tile->max_error), slight = VSET(tile->max_error * SSDGS__SHARE);
+    const V threshold = V_SET(tile->log2_threshold), stop = V_SET(tile->stop);
+    const V budget = V_SET(tile->max_error), slight = V_SET(tile->max_error * SSDGS__SHARE);
     F(batch) batch;
     uint32_t from = 0;
     unsigned live = 0xFFFF;
@@ -13283,38 +13171,38 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
             V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
             V t[SSDGS__NV], over[SSDGS__NV];
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
-                over[v] = VLOAD(passed_over[micro] + v * SSDGS__VW);
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                t[v] = V_LOAD(transmittance[micro] + v * SSDGS__VW);
+                over[v] = V_LOAD(passed_over[micro] + v * SSDGS__VW);
             }
             for (; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
                 const uint32_t place = batch.place[index];
                 int any = 0, must = 0;
-                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V u, w, raw;
                     VM drawn;
                     V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
                         alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
-                    const VM blended = VAND(drawn, VGE(t[v], stop));
-                    any |= VBITS(blended);
+                    const VM blended = V_AND(drawn, V_GE(t[v], stop));
+                    any |= V_BITS(blended);
                     if (thrifty &&
                         !needed[place]) { /* what is needed uses no budget; past it all is needed */
-                        const V blend = VMUL(alpha, t[v]);
-                        const VM light = VGE(slight, blend);
-                        over[v] = VADD(over[v], VSEL(VAND(light, blended), blend, VSET(0)));
-                        must |= VBITS(blended) & ~VBITS(VAND(light, VGE(budget, over[v])));
+                        const V blend = V_MUL(alpha, t[v]);
+                        const VM light = V_GE(slight, blend);
+                        over[v] = V_ADD(over[v], V_SEL(V_AND(light, blended), blend, V_SET(0)));
+                        must |= V_BITS(blended) & ~V_BITS(V_AND(light, V_GE(budget, over[v])));
                     }
-                    t[v] = VFNMA(alpha, t[v], t[v]);
+                    t[v] = V_FNMA(alpha, t[v], t[v]);
                 }
                 blends[place] = (uint16_t)(blends[place] | (unsigned)(any != 0) << micro);
                 if (thrifty) needed[place] = (unsigned char)(needed[place] | (must != 0));
             }
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
-                VSTORE(passed_over[micro] + v * SSDGS__VW, over[v]);
-                alive |= VBITS(VGE(t[v], stop));
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_STORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
+                V_STORE(passed_over[micro] + v * SSDGS__VW, over[v]);
+                alive |= V_BITS(V_GE(t[v], stop));
             }
             if (!alive) live &= ~(1u << micro);
         }
@@ -13329,12 +13217,12 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
    Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. An entry all
    of whose micro-tiles are dark is not sampled either, unless its Gaussian lies in other tiles too. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
-    const V threshold = VSET(tile->log2_threshold), one = VSET(1);
+    const V threshold = V_SET(tile->log2_threshold), one = V_SET(1);
     const int all = tile->flux || tile->light_map, cue = tile->cue, flux = tile->flux;
     V nothing[SSDGS__NV];
     uint32_t applying = 0, sampling = 0;
     unsigned lit = 0xFFFF; /* micro-tiles that are not dark */
-    for (int v = 0; v < SSDGS__NV; v++) nothing[v] = VSET(0);
+    for (int v = 0; v < SSDGS__NV; v++) nothing[v] = V_SET(0);
     /* met: sum of blend weight x distance; next: level to fall below */
     R transmittance[16][16], met[16][16], next[16][16];
     for (int micro = 0; micro < 16; micro++)
@@ -13378,10 +13266,10 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         F(batch_transpose)(&sampled, samples);
         V lanes[SSDGS__BATCH][3][SSDGS__NV]; /* the sums before the lanes are added up */
         for (int i = 0; i < samples; i++)
-            for (int v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = VSET(0);
+            for (int v = 0; v < 3 * SSDGS__NV; v++) lanes[i][v / SSDGS__NV][v % SSDGS__NV] = V_SET(0);
         V energy[SSDGS__BATCH][SSDGS__NV];
         for (int i = 0; flux && i < applies; i++)
-            for (int v = 0; v < SSDGS__NV; v++) energy[i][v] = VSET(0);
+            for (int v = 0; v < SSDGS__NV; v++) energy[i][v] = V_SET(0);
         /* transmittance and met, before the first applied and after each; 63 at most */
         R history[2][SSDGS__BATCH][16];
         for (int micro = 0; micro < 16; micro++) {
@@ -13390,70 +13278,70 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
             V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
             V t[SSDGS__NV], b[SSDGS__NV], omega[SSDGS__NV];
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 if (flux) {
-                    V u = VMUL(VSUB(px[v], VSET(tile->cx)), VSET(tile->inverse_focal));
-                    const V w = VMUL(VSUB(py[v], VSET(tile->cy)), VSET(tile->inverse_focal));
-                    const V cosine2 = tile->orthographic ? one : VDIV(one, VFMA(u, u, VFMA(w, w, one)));
-                    omega[v] =
-                        VMUL(VMUL(cosine2, VSQRT(cosine2)), VSET(tile->inverse_focal * tile->inverse_focal));
+                    V u = V_MUL(V_SUB(px[v], V_SET(tile->cx)), V_SET(tile->inverse_focal));
+                    const V w = V_MUL(V_SUB(py[v], V_SET(tile->cy)), V_SET(tile->inverse_focal));
+                    const V cosine2 = tile->orthographic ? one : V_DIV(one, V_FMA(u, u, V_FMA(w, w, one)));
+                    omega[v] = V_MUL(V_MUL(cosine2, V_SQRT(cosine2)),
+                                     V_SET(tile->inverse_focal * tile->inverse_focal));
                 }
-                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
-                VSTORE(history[0][0] + v * SSDGS__VW, t[v]);
+                t[v] = V_LOAD(transmittance[micro] + v * SSDGS__VW);
+                V_STORE(history[0][0] + v * SSDGS__VW, t[v]);
                 if (!cue) continue;
-                b[v] = VLOAD(met[micro] + v * SSDGS__VW);
-                VSTORE(history[1][0] + v * SSDGS__VW, b[v]);
+                b[v] = V_LOAD(met[micro] + v * SSDGS__VW);
+                V_STORE(history[1][0] + v * SSDGS__VW, b[v]);
             }
             for (uint64_t left = entries; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left);
-                const V distance = VSET(applied.distance[index]);
-                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                const V distance = V_SET(applied.distance[index]);
+                V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     const V before = t[v];
                     V u, w, raw;
                     VM drawn;
                     const V alpha =
                         F(alpha)(applied.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
-                    t[v] = VFNMA(alpha, before, before);
-                    VSTORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
-                    if (flux) energy[index][v] = VFMA(omega[v], VMUL(alpha, before), energy[index][v]);
+                    t[v] = V_FNMA(alpha, before, before);
+                    V_STORE(history[0][index + 1] + v * SSDGS__VW, t[v]);
+                    if (flux) energy[index][v] = V_FMA(omega[v], V_MUL(alpha, before), energy[index][v]);
                     if (cue) {
-                        b[v] = VFMA(VMUL(alpha, before), distance, b[v]);
-                        VSTORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
+                        b[v] = V_FMA(V_MUL(alpha, before), distance, b[v]);
+                        V_STORE(history[1][index + 1] + v * SSDGS__VW, b[v]);
                     }
                 }
             }
             unsigned fell = 0;
             for (int v = 0; v < SSDGS__NV; v++)
-                fell |= (unsigned)VBITS(VLT(t[v], VLOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
+                fell |= (unsigned)V_BITS(V_LT(t[v], V_LOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
             if (fell)
                 ssdgs__light_map_note(tile, micro, fell, entries, history[0], applied.distance, next[micro],
                                       steps[micro]);
             for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
-                const V distance = VSET(sampled.distance[index]);
+                const V distance = V_SET(sampled.distance[index]);
                 V(*sum)[SSDGS__NV] = lanes[index];
-                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                    const V past = VLOAD(history[0][then] + v * SSDGS__VW);
+                V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                    const V past = V_LOAD(history[0][then] + v * SSDGS__VW);
                     V u, w, raw;
                     VM drawn;
                     (void)F(alpha)(sampled.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
-                    raw = VSEL(drawn, raw, VSET(0)); /* opacity x rho; in the ratio the opacity cancels */
-                    sum[0][v] = VFMA(raw, past, sum[0][v]);
-                    sum[1][v] = VADD(sum[1][v], raw);
+                    raw = V_SEL(drawn, raw, V_SET(0)); /* opacity x rho; in the ratio the opacity cancels */
+                    sum[0][v] = V_FMA(raw, past, sum[0][v]);
+                    sum[1][v] = V_ADD(sum[1][v], raw);
                     if (cue)
-                        sum[2][v] = VFMA(
+                        sum[2][v] = V_FMA(
                             raw,
-                            VFNMA(distance, past, VSUB(distance, VLOAD(history[1][then] + v * SSDGS__VW))),
+                            V_FNMA(distance, past, V_SUB(distance, V_LOAD(history[1][then] + v * SSDGS__VW))),
                             sum[2][v]);
                 }
             }
             int alive = 0;
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW,
-                       VMAX(t[v], VSET(1e-20))); /* few subnormals deep inside */
-                if (cue) VSTORE(met[micro] + v * SSDGS__VW, b[v]);
-                alive |= VBITS(VGE(t[v], VSET(tile->stop)));
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_STORE(transmittance[micro] + v * SSDGS__VW,
+                        V_MAX(t[v], V_SET(1e-20))); /* few subnormals deep inside */
+                if (cue) V_STORE(met[micro] + v * SSDGS__VW, b[v]);
+                alive |= V_BITS(V_GE(t[v], V_SET(tile->stop)));
             }
             if (!alive) lit &= ~(1u << micro);
         }
@@ -13469,7 +13357,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
 /* pixels: [layer][micro-tile][3 colours, transmittance in the first layer][16 lanes]. */
 SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, const R *const *color,
                                    R *pixels) {
-    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop);
+    const V threshold = V_SET(tile->log2_threshold), stop = V_SET(tile->stop);
     F(batch) batch;
     uint32_t from = 0;
     const int at_once = SSDGS__NV == 1 ? layers : 1; /* as many sums as there are registers */
@@ -13499,48 +13387,48 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
             V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
             V t[SSDGS__NV], last[SSDGS__NV];
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                last[v] = VLOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
-                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                last[v] = V_LOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
+                t[v] = V_LOAD(transmittance[micro] + v * SSDGS__VW);
             }
             int used = 0;
             for (; left; left &= left - 1) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
-                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V u, w, raw;
-                    VM drawn, live = VGE(t[v], stop);
+                    VM drawn, live = V_GE(t[v], stop);
                     V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
                         alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
-                    VSTORE(weight[used] + v * SSDGS__VW, VSEL(live, VMUL(alpha, t[v]), VSET(0)));
+                    V_STORE(weight[used] + v * SSDGS__VW, V_SEL(live, V_MUL(alpha, t[v]), V_SET(0)));
                     const V before = t[v];
-                    t[v] = VFNMA(alpha, t[v], t[v]);
-                    last[v] = VSEL(live, t[v], last[v]);
+                    t[v] = V_FNMA(alpha, t[v], t[v]);
+                    last[v] = V_SEL(live, t[v], last[v]);
                     if (tile->median) {
                         R *to = tile->median + micro * 16 + v * SSDGS__VW;
-                        const VM fell = VAND(VAND(live, VGE(before, VSET(0.5))), VLT(t[v], VSET(0.5)));
-                        VSTORE(to, VSEL(fell, VSET(batch.distance[index]), VLOAD(to)));
+                        const VM fell = V_AND(V_AND(live, V_GE(before, V_SET(0.5))), V_LT(t[v], V_SET(0.5)));
+                        V_STORE(to, V_SEL(fell, V_SET(batch.distance[index]), V_LOAD(to)));
                     }
                 }
                 used += (int)(ours >> index & 1);
             }
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VSTORE(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW, last[v]);
-                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_STORE(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW, last[v]);
+                V_STORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
             }
             for (int layer = 0; layer < layers; layer += at_once, pixel += at_once * SSDGS__TILE_LAYER) {
                 V c[SSDGS__LAYERS][3][SSDGS__NV];
-                VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int v = 0; v < SSDGS__NV; v++)
-                    VUNROLL for (int i = 0; i < 3; i++) c[l][i][v] =
-                        VLOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
-                for (n = 0; n < used; n++) VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                        const V w = VLOAD(weight[n] + v * SSDGS__VW);
-                        VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int i = 0; i < 3; i++)
-                            c[l][i][v] = VFMA(w, VSET(local[layer + l][which[n]][i]), c[l][i][v]);
+                V_UNROLL for (int l = 0; l < at_once; l++) V_UNROLL for (int v = 0; v < SSDGS__NV; v++)
+                    V_UNROLL for (int i = 0; i < 3; i++) c[l][i][v] =
+                        V_LOAD(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                for (n = 0; n < used; n++) V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                        const V w = V_LOAD(weight[n] + v * SSDGS__VW);
+                        V_UNROLL for (int l = 0; l < at_once; l++) V_UNROLL for (int i = 0; i < 3; i++)
+                            c[l][i][v] = V_FMA(w, V_SET(local[layer + l][which[n]][i]), c[l][i][v]);
                     }
-                VUNROLL for (int l = 0; l < at_once; l++) VUNROLL for (int v = 0; v < SSDGS__NV; v++)
-                    VUNROLL for (int i = 0; i < 3; i++)
-                        VSTORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
+                V_UNROLL for (int l = 0; l < at_once; l++) V_UNROLL for (int v = 0; v < SSDGS__NV; v++)
+                    V_UNROLL for (int i = 0; i < 3; i++)
+                        V_STORE(pixel + l * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW, c[l][i][v]);
             }
         }
     }
@@ -13563,7 +13451,8 @@ SSDGS__FN void F(composite)(const ssdgs__tile *tile, int layers, const R *const 
    an entry is the final pixel less what has been passed, so alpha and T are the forward's, bit for bit. */
 SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile *tile, const R *const *color,
                                             const R *gradient, R *scratch, R *sums, size_t stride, int slot) {
-    const V threshold = VSET(tile->log2_threshold), stop = VSET(tile->stop), one = VSET(1), zero = VSET(0);
+    const V threshold = V_SET(tile->log2_threshold), stop = V_SET(tile->stop), one = V_SET(1),
+            zero = V_SET(0);
     /* with all layers sums over pixels have lanes over their values */
     const int wide = layers == SSDGS__LAYERS, width = 4 * layers;
     F(batch) batch;
@@ -13595,50 +13484,50 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             V px[SSDGS__NV], py[SSDGS__NV];
             F(pixel_centres)(tile, micro, px, py);
             V dc[SSDGS__LAYERS][3][SSDGS__NV], product[SSDGS__NV], t[SSDGS__NV], before[SSDGS__NV];
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VUNROLL for (int layer = 0; layer < layers; layer++) VUNROLL for (int i = 0; i < 3; i++)
-                    dc[layer][i][v] = VLOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
-                product[v] = VLOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
-                t[v] = VLOAD(transmittance[micro] + v * SSDGS__VW);
-                before[v] = VLOAD(passed[micro] + v * SSDGS__VW);
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_UNROLL for (int layer = 0; layer < layers; layer++) V_UNROLL for (int i = 0; i < 3; i++)
+                    dc[layer][i][v] = V_LOAD(pixel + layer * SSDGS__TILE_LAYER + 16 * i + v * SSDGS__VW);
+                product[v] = V_LOAD(pixel + SSDGS__TILE_FOURTH + v * SSDGS__VW);
+                t[v] = V_LOAD(transmittance[micro] + v * SSDGS__VW);
+                before[v] = V_LOAD(passed[micro] + v * SSDGS__VW);
             }
             int used;
             for (used = 0; left; left &= left - 1, used++) {
                 const int index = which[used] = ssdgs__lowest_bit(left);
                 R *out = sums + (size_t)batch.place[index] * stride;
                 V sum[12][SSDGS__NV];
-                VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                     V u, w, raw, before_it = t[v];
                     VM drawn;
                     V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
-                    t[v] = VFNMA(alpha, t[v], t[v]);
-                    alpha = VSEL(VGE(before_it, stop), alpha, zero);
-                    const V blend = VMUL(alpha, before_it);
+                    t[v] = V_FNMA(alpha, t[v], t[v]);
+                    alpha = V_SEL(V_GE(before_it, stop), alpha, zero);
+                    const V blend = V_MUL(alpha, before_it);
                     V part[4];
                     part[0] = part[1] = part[2] = part[3] =
                         zero; /* one chain of sums would be what all waits for */
-                    VUNROLL for (int layer = 0; layer < layers; layer++) VUNROLL for (int i = 0; i < 3; i++)
+                    V_UNROLL for (int layer = 0; layer < layers; layer++) V_UNROLL for (int i = 0; i < 3; i++)
                         part[layer & 3] =
-                            VFMA(VSET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
-                    const V shade = VADD(VADD(part[0], part[1]), VADD(part[2], part[3]));
-                    before[v] = VFMA(blend, shade, before[v]);
-                    const V behind = VDIV(VSUB(product[v], before[v]), VSUB(one, alpha));
-                    V g = VMUL(alpha, VFMA(before_it, shade, VNEG(behind)));
-                    g = VSEL(VLT(raw, VSET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
-                    const V gu = VMUL(g, u);
-                    const V gw = VMUL(g, w);
+                            V_FMA(V_SET(local[layer][index][i]), dc[layer][i][v], part[layer & 3]);
+                    const V shade = V_ADD(V_ADD(part[0], part[1]), V_ADD(part[2], part[3]));
+                    before[v] = V_FMA(blend, shade, before[v]);
+                    const V behind = V_DIV(V_SUB(product[v], before[v]), V_SUB(one, alpha));
+                    V g = V_MUL(alpha, V_FMA(before_it, shade, V_NEG(behind)));
+                    g = V_SEL(V_LT(raw, V_SET(SSDGS__ALPHA_MAX)), g, zero); /* alpha = min(0.999, .) */
+                    const V gu = V_MUL(g, u);
+                    const V gw = V_MUL(g, w);
                     sum[0][v] = g;
                     sum[1][v] = gu;
                     sum[2][v] = gw;
-                    sum[3][v] = VMUL(gu, u);
-                    sum[4][v] = VMUL(gu, w);
-                    sum[5][v] = VMUL(gw, w);
+                    sum[3][v] = V_MUL(gu, u);
+                    sum[4][v] = V_MUL(gu, w);
+                    sum[5][v] = V_MUL(gw, w);
                     sum[6][v] = slot ? zero : blend;
                     sum[7][v] = zero;
                     if (wide) {
-                        VSTORE(weight[used] + v * SSDGS__VW, blend);
+                        V_STORE(weight[used] + v * SSDGS__VW, blend);
                     } else {
-                        VUNROLL for (int i = 0; i < 3; i++) sum[8 + i][v] = VMUL(blend, dc[0][i][v]);
+                        V_UNROLL for (int i = 0; i < 3; i++) sum[8 + i][v] = V_MUL(blend, dc[0][i][v]);
                         sum[11][v] = zero;
                     }
                 }
@@ -13649,18 +13538,18 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
             for (n = 0; wide && n < used; n++) {
                 R *out = sums + (size_t)batch.place[which[n]] * stride + 8;
                 V sum[4 * SSDGS__LAYERS / SSDGS__VW];
-                VUNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
+                V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] = zero;
                 for (int i = 0; i < 16; i++) {
-                    const V w = VSET(weight[n][i]);
-                    VUNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] =
-                        VFMA(w, VLOAD(rows + i * width + v * SSDGS__VW), sum[v]);
+                    const V w = V_SET(weight[n][i]);
+                    V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] =
+                        V_FMA(w, V_LOAD(rows + i * width + v * SSDGS__VW), sum[v]);
                 }
-                VUNROLL for (int v = 0; v < width / SSDGS__VW; v++)
-                    VSTORE(out + v * SSDGS__VW, VADD(VLOAD(out + v * SSDGS__VW), sum[v]));
+                V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++)
+                    V_STORE(out + v * SSDGS__VW, V_ADD(V_LOAD(out + v * SSDGS__VW), sum[v]));
             }
-            VUNROLL for (int v = 0; v < SSDGS__NV; v++) {
-                VSTORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
-                VSTORE(passed[micro] + v * SSDGS__VW, before[v]);
+            V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
+                V_STORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
+                V_STORE(passed[micro] + v * SSDGS__VW, before[v]);
             }
         }
     }
@@ -13679,23 +13568,23 @@ SSDGS__FN void F(composite_backward)(const ssdgs__tile *tile, int layers, const 
    exponential for the longest l, its squares for the others. */
 SSDGS__FN void F(transport)(const R *sources, int count, const R *x, const R *scale, R *sums) {
     for (int s = 0; s < 16; s += SSDGS__VW) {
-        const V px = VLOAD(x + s), py = VLOAD(x + SSDGS__BLOCK + s), pz = VLOAD(x + 2 * SSDGS__BLOCK + s);
-        const V soft = VSET(scale[0]), longest = VSET(scale[1]);
+        const V px = V_LOAD(x + s), py = V_LOAD(x + SSDGS__BLOCK + s), pz = V_LOAD(x + 2 * SSDGS__BLOCK + s);
+        const V soft = V_SET(scale[0]), longest = V_SET(scale[1]);
         V sum[SSDGS__LENGTHS];
-        VUNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) sum[k] = VLOAD(sums + k * SSDGS__BLOCK + s);
+        V_UNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) sum[k] = V_LOAD(sums + k * SSDGS__BLOCK + s);
         for (int i = 0; i < count; i++) {
             const R *source = sources + 4 * i;
-            const V dx = VSUB(px, VSET(source[0])), dy = VSUB(py, VSET(source[1])),
-                    dz = VSUB(pz, VSET(source[2]));
-            const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, soft)))),
-                    weight = VDIV(VSET(source[3]), r);
-            V e = F(exp2)(VMUL(r, longest));
-            VUNROLL for (int k = SSDGS__LENGTHS - 1; k >= 0; k--) {
-                sum[k] = VFMA(weight, e, sum[k]);
-                e = VMUL(e, e);
+            const V dx = V_SUB(px, V_SET(source[0])), dy = V_SUB(py, V_SET(source[1])),
+                    dz = V_SUB(pz, V_SET(source[2]));
+            const V r = V_SQRT(V_FMA(dx, dx, V_FMA(dy, dy, V_FMA(dz, dz, soft)))),
+                    weight = V_DIV(V_SET(source[3]), r);
+            V e = F(exp2)(V_MUL(r, longest));
+            V_UNROLL for (int k = SSDGS__LENGTHS - 1; k >= 0; k--) {
+                sum[k] = V_FMA(weight, e, sum[k]);
+                e = V_MUL(e, e);
             }
         }
-        VUNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) VSTORE(sums + k * SSDGS__BLOCK + s, sum[k]);
+        V_UNROLL for (int k = 0; k < SSDGS__LENGTHS; k++) V_STORE(sums + k * SSDGS__BLOCK + s, sum[k]);
     }
 }
 
@@ -13709,47 +13598,48 @@ SSDGS__FN void F(expand)(const R *sources, int count, const R *middle, const R *
         weight[SSDGS__SOURCES], decay[SSDGS__SOURCES], lanes[SSDGS__SERIES][16];
     R by_l = (R)-0.6931471805599453 * scale[1];
     for (int i = 0; i < count; i += SSDGS__VW) {
-        const V dx = VSUB(VSET(middle[0]), VLOAD(sources + i)),
-                dy = VSUB(VSET(middle[1]), VLOAD(sources + SSDGS__SOURCES + i)),
-                dz = VSUB(VSET(middle[2]), VLOAD(sources + 2 * SSDGS__SOURCES + i));
-        const V r = VSQRT(VFMA(dx, dx, VFMA(dy, dy, VFMA(dz, dz, VSET(scale[0]))))),
-                inverse = VDIV(VSET(1), r);
-        VSTORE(ux + i, VMUL(dx, inverse));
-        VSTORE(uy + i, VMUL(dy, inverse));
-        VSTORE(uz + i, VMUL(dz, inverse));
-        VSTORE(by_r + i, inverse);
-        VSTORE(weight + i, VMUL(VLOAD(sources + 3 * SSDGS__SOURCES + i), inverse));
-        VSTORE(decay + i, F(exp2)(VMUL(r, VSET(scale[1]))));
+        const V dx = V_SUB(V_SET(middle[0]), V_LOAD(sources + i)),
+                dy = V_SUB(V_SET(middle[1]), V_LOAD(sources + SSDGS__SOURCES + i)),
+                dz = V_SUB(V_SET(middle[2]), V_LOAD(sources + 2 * SSDGS__SOURCES + i));
+        const V r = V_SQRT(V_FMA(dx, dx, V_FMA(dy, dy, V_FMA(dz, dz, V_SET(scale[0]))))),
+                inverse = V_DIV(V_SET(1), r);
+        V_STORE(ux + i, V_MUL(dx, inverse));
+        V_STORE(uy + i, V_MUL(dy, inverse));
+        V_STORE(uz + i, V_MUL(dz, inverse));
+        V_STORE(by_r + i, inverse);
+        V_STORE(weight + i, V_MUL(V_LOAD(sources + 3 * SSDGS__SOURCES + i), inverse));
+        V_STORE(decay + i, F(exp2)(V_MUL(r, V_SET(scale[1]))));
     }
     for (int k = SSDGS__LENGTHS - 1; k >= 0; k--, by_l += by_l) {
-        const V ball = VSET(by_l * by_l * (R)(1.0 / 6));
+        const V ball = V_SET(by_l * by_l * (R)(1.0 / 6));
         for (int s = 0; s < 16; s += SSDGS__VW) {
-            V sum[SSDGS__SERIES], round = VSET(0);
-            VUNROLL for (int j = 0; j < SSDGS__SERIES; j++) sum[j] = VSET(0);
+            V sum[SSDGS__SERIES], round = V_SET(0);
+            V_UNROLL for (int j = 0; j < SSDGS__SERIES; j++) sum[j] = V_SET(0);
             for (int i = s; i < count; i += 16) {
-                const V x = VLOAD(ux + i), y = VLOAD(uy + i), z = VLOAD(uz + i), inverse = VLOAD(by_r + i);
-                const V e = VLOAD(decay + i),
-                        more = VFMA(VLOAD(sources + 4 * SSDGS__SOURCES + i), ball, VSET(1)),
-                        p = VMUL(VMUL(VLOAD(weight + i), more), e), a = VADD(inverse, VSET(by_l)),
-                        ap = VMUL(a, p), b = VFMA(a, ap, VMUL(inverse, VFMA(inverse, p, ap)));
-                const V bx = VMUL(b, x), by = VMUL(b, y), bz = VMUL(b, z);
-                VSTORE(decay + i, VMUL(e, e));
-                sum[0] = VADD(sum[0], p);
-                sum[1] = VFNMA(ap, x, sum[1]);
-                sum[2] = VFNMA(ap, y, sum[2]);
-                sum[3] = VFNMA(ap, z, sum[3]);
-                sum[4] = VFMA(bx, x, sum[4]);
-                sum[5] = VFMA(bx, y, sum[5]);
-                sum[6] = VFMA(bx, z, sum[6]);
-                sum[7] = VFMA(by, y, sum[7]);
-                sum[8] = VFMA(by, z, sum[8]);
-                sum[9] = VFMA(bz, z, sum[9]);
-                round = VFMA(ap, inverse, round);
+                const V x = V_LOAD(ux + i), y = V_LOAD(uy + i), z = V_LOAD(uz + i),
+                        inverse = V_LOAD(by_r + i);
+                const V e = V_LOAD(decay + i),
+                        more = V_FMA(V_LOAD(sources + 4 * SSDGS__SOURCES + i), ball, V_SET(1)),
+                        p = V_MUL(V_MUL(V_LOAD(weight + i), more), e), a = V_ADD(inverse, V_SET(by_l)),
+                        ap = V_MUL(a, p), b = V_FMA(a, ap, V_MUL(inverse, V_FMA(inverse, p, ap)));
+                const V bx = V_MUL(b, x), by = V_MUL(b, y), bz = V_MUL(b, z);
+                V_STORE(decay + i, V_MUL(e, e));
+                sum[0] = V_ADD(sum[0], p);
+                sum[1] = V_FNMA(ap, x, sum[1]);
+                sum[2] = V_FNMA(ap, y, sum[2]);
+                sum[3] = V_FNMA(ap, z, sum[3]);
+                sum[4] = V_FMA(bx, x, sum[4]);
+                sum[5] = V_FMA(bx, y, sum[5]);
+                sum[6] = V_FMA(bx, z, sum[6]);
+                sum[7] = V_FMA(by, y, sum[7]);
+                sum[8] = V_FMA(by, z, sum[8]);
+                sum[9] = V_FMA(bz, z, sum[9]);
+                round = V_FMA(ap, inverse, round);
             }
-            sum[4] = VMUL(VSET((R)0.5), VSUB(sum[4], round));
-            sum[7] = VMUL(VSET((R)0.5), VSUB(sum[7], round));
-            sum[9] = VMUL(VSET((R)0.5), VSUB(sum[9], round));
-            VUNROLL for (int j = 0; j < SSDGS__SERIES; j++) VSTORE(lanes[j] + s, sum[j]);
+            sum[4] = V_MUL(V_SET((R)0.5), V_SUB(sum[4], round));
+            sum[7] = V_MUL(V_SET((R)0.5), V_SUB(sum[7], round));
+            sum[9] = V_MUL(V_SET((R)0.5), V_SUB(sum[9], round));
+            V_UNROLL for (int j = 0; j < SSDGS__SERIES; j++) V_STORE(lanes[j] + s, sum[j]);
         }
         for (int j = 0; j < SSDGS__SERIES; j++)
             for (int s = 0; s < 16; s++) series[k * SSDGS__SERIES + j] += lanes[j][s];
@@ -13759,16 +13649,17 @@ SSDGS__FN void F(expand)(const R *sources, int count, const R *middle, const R *
 /* Adds a series' values at x (3, BLOCK), of which so many lanes, to sums (SSDGS__LENGTHS, BLOCK). */
 SSDGS__FN void F(series)(const R *series, const R *middle, const R *x, int lanes, R *sums) {
     for (int s = 0; s < lanes; s += SSDGS__VW) {
-        const V dx = VSUB(VLOAD(x + s), VSET(middle[0])),
-                dy = VSUB(VLOAD(x + SSDGS__BLOCK + s), VSET(middle[1])),
-                dz = VSUB(VLOAD(x + 2 * SSDGS__BLOCK + s), VSET(middle[2]));
+        const V dx = V_SUB(V_LOAD(x + s), V_SET(middle[0])),
+                dy = V_SUB(V_LOAD(x + SSDGS__BLOCK + s), V_SET(middle[1])),
+                dz = V_SUB(V_LOAD(x + 2 * SSDGS__BLOCK + s), V_SET(middle[2]));
         for (int k = 0; k < SSDGS__LENGTHS; k++) {
             const R *of = series + k * SSDGS__SERIES;
-            const V x1 = VFMA(dz, VSET(of[6]), VFMA(dy, VSET(of[5]), VFMA(dx, VSET(of[4]), VSET(of[1])))),
-                    y1 = VFMA(dz, VSET(of[8]), VFMA(dy, VSET(of[7]), VSET(of[2]))),
-                    z1 = VFMA(dz, VSET(of[9]), VSET(of[3]));
-            const V value = VFMA(dx, x1, VFMA(dy, y1, VFMA(dz, z1, VSET(of[0]))));
-            VSTORE(sums + k * SSDGS__BLOCK + s, VADD(value, VLOAD(sums + k * SSDGS__BLOCK + s)));
+            const V x1 = V_FMA(dz, V_SET(of[6]),
+                               V_FMA(dy, V_SET(of[5]), V_FMA(dx, V_SET(of[4]), V_SET(of[1])))),
+                    y1 = V_FMA(dz, V_SET(of[8]), V_FMA(dy, V_SET(of[7]), V_SET(of[2]))),
+                    z1 = V_FMA(dz, V_SET(of[9]), V_SET(of[3]));
+            const V value = V_FMA(dx, x1, V_FMA(dy, y1, V_FMA(dz, z1, V_SET(of[0]))));
+            V_STORE(sums + k * SSDGS__BLOCK + s, V_ADD(value, V_LOAD(sums + k * SSDGS__BLOCK + s)));
         }
     }
 }
@@ -13784,37 +13675,37 @@ SSDGS__FI void F(dense_tile)(const int rows, const ssdgs__product *p, const ssdg
     V sum[6][SSDGS__TV];
     const R *a[6], *columns = p->b + column;
     const ssdgs__offsets *const end = depth + p->depth;
-    VUNROLL for (int i = 0; i < rows; i++) {
+    V_UNROLL for (int i = 0; i < rows; i++) {
         a[i] = p->a + (size_t)row[i] * p->a_row;
-        VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] = p->bias ? VSET(p->bias[row[i]]) : VSET(0);
+        V_UNROLL for (int v = 0; v < vectors; v++) sum[i][v] = p->bias ? V_SET(p->bias[row[i]]) : V_SET(0);
     }
     for (; depth < end; depth++) {
         const size_t at = depth->a;
         const R *b = columns + depth->b;
         V lanes[SSDGS__TV];
-        VUNROLL for (int v = 0; v < vectors; v++) lanes[v] = VLOAD(b + v * SSDGS__VW);
-        VUNROLL for (int i = 0; i < rows; i++) {
-            const V weight = VSET(a[i][at]);
-            VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] = VFMA(weight, lanes[v], sum[i][v]);
+        V_UNROLL for (int v = 0; v < vectors; v++) lanes[v] = V_LOAD(b + v * SSDGS__VW);
+        V_UNROLL for (int i = 0; i < rows; i++) {
+            const V weight = V_SET(a[i][at]);
+            V_UNROLL for (int v = 0; v < vectors; v++) sum[i][v] = V_FMA(weight, lanes[v], sum[i][v]);
         }
     }
     size_t out[6];
-    VUNROLL for (int i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
+    V_UNROLL for (int i = 0; i < rows; i++) out[i] = (size_t)row[i] * p->out_stride + (size_t)column;
     if (p->accumulate) {
-        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
-            VADD(sum[i][v], VLOAD(p->out + out[i] + v * SSDGS__VW));
+        V_UNROLL for (int i = 0; i < rows; i++) V_UNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
+            V_ADD(sum[i][v], V_LOAD(p->out + out[i] + v * SSDGS__VW));
     }
     if (p->relu) {
-        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
-            VMAX(sum[i][v], VSET(0));
+        V_UNROLL for (int i = 0; i < rows; i++) V_UNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
+            V_MAX(sum[i][v], V_SET(0));
     }
     if (p->mask) {
-        VUNROLL for (int i = 0; i < rows; i++) VUNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
-            VSEL(VLT(VSET(0), VLOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], VSET(0));
+        V_UNROLL for (int i = 0; i < rows; i++) V_UNROLL for (int v = 0; v < vectors; v++) sum[i][v] =
+            V_SEL(V_LT(V_SET(0), V_LOAD(p->mask + out[i] + v * SSDGS__VW)), sum[i][v], V_SET(0));
     }
-    VUNROLL for (int i = 0; i < rows; i++) {
+    V_UNROLL for (int i = 0; i < rows; i++) {
         R *const to = p->out + out[i];
-        VUNROLL for (int v = 0; v < vectors; v++) VSTORE(to + v * SSDGS__VW, sum[i][v]);
+        V_UNROLL for (int v = 0; v < vectors; v++) V_STORE(to + v * SSDGS__VW, sum[i][v]);
     }
 }
 
@@ -13865,11 +13756,11 @@ SSDGS__FN void F(dense)(const ssdgs__product *p) {
 SSDGS__FN int F(live_rows)(const R *rows, int count, uint16_t *list) {
     int n = 0;
     for (int i = 0; i < count; i++) {
-        V most = VLOAD(rows + i * SSDGS__BLOCK);
+        V most = V_LOAD(rows + i * SSDGS__BLOCK);
         for (int s = SSDGS__VW; s < SSDGS__BLOCK; s += SSDGS__VW)
-            most = VMAX(most, VLOAD(rows + i * SSDGS__BLOCK + s));
+            most = V_MAX(most, V_LOAD(rows + i * SSDGS__BLOCK + s));
         list[n] = (uint16_t)i;
-        n += VBITS(VLT(VSET(0), most)) != 0;
+        n += V_BITS(V_LT(V_SET(0), most)) != 0;
     }
     return n;
 }
@@ -13894,9 +13785,9 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
         for (int j = 0; j < 16; j += SSDGS__VW) {
             const R *row = rows + list[i] * SSDGS__BLOCK + j;
             R *out = sums + list[i] * stride + j;
-            V sum = VLOAD(row);
-            for (int s = 16; s < SSDGS__BLOCK; s += 16) sum = VADD(sum, VLOAD(row + s));
-            VSTORE(out, VADD(VLOAD(out), sum));
+            V sum = V_LOAD(row);
+            for (int s = 16; s < SSDGS__BLOCK; s += 16) sum = V_ADD(sum, V_LOAD(row + s));
+            V_STORE(out, V_ADD(V_LOAD(out), sum));
         }
 }
 
@@ -13907,16 +13798,17 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
 SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims, int levels) {
     for (int d = 0; d < dims; d++)
         for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-            V x = VMUL(VSUB(VLOAD(in + d * SSDGS__BLOCK + s), VSET(origin ? origin[d] : 0)), VSET(scale));
-            VSTORE(out + d * SSDGS__BLOCK + s, x);
+            V x =
+                V_MUL(V_SUB(V_LOAD(in + d * SSDGS__BLOCK + s), V_SET(origin ? origin[d] : 0)), V_SET(scale));
+            V_STORE(out + d * SSDGS__BLOCK + s, x);
             V sine, cosine;
-            F(sincos)(VMAX(VSET(-1e5), VMIN(VSET(1e5), x)), &sine, &cosine); /* finite however far out */
+            F(sincos)(V_MAX(V_SET(-1e5), V_MIN(V_SET(1e5), x)), &sine, &cosine); /* finite however far out */
             for (int l = 0; l < levels; l++) {
-                const V twice = VADD(sine, sine);
-                VSTORE(out + (dims * (1 + l) + d) * SSDGS__BLOCK + s, sine);
-                VSTORE(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s, cosine);
-                cosine = VFNMA(twice, sine, VSET(1));
-                sine = VMUL(twice, VLOAD(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s));
+                const V twice = V_ADD(sine, sine);
+                V_STORE(out + (dims * (1 + l) + d) * SSDGS__BLOCK + s, sine);
+                V_STORE(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s, cosine);
+                cosine = V_FNMA(twice, sine, V_SET(1));
+                sine = V_MUL(twice, V_LOAD(out + (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s));
             }
         }
 }
@@ -13925,16 +13817,16 @@ SSDGS__FN void F(encode)(R *out, const R *in, const R *origin, R scale, int dims
 SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, int dims, int levels) {
     for (int d = 0; d < dims; d++)
         for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-            V sum = VLOAD(dout + d * SSDGS__BLOCK + s), power = VSET(1);
+            V sum = V_LOAD(dout + d * SSDGS__BLOCK + s), power = V_SET(1);
             for (int l = 0; l < levels; l++) {
                 const int sine = (dims * (1 + l) + d) * SSDGS__BLOCK + s,
                           cosine = (dims * (1 + levels + l) + d) * SSDGS__BLOCK + s;
-                V turn = VFNMA(VLOAD(dout + cosine), VLOAD(out + sine),
-                               VMUL(VLOAD(dout + sine), VLOAD(out + cosine)));
-                sum = VFMA(power, turn, sum);
-                power = VADD(power, power);
+                V turn = V_FNMA(V_LOAD(dout + cosine), V_LOAD(out + sine),
+                                V_MUL(V_LOAD(dout + sine), V_LOAD(out + cosine)));
+                sum = V_FMA(power, turn, sum);
+                power = V_ADD(power, power);
             }
-            VSTORE(din + d * SSDGS__BLOCK + s, VFMA(sum, VSET(scale), VLOAD(din + d * SSDGS__BLOCK + s)));
+            V_STORE(din + d * SSDGS__BLOCK + s, V_FMA(sum, V_SET(scale), V_LOAD(din + d * SSDGS__BLOCK + s)));
         }
 }
 
@@ -13944,15 +13836,15 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 
 /* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
 SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
-    V h2 = VDOT3(h[0], h[1], h[2], h[0], h[1], h[2]);
-    *half = VGE(h2, VSET(1e-12)); /* wi = -wo has no half vector: no highlight there */
-    *inverse_h = VDIV(VSET(1), VSQRT(VMAX(h2, VSET(1e-12))));
-    for (int i = 0; i < 3; i++) h[i] = VMUL(h[i], *inverse_h);
-    *missing = VSUB(VSET(1), VDOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
-    *missing = VMAX(VSET(0),
-                    VMIN(VSET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
-    h2 = VMUL(*missing, *missing);
-    *fifth = VMUL(VMUL(h2, h2), *missing);
+    V h2 = V_DOT3(h[0], h[1], h[2], h[0], h[1], h[2]);
+    *half = V_GE(h2, V_SET(1e-12)); /* wi = -wo has no half vector: no highlight there */
+    *inverse_h = V_DIV(V_SET(1), V_SQRT(V_MAX(h2, V_SET(1e-12))));
+    for (int i = 0; i < 3; i++) h[i] = V_MUL(h[i], *inverse_h);
+    *missing = V_SUB(V_SET(1), V_DOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
+    *missing = V_MAX(
+        V_SET(0), V_MIN(V_SET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
+    h2 = V_MUL(*missing, *missing);
+    *fifth = V_MUL(V_MUL(h2, h2), *missing);
 }
 
 /* One lane set of the geometry; both directions of the pass run through it. */
@@ -13964,61 +13856,61 @@ typedef struct F(geometry) {
 
 SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, const R *gauss) {
     V x[3];
-    for (int i = 0; i < 3; i++) x[i] = VLOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
+    for (int i = 0; i < 3; i++) x[i] = V_LOAD(gauss + (SSDGS_POSITION + i) * SSDGS__BLOCK);
     V raw[4];
-    for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
+    for (int i = 0; i < 4; i++) raw[i] = V_LOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK);
     g->inverse_q = F(rotation)(raw, g->q, g->r);
     for (int i = 0; i < 3; i++) {
-        g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), x[i]);
-        g->wo[i] = VSUB(VSET(k->eye[i]), x[i]);
+        g->wi[i] = k->directional ? V_SET(k->light[i]) : V_SUB(V_SET(k->light[i]), x[i]);
+        g->wo[i] = V_SUB(V_SET(k->eye[i]), x[i]);
     }
     const V d2 =
-        VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
+        V_MAX(V_DOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), V_SET(k->least_distance2));
     const V e2 =
-        VMAX(VDOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), VSET(k->least_distance2));
-    g->irradiance = k->directional ? VSET(1) : VDIV(VSET(1), d2);
-    g->inverse_light = k->directional ? VSET(1) : VSQRT(g->irradiance);
-    g->inverse_eye = VDIV(VSET(1), VSQRT(e2));
+        V_MAX(V_DOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), V_SET(k->least_distance2));
+    g->irradiance = k->directional ? V_SET(1) : V_DIV(V_SET(1), d2);
+    g->inverse_light = k->directional ? V_SET(1) : V_SQRT(g->irradiance);
+    g->inverse_eye = V_DIV(V_SET(1), V_SQRT(e2));
     for (int i = 0; i < 3; i++) {
-        g->wi[i] = VMUL(g->wi[i], g->inverse_light);
-        g->wo[i] = VMUL(g->wo[i], g->inverse_eye);
-        g->h[i] = VADD(g->wi[i], g->wo[i]);
+        g->wi[i] = V_MUL(g->wi[i], g->inverse_light);
+        g->wo[i] = V_MUL(g->wo[i], g->inverse_eye);
+        g->h[i] = V_ADD(g->wi[i], g->wo[i]);
     }
-    g->cosine = VDOT3(g->r[2], g->r[5], g->r[8], g->wi[0], g->wi[1], g->wi[2]);
+    g->cosine = V_DOT3(g->r[2], g->r[5], g->r[8], g->wi[0], g->wi[1], g->wi[2]);
     V fifth;
     F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &fifth);
     for (int i = 0; i < 3; i++)
-        g->local[i] = VDOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
-    g->fresnel = VFMA(VSET(1 - SSDGS__F0), fifth, VSET(SSDGS__F0));
+        g->local[i] = V_DOT3(g->r[i], g->r[3 + i], g->r[6 + i], g->h[0], g->h[1], g->h[2]);
+    g->fresnel = V_FMA(V_SET(1 - SSDGS__F0), fifth, V_SET(SSDGS__F0));
 }
 
 /* One basis at the local half vector h (eq. 12). b: x, y, z axes (9), lambda, mu. With dh NULL only the
    value; else also the exponent's derivatives: to h (3), and to the x axis, the y axis, lambda and mu (8). */
 SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
-    const V x = VDOT3(VSET(b[0]), VSET(b[1]), VSET(b[2]), h[0], h[1], h[2]);
-    const V y = VDOT3(VSET(b[3]), VSET(b[4]), VSET(b[5]), h[0], h[1], h[2]);
-    const V value = VEXP(VNEG(VFMA(VMUL(VSET(b[9]), x), x, VMUL(VMUL(VSET(b[10]), y), y))));
+    const V x = V_DOT3(V_SET(b[0]), V_SET(b[1]), V_SET(b[2]), h[0], h[1], h[2]);
+    const V y = V_DOT3(V_SET(b[3]), V_SET(b[4]), V_SET(b[5]), h[0], h[1], h[2]);
+    const V value = V_EXP(V_NEG(V_FMA(V_MUL(V_SET(b[9]), x), x, V_MUL(V_MUL(V_SET(b[10]), y), y))));
     if (dh) {
-        const V dx = VMUL(VSET(-2 * b[9]), x), dy = VMUL(VSET(-2 * b[10]), y);
+        const V dx = V_MUL(V_SET(-2 * b[9]), x), dy = V_MUL(V_SET(-2 * b[10]), y);
         for (int i = 0; i < 3; i++) {
-            dh[i] = VFMA(dx, VSET(b[i]), VMUL(dy, VSET(b[3 + i])));
-            db[i] = VMUL(dx, h[i]);
-            db[3 + i] = VMUL(dy, h[i]);
+            dh[i] = V_FMA(dx, V_SET(b[i]), V_MUL(dy, V_SET(b[3 + i])));
+            db[i] = V_MUL(dx, h[i]);
+            db[3 + i] = V_MUL(dy, h[i]);
         }
-        db[6] = VNEG(VMUL(x, x));
-        db[7] = VNEG(VMUL(y, y));
+        db[6] = V_NEG(V_MUL(x, x));
+        db[7] = V_NEG(V_MUL(y, y));
     }
     return value;
 }
 
 /* Deferred: lambda or mu of its logarithm. */
 SSDGS__FI V F(sharpness)(V raw) {
-    return VEXP(VMAX(VSET(-SSDGS__SHARPEST), VMIN(VSET(SSDGS__SHARPEST), raw)));
+    return V_EXP(V_MAX(V_SET(-SSDGS__SHARPEST), V_MIN(V_SET(SSDGS__SHARPEST), raw)));
 }
 /* As ssdgs__lobe_height(): sqrt(lambda mu). */
 SSDGS__FI V F(lobe_height)(const R *gauss) {
     const R *raw = gauss + SSDGS_ASG_WEIGHT * SSDGS__BLOCK;
-    return VSQRT(VMUL(F(sharpness)(VLOAD(raw)), F(sharpness)(VLOAD(raw + SSDGS__BLOCK))));
+    return V_SQRT(V_MUL(F(sharpness)(V_LOAD(raw)), F(sharpness)(V_LOAD(raw + SSDGS__BLOCK))));
 }
 
 /* gauss (CHANNELS, BLOCK) -> rows (SSDGS__ROWS, BLOCK): wi, wo, n, irradiance, f_d, f_s. Deferred,
@@ -14026,30 +13918,30 @@ SSDGS__FI V F(lobe_height)(const R *gauss) {
 SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
-        V d = VSET(0);
+        V d = V_SET(0);
         F(geometry_lanes)(&g, k, gauss + s);
         for (int i = 0; i < 3; i++) {
-            VSTORE(rows + (SSDGS__WI + i) * SSDGS__BLOCK + s, g.wi[i]);
-            VSTORE(rows + (SSDGS__WO + i) * SSDGS__BLOCK + s, g.wo[i]);
-            VSTORE(rows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s, g.r[3 * i + 2]);
+            V_STORE(rows + (SSDGS__WI + i) * SSDGS__BLOCK + s, g.wi[i]);
+            V_STORE(rows + (SSDGS__WO + i) * SSDGS__BLOCK + s, g.wo[i]);
+            V_STORE(rows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s, g.r[3 * i + 2]);
         }
-        VSTORE(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, g.irradiance);
-        VSTORE(rows + SSDGS__COSINE * SSDGS__BLOCK + s, VMAX(VSET(0), g.cosine));
+        V_STORE(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, g.irradiance);
+        V_STORE(rows + SSDGS__COSINE * SSDGS__BLOCK + s, V_MAX(V_SET(0), g.cosine));
         if (k->specular && !k->deferred)
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
-                V weight = F(softplus)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
+                V weight = F(softplus)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
                 V lobe = F(asg)(k->basis + 12 * j, g.local, NULL, NULL);
-                d = VFMA(weight, lobe, d);
+                d = V_FMA(weight, lobe, d);
             }
-        VSTORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s,
-               k->deferred ? F(lobe_height)(gauss + s) : VMUL(g.fresnel, VSEL(g.half, d, VSET(0))));
+        V_STORE(rows + SSDGS__GLOSS * SSDGS__BLOCK + s,
+                k->deferred ? F(lobe_height)(gauss + s) : V_MUL(g.fresnel, V_SEL(g.half, d, V_SET(0))));
     }
 }
 
 /* Where least_distance2 holds the length that a direction was divided by: it is shorter than 1 there. */
 SSDGS__FI VM F(held)(const V direction[3]) {
-    return VLT(VDOT3(direction[0], direction[1], direction[2], direction[0], direction[1], direction[2]),
-               VSET(0.99));
+    return V_LT(V_DOT3(direction[0], direction[1], direction[2], direction[0], direction[1], direction[2]),
+                V_SET(0.99));
 }
 
 /* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3),
@@ -14058,83 +13950,86 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
                                    R *lane_sums) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         F(geometry) g;
-        V d = VSET(0);
+        V d = V_SET(0);
         F(geometry_lanes)(&g, k, gauss + s);
         V dwi[3], dwo[3], dn[3], dlocal[3];
         for (int i = 0; i < 3; i++) {
-            dwi[i] = VLOAD(drows + (SSDGS__WI + i) * SSDGS__BLOCK + s);
-            dwo[i] = VLOAD(drows + (SSDGS__WO + i) * SSDGS__BLOCK + s);
-            dn[i] = VLOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
-            dlocal[i] = VSET(0);
+            dwi[i] = V_LOAD(drows + (SSDGS__WI + i) * SSDGS__BLOCK + s);
+            dwo[i] = V_LOAD(drows + (SSDGS__WO + i) * SSDGS__BLOCK + s);
+            dn[i] = V_LOAD(drows + (SSDGS__NORMAL + i) * SSDGS__BLOCK + s);
+            dlocal[i] = V_SET(0);
         }
-        const V dgloss = VLOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s),
-                df = k->deferred ? VSET(0) : VSEL(g.half, dgloss, VSET(0));
+        const V dgloss = V_LOAD(drows + SSDGS__GLOSS * SSDGS__BLOCK + s),
+                df = k->deferred ? V_SET(0) : V_SEL(g.half, dgloss, V_SET(0));
         if (k->deferred) { /* d sqrt(lambda mu) / d(log lambda) is half of it */
-            const V dlog = VMUL(VMUL(VSET(0.5), dgloss), F(lobe_height)(gauss + s));
+            const V dlog = V_MUL(V_MUL(V_SET(0.5), dgloss), F(lobe_height)(gauss + s));
             for (int j = 0; j < 2; j++) {
-                const V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
+                const V raw = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-                VSTORE(dw, VADD(VSEL(VLT(VABS(raw), VSET(SSDGS__SHARPEST)), dlog, VSET(0)), VLOAD(dw)));
+                V_STORE(dw,
+                        V_ADD(V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__SHARPEST)), dlog, V_SET(0)), V_LOAD(dw)));
             }
         }
-        const V dlobe = VMUL(df, g.fresnel);
+        const V dlobe = V_MUL(df, g.fresnel);
         if (k->specular && !k->deferred)
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
-                V raw = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
+                V raw = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
                   de[3], db[8];
                 R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
                 const V lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
-                d = VFMA(weight, lobe, d);
-                VSTORE(dw, VFMA(VMUL(dlobe, lobe), F(sigmoid)(raw), VLOAD(dw)));
-                const V push = VMUL(VMUL(dlobe, weight), lobe);
-                for (int i = 0; i < 3; i++) dlocal[i] = VFMA(push, de[i], dlocal[i]);
+                d = V_FMA(weight, lobe, d);
+                V_STORE(dw, V_FMA(V_MUL(dlobe, lobe), F(sigmoid)(raw), V_LOAD(dw)));
+                const V push = V_MUL(V_MUL(dlobe, weight), lobe);
+                for (int i = 0; i < 3; i++) dlocal[i] = V_FMA(push, de[i], dlocal[i]);
                 for (int i = 0; i < 8; i++) { /* the z axis, rows 6 to 8, has no part in it */
                     R *sum = lane_sums + (6 + 12 * j + (i < 6 ? i : i + 3)) * 16 + s % 16;
-                    VSTORE(sum, VFMA(push, db[i], VLOAD(sum)));
+                    V_STORE(sum, V_FMA(push, db[i], V_LOAD(sum)));
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-        const V missing2 = VMUL(g.missing, g.missing);
-        const V dwoh = VMUL(VMUL(df, d), VMUL(VSET(-5 * (1 - SSDGS__F0)), VMUL(missing2, missing2)));
+        const V missing2 = V_MUL(g.missing, g.missing);
+        const V dwoh = V_MUL(V_MUL(df, d), V_MUL(V_SET(-5 * (1 - SSDGS__F0)), V_MUL(missing2, missing2)));
         V dr[9], dh[3];
         for (int i = 0; i < 3; i++) {
-            dh[i] = VFMA(dwoh, g.wo[i],
-                         VDOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
-            dwo[i] = VFMA(dwoh, g.h[i], dwo[i]);
-            for (int j = 0; j < 3; j++) dr[3 * i + j] = VMUL(g.h[i], dlocal[j]);
+            dh[i] =
+                V_FMA(dwoh, g.wo[i],
+                      V_DOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
+            dwo[i] = V_FMA(dwoh, g.h[i], dwo[i]);
+            for (int j = 0; j < 3; j++) dr[3 * i + j] = V_MUL(g.h[i], dlocal[j]);
         }
         /* f_d = max(0, n.wi) */
         const V dcosine =
-            VSEL(VLT(VSET(0), g.cosine), VLOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), VSET(0));
-        const V along_h = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+            V_SEL(V_LT(V_SET(0), g.cosine), V_LOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), V_SET(0));
+        const V along_h = V_DOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
         for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
-            const V dsum = VMUL(VFNMA(g.h[i], along_h, dh[i]), g.inverse_h);
-            dwi[i] = VFMA(dcosine, g.r[3 * i + 2], VADD(dwi[i], dsum));
-            dwo[i] = VADD(dwo[i], dsum);
-            dr[3 * i + 2] = VADD(dr[3 * i + 2], VFMA(dcosine, g.wi[i], dn[i]));
+            const V dsum = V_MUL(V_FNMA(g.h[i], along_h, dh[i]), g.inverse_h);
+            dwi[i] = V_FMA(dcosine, g.r[3 * i + 2], V_ADD(dwi[i], dsum));
+            dwo[i] = V_ADD(dwo[i], dsum);
+            dr[3 * i + 2] = V_ADD(dr[3 * i + 2], V_FMA(dcosine, g.wi[i], dn[i]));
         }
         V dq[4];
         F(rotation_backward)(dq, g.q, g.inverse_q, dr);
         for (int i = 0; i < 4; i++) {
             R *out = dgauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s;
-            VSTORE(out, VADD(VLOAD(out), dq[i]));
+            V_STORE(out, V_ADD(V_LOAD(out), dq[i]));
         }
         /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
-        V along_light = VDOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
+        V along_light = V_DOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
         if (!k->directional)
-            along_light = VFMA(VMUL(VSET(2), g.irradiance),
-                               VLOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), along_light);
-        along_light = VSEL(F(held)(g.wi), VSET(0), along_light);
+            along_light = V_FMA(V_MUL(V_SET(2), g.irradiance),
+                                V_LOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), along_light);
+        along_light = V_SEL(F(held)(g.wi), V_SET(0), along_light);
         const V along_eye =
-            VSEL(F(held)(g.wo), VSET(0), VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]));
+            V_SEL(F(held)(g.wo), V_SET(0), V_DOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]));
         for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
-            const V to_light = VMUL(VFNMA(g.wi[i], along_light, dwi[i]), g.inverse_light);
-            const V to_eye = VMUL(VFNMA(g.wo[i], along_eye, dwo[i]), g.inverse_eye);
-            VSTORE(out, VSUB(VLOAD(out), k->directional ? to_eye : VADD(to_light, to_eye)));
+            const V to_light = V_MUL(V_FNMA(g.wi[i], along_light, dwi[i]), g.inverse_light);
+            const V to_eye = V_MUL(V_FNMA(g.wo[i], along_eye, dwo[i]), g.inverse_eye);
+            V_STORE(out, V_SUB(V_LOAD(out), k->directional ? to_eye : V_ADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
-            VSTORE(out, VADD(VLOAD(out), to_light));
-            VSTORE(out + 3 * 16, VADD(VLOAD(out + 3 * 16), to_eye)); /* the eye's, after the light's three */
+            V_STORE(out, V_ADD(V_LOAD(out), to_light));
+            V_STORE(out + 3 * 16,
+                    V_ADD(V_LOAD(out + 3 * 16), to_eye)); /* the eye's, after the light's three */
         }
     }
 }
@@ -14178,87 +14073,88 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
                                            const V pixel[2], const R *layers) {
     const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
             *normal = more + SSDGS__TILE_LAYER;
-    g->inverse_cover = VDIV(VSET(1), VMAX(VLOAD(more + 32), VSET(SSDGS__THIN)));
-    g->depth = VMUL(VLOAD(more), g->inverse_cover);
-    g->f0 = VMUL(VLOAD(more + 16), g->inverse_cover);
-    g->to_camera[0] = VMUL(VSUB(pixel[0], VSET(k->cx)), VSET(k->inverse_fx));
-    g->to_camera[1] = VMUL(VSUB(pixel[1], VSET(k->cy)), VSET(k->inverse_fy));
+    g->inverse_cover = V_DIV(V_SET(1), V_MAX(V_LOAD(more + 32), V_SET(SSDGS__THIN)));
+    g->depth = V_MUL(V_LOAD(more), g->inverse_cover);
+    g->f0 = V_MUL(V_LOAD(more + 16), g->inverse_cover);
+    g->to_camera[0] = V_MUL(V_SUB(pixel[0], V_SET(k->cx)), V_SET(k->inverse_fx));
+    g->to_camera[1] = V_MUL(V_SUB(pixel[1], V_SET(k->cy)), V_SET(k->inverse_fy));
     for (int i = 0; i < 3; i++)
-        g->ray[i] = VFMA(VSET(k->view[i]), g->to_camera[0],
-                         VFMA(VSET(k->view[4 + i]), g->to_camera[1], VSET(k->view[8 + i])));
-    V d2 = VDOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
-    g->inverse_ray = VDIV(VSET(1), VSQRT(d2));
+        g->ray[i] = V_FMA(V_SET(k->view[i]), g->to_camera[0],
+                          V_FMA(V_SET(k->view[4 + i]), g->to_camera[1], V_SET(k->view[8 + i])));
+    V d2 = V_DOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
+    g->inverse_ray = V_DIV(V_SET(1), V_SQRT(d2));
     V at[3];
     for (int i = 0; i < 3; i++) {
-        at[i] = VFMA(g->ray[i], g->depth, VSET(k->eye[i]));
-        g->wo[i] = VNEG(VMUL(g->ray[i], g->inverse_ray));
-        g->wi[i] = k->directional ? VSET(k->light[i]) : VSUB(VSET(k->light[i]), at[i]);
+        at[i] = V_FMA(g->ray[i], g->depth, V_SET(k->eye[i]));
+        g->wo[i] = V_NEG(V_MUL(g->ray[i], g->inverse_ray));
+        g->wi[i] = k->directional ? V_SET(k->light[i]) : V_SUB(V_SET(k->light[i]), at[i]);
     }
-    d2 = VMAX(VDOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), VSET(k->least_distance2));
-    g->inverse_light = k->directional ? VSET(1) : VDIV(VSET(1), VSQRT(d2));
+    d2 = V_MAX(V_DOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), V_SET(k->least_distance2));
+    g->inverse_light = k->directional ? V_SET(1) : V_DIV(V_SET(1), V_SQRT(d2));
     for (int i = 0; i < 3; i++) {
-        g->wi[i] = VMUL(g->wi[i], g->inverse_light);
-        g->h[i] = VADD(g->wi[i], g->wo[i]);
+        g->wi[i] = V_MUL(g->wi[i], g->inverse_light);
+        g->h[i] = V_ADD(g->wi[i], g->wo[i]);
     }
     F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &g->fifth);
-    g->fresnel = VFMA(VSUB(VSET(1), g->f0), g->fifth, g->f0);
-    for (int i = 0; i < 3; i++) g->n[i] = VLOAD(normal + 16 * i);
-    d2 = VDOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
-    g->half = VAND(g->half,
-                   VGE(d2, VSET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
-    g->inverse_n = VDIV(VSET(1), VSQRT(VMAX(d2, VSET(SSDGS__THIN * SSDGS__THIN))));
-    for (int i = 0; i < 3; i++) g->n[i] = VMUL(g->n[i], g->inverse_n);
-    g->along = VDOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
-    g->cosine = VMAX(VSET(0), VDOT3(g->n[0], g->n[1], g->n[2], g->wi[0], g->wi[1], g->wi[2]));
-    g->inverse_woh = VDIV(VSET(1), VMAX(VSET(SSDGS__GRAZING), VSUB(VSET(1), g->missing)));
-    g->microfacet = VMUL(g->cosine, VMUL(g->inverse_woh, g->inverse_woh));
+    g->fresnel = V_FMA(V_SUB(V_SET(1), g->f0), g->fifth, g->f0);
+    for (int i = 0; i < 3; i++) g->n[i] = V_LOAD(normal + 16 * i);
+    d2 = V_DOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
+    g->half = V_AND(
+        g->half, V_GE(d2, V_SET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
+    g->inverse_n = V_DIV(V_SET(1), V_SQRT(V_MAX(d2, V_SET(SSDGS__THIN * SSDGS__THIN))));
+    for (int i = 0; i < 3; i++) g->n[i] = V_MUL(g->n[i], g->inverse_n);
+    g->along = V_DOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
+    g->cosine = V_MAX(V_SET(0), V_DOT3(g->n[0], g->n[1], g->n[2], g->wi[0], g->wi[1], g->wi[2]));
+    g->inverse_woh = V_DIV(V_SET(1), V_MAX(V_SET(SSDGS__GRAZING), V_SUB(V_SET(1), g->missing)));
+    g->microfacet = V_MUL(g->cosine, V_MUL(g->inverse_woh, g->inverse_woh));
     for (int i = 0; i < 3; i++) {
-        g->p[0][i] = VFNMA(g->n[i], g->along, g->h[i]);
+        g->p[0][i] = V_FNMA(g->n[i], g->along, g->h[i]);
         g->p[1][i] = g->h[i];
     }
     for (int j = 0; j < 2; j++) {
         for (int i = 0; i < 3; i++)
-            g->row[j][i] = VMUL(
-                g->inverse_cover,
-                VFMA(VLOAD(q + 16 * i), g->p[j][i],
-                     VFMA(VLOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
-                          VMUL(VLOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)), g->p[j][(i + 2) % 3]))));
-        g->q[j] = VDOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
+            g->row[j][i] = V_MUL(g->inverse_cover,
+                                 V_FMA(V_LOAD(q + 16 * i), g->p[j][i],
+                                       V_FMA(V_LOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
+                                             V_MUL(V_LOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)),
+                                                   g->p[j][(i + 2) % 3]))));
+        g->q[j] = V_DOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
     }
 }
 
 /* exp(-s ((1 - t) q0 + t q1)) of lobe j */
 SSDGS__FI V F(glow_lobe)(const R *basis, const V q[2]) {
-    return VEXP(
-        VMUL(VSET(-basis[9]), VMAX(VSET(0), VFMA(VSET(1 - basis[8]), q[0], VMUL(VSET(basis[8]), q[1])))));
+    return V_EXP(V_MUL(V_SET(-basis[9]),
+                       V_MAX(V_SET(0), V_FMA(V_SET(1 - basis[8]), q[0], V_MUL(V_SET(basis[8]), q[1])))));
 }
 
 SSDGS__FI V F(glow)(const ssdgs__lighting *k, const V q[2], V lobes[SSDGS_ASG_COUNT]) {
-    V sum = VSET(0);
+    V sum = V_SET(0);
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         lobes[j] = F(glow_lobe)(k->basis + 12 * j, q);
-        sum = VFMA(VSET(k->basis[12 * j + 10]), lobes[j], sum);
+        sum = V_FMA(V_SET(k->basis[12 * j + 10]), lobes[j], sum);
     }
     return sum;
 }
 
 /* Eq. 8: S of a visibility and the shadow network's answer. */
 SSDGS__FI V F(shadow_factor)(const ssdgs__lighting *k, V visibility, V answer) {
-    const V v = VMAX(VMIN(visibility, VSET(0.99)), VSET(0.01)); /* NaN: 0.99 */
-    if (!k->shadow) return VSET(1);
+    const V v = V_MAX(V_MIN(visibility, V_SET(0.99)), V_SET(0.01)); /* NaN: 0.99 */
+    if (!k->shadow) return V_SET(1);
     if (!k->refined_shadow) return visibility;
-    return F(sigmoid)(k->residual_shadow ? VADD(VLOG(VDIV(v, VSUB(VSET(1), v))), answer) : answer);
+    return F(sigmoid)(k->residual_shadow ? V_ADD(V_LOG(V_DIV(v, V_SUB(V_SET(1), v))), answer) : answer);
 }
 
 /* *d: dL/dS, then dL/dv. Returns dL/d(answer). */
 SSDGS__FI V F(shadow_factor_backward)(const ssdgs__lighting *k, V visibility, V factor, V *d) {
-    if (!k->shadow) *d = VSET(0);
-    if (!k->shadow || !k->refined_shadow) return VSET(0);
-    const V danswer = VMUL(*d, VFNMA(factor, factor, factor));
+    if (!k->shadow) *d = V_SET(0);
+    if (!k->shadow || !k->refined_shadow) return V_SET(0);
+    const V danswer = V_MUL(*d, V_FNMA(factor, factor, factor));
     /* d logit(v) = 1 / (v (1 - v)) inside the clamp */
-    const VM inside = VAND(VLT(VSET(0.01), visibility), VLT(visibility, VSET(0.99)));
-    *d = k->residual_shadow ? VSEL(inside, VDIV(danswer, VFNMA(visibility, visibility, visibility)), VSET(0))
-                            : VSET(0);
+    const VM inside = V_AND(V_LT(V_SET(0.01), visibility), V_LT(visibility, V_SET(0.99)));
+    *d = k->residual_shadow
+             ? V_SEL(inside, V_DIV(danswer, V_FNMA(visibility, visibility, visibility)), V_SET(0))
+             : V_SET(0);
     return danswer;
 }
 
@@ -14270,13 +14166,13 @@ typedef struct F(arrival) {
 
 SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const R *layers, V map) {
     const R *more = layers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
-    a->inverse_cover =
-        VDIV(VSET(1), VMAX(VLOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), VSET(SSDGS__THIN)));
-    a->residual = VMUL(VLOAD(more), a->inverse_cover);
-    a->gauss = VMUL(VLOAD(more + 16), a->inverse_cover);
-    a->soft = VMUL(VLOAD(more + 32), a->inverse_cover);
+    a->inverse_cover = V_DIV(
+        V_SET(1), V_MAX(V_LOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), V_SET(SSDGS__THIN)));
+    a->residual = V_MUL(V_LOAD(more), a->inverse_cover);
+    a->gauss = V_MUL(V_LOAD(more + 16), a->inverse_cover);
+    a->soft = V_MUL(V_LOAD(more + 32), a->inverse_cover);
     a->map = map;
-    a->visibility = VFMA(a->soft, VSUB(a->gauss, map), map);
+    a->visibility = V_FMA(a->soft, V_SUB(a->gauss, map), map);
     a->factor = F(shadow_factor)(k, a->visibility, a->residual);
 }
 
@@ -14286,12 +14182,12 @@ SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, 
     R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
     const V dresidual = F(shadow_factor_backward)(k, a->visibility, a->factor, &dvisibility);
-    const V dgauss = VMUL(dvisibility, a->soft), dsoft = VMUL(dvisibility, VSUB(a->gauss, a->map));
-    VSTORE(dmore + SSDGS__TILE_FOURTH, VMUL(dvisibility, VSUB(VSET(1), a->soft)));
-    VSTORE(dmore, VMUL(dresidual, a->inverse_cover));
-    VSTORE(dmore + 16, VMUL(dgauss, a->inverse_cover));
-    VSTORE(dmore + 32, VMUL(dsoft, a->inverse_cover));
-    return VFMA(dresidual, a->residual, VFMA(dgauss, a->gauss, VMUL(dsoft, a->soft)));
+    const V dgauss = V_MUL(dvisibility, a->soft), dsoft = V_MUL(dvisibility, V_SUB(a->gauss, a->map));
+    V_STORE(dmore + SSDGS__TILE_FOURTH, V_MUL(dvisibility, V_SUB(V_SET(1), a->soft)));
+    V_STORE(dmore, V_MUL(dresidual, a->inverse_cover));
+    V_STORE(dmore + 16, V_MUL(dgauss, a->inverse_cover));
+    V_STORE(dmore + 32, V_MUL(dsoft, a->inverse_cover));
+    return V_FMA(dresidual, a->residual, V_FMA(dgauss, a->gauss, V_MUL(dsoft, a->soft)));
 }
 
 /* Adds the light's diffuse and specular terms to layer 0. visibility: visibility, in; S, out. */
@@ -14304,19 +14200,21 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
         for (int v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            F(arrival_lanes)(&arrival, k, at, VLOAD(s));
+            F(arrival_lanes)(&arrival, k, at, V_LOAD(s));
             const V factor = arrival.factor;
-            VSTORE(s + 16, factor);
+            V_STORE(s + 16, factor);
             for (int c = 0; c < 3; c++)
-                VSTORE(at + 16 * c, VFMA(factor, VLOAD(m + SSDGS__TILE_LAYER + 16 * c), VLOAD(at + 16 * c)));
-            if (!VBITS(VLT(VSET(0), VMAX(VMAX(VLOAD(m), VLOAD(m + 16)), VLOAD(m + 32))))) continue;
+                V_STORE(at + 16 * c,
+                        V_FMA(factor, V_LOAD(m + SSDGS__TILE_LAYER + 16 * c), V_LOAD(at + 16 * c)));
+            if (!V_BITS(V_LT(V_SET(0), V_MAX(V_MAX(V_LOAD(m), V_LOAD(m + 16)), V_LOAD(m + 32))))) continue;
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
             V lobes[SSDGS_ASG_COUNT];
-            const V value = VMUL(
-                factor, VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), F(glow)(k, g.q, lobes)), VSET(0)));
+            const V value =
+                V_MUL(factor,
+                      V_SEL(g.half, V_MUL(V_MUL(g.microfacet, g.fresnel), F(glow)(k, g.q, lobes)), V_SET(0)));
             for (int c = 0; c < 3; c++)
-                VSTORE(at + 16 * c, VFMA(value, VLOAD(m + 16 * c), VLOAD(at + 16 * c)));
+                V_STORE(at + 16 * c, V_FMA(value, V_LOAD(m + 16 * c), V_LOAD(at + 16 * c)));
         }
     }
 }
@@ -14327,7 +14225,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                                      const R *visibility, R *gradient, R *sums) {
     V sum[SSDGS__HIGHLIGHT_SUMS][SSDGS__NV];
     for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++)
-        for (int v = 0; v < SSDGS__NV; v++) sum[i][v] = VSET(0);
+        for (int v = 0; v < SSDGS__NV; v++) sum[i][v] = V_SET(0);
     for (int micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         const R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
@@ -14338,136 +14236,138 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
              v++, at += SSDGS__VW, m += SSDGS__VW, d += SSDGS__VW, dm += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
-            V push = VSET(0), dfactor = VSET(0);
+            V push = V_SET(0), dfactor = V_SET(0);
             R *dlayer = d + SSDGS__TILE_LAYER;
-            F(arrival_lanes)(&arrival, k, at, VLOAD(s));
+            F(arrival_lanes)(&arrival, k, at, V_LOAD(s));
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
             V lobes[SSDGS_ASG_COUNT];
             const V glow = F(glow)(k, g.q, lobes);
-            const V value = VSEL(g.half, VMUL(VMUL(g.microfacet, g.fresnel), glow), VSET(0));
+            const V value = V_SEL(g.half, V_MUL(V_MUL(g.microfacet, g.fresnel), glow), V_SET(0));
             for (int i = 0; i < 3; i++) {
-                const V pull = VMUL(VLOAD(d + 16 * i), arrival.factor);
-                VSTORE(dm + 16 * i, VMUL(pull, value));
-                VSTORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
-                push = VFMA(pull, VLOAD(m + 16 * i), push);
+                const V pull = V_MUL(V_LOAD(d + 16 * i), arrival.factor);
+                V_STORE(dm + 16 * i, V_MUL(pull, value));
+                V_STORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
+                push = V_FMA(pull, V_LOAD(m + 16 * i), push);
                 dfactor =
-                    VFMA(VLOAD(d + 16 * i),
-                         VFMA(value, VLOAD(m + 16 * i), VLOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
+                    V_FMA(V_LOAD(d + 16 * i),
+                          V_FMA(value, V_LOAD(m + 16 * i), V_LOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
             }
             V dcover = F(arrival_backward)(&arrival, k, dfactor, d);
-            push = VSEL(g.half, push, VSET(0));
-            const V dmicrofacet = VMUL(push, VMUL(g.fresnel, glow));
-            push = VMUL(push, g.microfacet);
+            push = V_SEL(g.half, push, V_SET(0));
+            const V dmicrofacet = V_MUL(push, V_MUL(g.fresnel, glow));
+            push = V_MUL(push, g.microfacet);
             V dq[2];
-            dq[0] = dq[1] = VSET(0);
+            dq[0] = dq[1] = V_SET(0);
             /* a exp(-s ((1 - t) q0 + t q1)), s = exp(log s), t = sigmoid(logit t) */
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 const R *b = k->basis + 12 * j;
-                const V lobe = VMUL(VMUL(push, g.fresnel), lobes[j]), pull = VMUL(VSET(-b[9] * b[10]), lobe);
+                const V lobe = V_MUL(V_MUL(push, g.fresnel), lobes[j]),
+                        pull = V_MUL(V_SET(-b[9] * b[10]), lobe);
                 V *out = sum[15 + 2 * j] + v;
-                const V fold = VFMA(VSET(1 - b[8]), g.q[0], VMUL(VSET(b[8]), g.q[1]));
-                dq[0] = VFMA(VSET(1 - b[8]), pull, dq[0]);
-                dq[1] = VFMA(VSET(b[8]), pull, dq[1]);
-                *out = VFMA(fold, pull, *out);
+                const V fold = V_FMA(V_SET(1 - b[8]), g.q[0], V_MUL(V_SET(b[8]), g.q[1]));
+                dq[0] = V_FMA(V_SET(1 - b[8]), pull, dq[0]);
+                dq[1] = V_FMA(V_SET(b[8]), pull, dq[1]);
+                *out = V_FMA(fold, pull, *out);
                 out += SSDGS__NV;
-                *out = VFMA(VMUL(VSET(b[8] * (1 - b[8])), VSUB(g.q[1], g.q[0])), pull, *out);
+                *out = V_FMA(V_MUL(V_SET(b[8] * (1 - b[8])), V_SUB(g.q[1], g.q[0])), pull, *out);
                 sum[15 + 2 * SSDGS_ASG_COUNT + j][v] =
-                    VFMA(VSET(b[11]), lobe, sum[15 + 2 * SSDGS_ASG_COUNT + j][v]);
+                    V_FMA(V_SET(b[11]), lobe, sum[15 + 2 * SSDGS_ASG_COUNT + j][v]);
             }
             /* F = F0 + (1 - F0) (1 - wo.h)^5 */
-            push = VMUL(push, glow);
-            const V df0 = VMUL(push, VSUB(VSET(1), g.fifth));
-            const V missing2 = VMUL(g.missing, g.missing);
-            V dwoh = VMUL(VMUL(push, VSUB(VSET(1), g.f0)), VMUL(VSET(-5), VMUL(missing2, missing2)));
-            const V steep = VMUL(VMUL(VSET(-2), dmicrofacet), VMUL(g.microfacet, g.inverse_woh));
-            dwoh = VADD(dwoh, VSEL(VLT(g.missing, VSET(1 - SSDGS__GRAZING)), steep, VSET(0)));
-            const V dcosine =
-                VSEL(VLT(VSET(0), g.cosine), VMUL(dmicrofacet, VMUL(g.inverse_woh, g.inverse_woh)), VSET(0));
+            push = V_MUL(push, glow);
+            const V df0 = V_MUL(push, V_SUB(V_SET(1), g.fifth));
+            const V missing2 = V_MUL(g.missing, g.missing);
+            V dwoh = V_MUL(V_MUL(push, V_SUB(V_SET(1), g.f0)), V_MUL(V_SET(-5), V_MUL(missing2, missing2)));
+            const V steep = V_MUL(V_MUL(V_SET(-2), dmicrofacet), V_MUL(g.microfacet, g.inverse_woh));
+            dwoh = V_ADD(dwoh, V_SEL(V_LT(g.missing, V_SET(1 - SSDGS__GRAZING)), steep, V_SET(0)));
+            const V dcosine = V_SEL(V_LT(V_SET(0), g.cosine),
+                                    V_MUL(dmicrofacet, V_MUL(g.inverse_woh, g.inverse_woh)), V_SET(0));
             for (int j = 0; j < 2; j++) {
-                const V dlayer_q = VMUL(dq[j], g.inverse_cover);
+                const V dlayer_q = V_MUL(dq[j], g.inverse_cover);
                 for (int i = 0; i < 3; i++) {
-                    const V twice = VMUL(VMUL(VSET(2), dlayer_q), g.p[j][i]);
+                    const V twice = V_MUL(V_MUL(V_SET(2), dlayer_q), g.p[j][i]);
                     R *cross = dlayer + SSDGS__TILE_LAYER + 16 * i;
-                    VSTORE(dlayer + 16 * i,
-                           VFMA(VMUL(dlayer_q, g.p[j][i]), g.p[j][i], VLOAD(dlayer + 16 * i)));
-                    VSTORE(cross, VFMA(twice, g.p[j][(i + 1) % 3], VLOAD(cross)));
+                    V_STORE(dlayer + 16 * i,
+                            V_FMA(V_MUL(dlayer_q, g.p[j][i]), g.p[j][i], V_LOAD(dlayer + 16 * i)));
+                    V_STORE(cross, V_FMA(twice, g.p[j][(i + 1) % 3], V_LOAD(cross)));
                 }
             }
             V dh[3];
-            for (int i = 0; i < 3; i++) dh[i] = VMUL(VMUL(VSET(2), dq[0]), g.row[0][i]); /* p's */
-            const V dh_along = VDOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
+            for (int i = 0; i < 3; i++) dh[i] = V_MUL(V_MUL(V_SET(2), dq[0]), g.row[0][i]); /* p's */
+            const V dh_along = V_DOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
             V dn[3], dwo[3];
             for (int i = 0; i < 3; i++) { /* p = h - n (n.h) */
-                dn[i] = VFMA(dcosine, g.wi[i], VNEG(VFMA(g.along, dh[i], VMUL(g.h[i], dh_along))));
-                dh[i] = VFMA(dwoh, g.wo[i],
-                             VFMA(VMUL(VSET(2), dq[1]), g.row[1][i], VFNMA(g.n[i], dh_along, dh[i])));
-                dwo[i] = VMUL(dwoh, g.h[i]);
+                dn[i] = V_FMA(dcosine, g.wi[i], V_NEG(V_FMA(g.along, dh[i], V_MUL(g.h[i], dh_along))));
+                dh[i] = V_FMA(dwoh, g.wo[i],
+                              V_FMA(V_MUL(V_SET(2), dq[1]), g.row[1][i], V_FNMA(g.n[i], dh_along, dh[i])));
+                dwo[i] = V_MUL(dwoh, g.h[i]);
             }
-            const V dn_along = VDOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
+            const V dn_along = V_DOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
             for (int i = 0; i < 3; i++) {
                 R *out = dlayer + 3 * SSDGS__TILE_LAYER + 16 * i;
-                VSTORE(out, VFMA(VFNMA(g.n[i], dn_along, dn[i]), g.inverse_n, VLOAD(out)));
+                V_STORE(out, V_FMA(V_FNMA(g.n[i], dn_along, dn[i]), g.inverse_n, V_LOAD(out)));
             }
-            const V along_h = VDOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+            const V along_h = V_DOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
             for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
-                const V dsum = VMUL(VFNMA(g.h[i], along_h, dh[i]), g.inverse_h);
-                dwo[i] = VADD(dwo[i], dsum);
-                dh[i] = VFMA(dcosine, g.n[i], dsum);
+                const V dsum = V_MUL(V_FNMA(g.h[i], along_h, dh[i]), g.inverse_h);
+                dwo[i] = V_ADD(dwo[i], dsum);
+                dh[i] = V_FMA(dcosine, g.n[i], dsum);
             }
             const V along_light =
-                VSEL(F(held)(g.wi), VSET(0), VDOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]));
-            const V along_eye = VDOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
-            V ddepth = VSET(0);
+                V_SEL(F(held)(g.wi), V_SET(0), V_DOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]));
+            const V along_eye = V_DOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+            V ddepth = V_SET(0);
             V dat[3];
             /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
             for (int i = 0; i < 3; i++) {
-                dat[i] = VMUL(VSUB(VMUL(g.wi[i], along_light), dh[i]), g.inverse_light);
-                sum[i][v] = VSUB(sum[i][v], dat[i]);
-                if (k->directional) dat[i] = VSET(0);
-                ddepth = VFMA(dat[i], g.ray[i], ddepth);
-                sum[3 + i][v] = VADD(sum[3 + i][v], dat[i]);
+                dat[i] = V_MUL(V_SUB(V_MUL(g.wi[i], along_light), dh[i]), g.inverse_light);
+                sum[i][v] = V_SUB(sum[i][v], dat[i]);
+                if (k->directional) dat[i] = V_SET(0);
+                ddepth = V_FMA(dat[i], g.ray[i], ddepth);
+                sum[3 + i][v] = V_ADD(sum[3 + i][v], dat[i]);
                 const V dray =
-                    VFMA(dat[i], g.depth, VMUL(VSUB(VMUL(g.wo[i], along_eye), dwo[i]), g.inverse_ray));
-                sum[6 + i][v] = VFMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */
-                sum[9 + i][v] = VFMA(dray, g.to_camera[1], sum[9 + i][v]);
-                sum[12 + i][v] = VADD(dray, sum[12 + i][v]);
+                    V_FMA(dat[i], g.depth, V_MUL(V_SUB(V_MUL(g.wo[i], along_eye), dwo[i]), g.inverse_ray));
+                sum[6 + i][v] = V_FMA(dray, g.to_camera[0], sum[6 + i][v]); /* ray = R' (x, y, 1) */
+                sum[9 + i][v] = V_FMA(dray, g.to_camera[1], sum[9 + i][v]);
+                sum[12 + i][v] = V_ADD(dray, sum[12 + i][v]);
             }
             dlayer += 2 * SSDGS__TILE_LAYER;
-            VSTORE(dlayer, VFMA(ddepth, g.inverse_cover, VLOAD(dlayer)));
-            VSTORE(dlayer + 16, VFMA(df0, g.inverse_cover, VLOAD(dlayer + 16)));
+            V_STORE(dlayer, V_FMA(ddepth, g.inverse_cover, V_LOAD(dlayer)));
+            V_STORE(dlayer + 16, V_FMA(df0, g.inverse_cover, V_LOAD(dlayer + 16)));
             /* -A dL/dA: all are divided by A */
-            dcover = VFMA(dq[0], g.q[0], VFMA(dq[1], g.q[1], VFMA(ddepth, g.depth, VFMA(df0, g.f0, dcover))));
-            VSTORE(dlayer + 32, VFNMA(dcover, g.inverse_cover, VLOAD(dlayer + 32)));
+            dcover =
+                V_FMA(dq[0], g.q[0], V_FMA(dq[1], g.q[1], V_FMA(ddepth, g.depth, V_FMA(df0, g.f0, dcover))));
+            V_STORE(dlayer + 32, V_FNMA(dcover, g.inverse_cover, V_LOAD(dlayer + 32)));
         }
     }
     for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);
 }
 
 /* Deferred: F0 of its logit from 0.04's on. */
-SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(VADD(raw, VSET(SSDGS__F0_LOGIT))); }
+SSDGS__FI V F(reflectance)(V raw) { return F(sigmoid)(V_ADD(raw, V_SET(SSDGS__F0_LOGIT))); }
 
 /* gauss (CHANNELS, BLOCK) -> rows (SSDGS__LOBE, BLOCK): Q's xx, yy, zz, xy, yz, zx, the normal, F0,
    softness. */
 SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         V raw[4];
-        for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        for (int i = 0; i < 4; i++) raw[i] = V_LOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
         V q[4], r[9];
         F(rotation)(raw, q, r);
         V sharp[2];
         for (int j = 0; j < 2; j++)
-            sharp[j] = F(sharpness)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
+            sharp[j] = F(sharpness)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s));
         for (int i = 0; i < 6; i++) {
             const int a = 3 * (i % 3), b = i < 3 ? a : (a + 3) % 9;
-            VSTORE(rows + i * SSDGS__BLOCK + s,
-                   VFMA(VMUL(sharp[0], r[a]), r[b], VMUL(VMUL(sharp[1], r[a + 1]), r[b + 1])));
+            V_STORE(rows + i * SSDGS__BLOCK + s,
+                    V_FMA(V_MUL(sharp[0], r[a]), r[b], V_MUL(V_MUL(sharp[1], r[a + 1]), r[b + 1])));
         }
-        for (int i = 0; i < 3; i++) VSTORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
-        VSTORE(rows + 9 * SSDGS__BLOCK + s,
-               F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
-        VSTORE(rows + 10 * SSDGS__BLOCK + s,
-               F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
+        for (int i = 0; i < 3; i++) V_STORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
+        V_STORE(rows + 9 * SSDGS__BLOCK + s,
+                F(reflectance)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
+        V_STORE(rows + 10 * SSDGS__BLOCK + s,
+                F(sigmoid)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
     }
 }
 
@@ -14476,38 +14376,38 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         V raw[4];
         R *out = dgauss + SSDGS_FRAME * SSDGS__BLOCK + s;
-        for (int i = 0; i < 4; i++) raw[i] = VLOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
+        for (int i = 0; i < 4; i++) raw[i] = V_LOAD(gauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s);
         V q[4], r[9];
         const V inverse_q = F(rotation)(raw, q, r);
         V dr[9];
-        for (int i = 0; i < 3; i++) dr[3 * i + 2] = VLOAD(drows + (6 + i) * SSDGS__BLOCK + s);
+        for (int i = 0; i < 3; i++) dr[3 * i + 2] = V_LOAD(drows + (6 + i) * SSDGS__BLOCK + s);
         /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
         for (int j = 0; j < 2; j++) {
-            const V log_sharp = VLOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
+            const V log_sharp = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
                     sharp = F(sharpness)(log_sharp);
             R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-            V product = VSET(0);
+            V product = V_SET(0);
             for (int i = 0; i < 3; i++) {
                 const int next = (i + 1) % 3, before = (i + 2) % 3;
                 const V row =
-                    VFMA(VMUL(VSET(2), VLOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
-                         VFMA(VLOAD(drows + (3 + i) * SSDGS__BLOCK + s), r[3 * next + j],
-                              VMUL(VLOAD(drows + (3 + before) * SSDGS__BLOCK + s), r[3 * before + j])));
-                dr[3 * i + j] = VMUL(sharp, row);
-                product = VFMA(VMUL(VSET(0.5), row), r[3 * i + j], product);
+                    V_FMA(V_MUL(V_SET(2), V_LOAD(drows + i * SSDGS__BLOCK + s)), r[3 * i + j],
+                          V_FMA(V_LOAD(drows + (3 + i) * SSDGS__BLOCK + s), r[3 * next + j],
+                                V_MUL(V_LOAD(drows + (3 + before) * SSDGS__BLOCK + s), r[3 * before + j])));
+                dr[3 * i + j] = V_MUL(sharp, row);
+                product = V_FMA(V_MUL(V_SET(0.5), row), r[3 * i + j], product);
             }
-            product = VSEL(VLT(VABS(log_sharp), VSET(SSDGS__SHARPEST)), VMUL(product, sharp), VSET(0));
-            VSTORE(dsharp, VADD(VLOAD(dsharp), product));
+            product = V_SEL(V_LT(V_ABS(log_sharp), V_SET(SSDGS__SHARPEST)), V_MUL(product, sharp), V_SET(0));
+            V_STORE(dsharp, V_ADD(V_LOAD(dsharp), product));
         }
         V dq[4];
         F(rotation_backward)(dq, q, inverse_q, dr);
-        for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) VSTORE(out, VADD(VLOAD(out), dq[i]));
-        const V f0 = F(reflectance)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
+        for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) V_STORE(out, V_ADD(V_LOAD(out), dq[i]));
+        const V f0 = F(reflectance)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
         out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
-        VSTORE(out, VFMA(VFNMA(f0, f0, f0), VLOAD(drows + 9 * SSDGS__BLOCK + s), VLOAD(out)));
-        const V soft = F(sigmoid)(VLOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
+        V_STORE(out, V_FMA(V_FNMA(f0, f0, f0), V_LOAD(drows + 9 * SSDGS__BLOCK + s), V_LOAD(out)));
+        const V soft = F(sigmoid)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
         out += SSDGS__BLOCK;
-        VSTORE(out, VFMA(VFNMA(soft, soft, soft), VLOAD(drows + 10 * SSDGS__BLOCK + s), VLOAD(out)));
+        V_STORE(out, V_FMA(V_FNMA(soft, soft, soft), V_LOAD(drows + 10 * SSDGS__BLOCK + s), V_LOAD(out)));
     }
 }
 
@@ -14518,38 +14418,40 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
    printed, s is sigma_t, the virtual source's factor zr zv, and its bracket has the real source's
    distance. */
 SSDGS__FI V F(dipole)(const int printed, V ss, V sa, V r, R virtual_depth, V *d) {
-    const V one = VSET(1), st = VADD(ss, sa), inverse_st = VDIV(one, st), albedo = VMUL(ss, inverse_st);
-    const V str = VSQRT(VMUL(VMUL(VSET(3), sa), st)), s = printed ? st : str;
-    const V zr = inverse_st, zv = VMUL(zr, VSET(virtual_depth)), factor = printed ? VMUL(zr, zv) : zv;
-    const V dr = VSQRT(VFMA(r, r, VMUL(zr, zr))), dv = VSQRT(VFMA(r, r, VMUL(zv, zv))), q = printed ? dr : dv;
-    const V ir = VDIV(one, dr), iv = VDIV(one, dv);
-    const V er = VMUL(VEXP(VNEG(VMUL(s, dr))), VMUL(ir, VMUL(ir, ir)));
-    const V ev = VMUL(VEXP(VNEG(VMUL(s, dv))), VMUL(iv, VMUL(iv, iv)));
-    const V br = VFMA(s, dr, one), bv = VFMA(s, q, one);
-    const V scale = VMUL(albedo, VSET(0.079577471545947668)); /* 1 / (4 pi) */
-    const V first = VMUL(br, er), second = VMUL(bv, ev), f = VFMA(zr, first, VMUL(factor, second));
+    const V one = V_SET(1), st = V_ADD(ss, sa), inverse_st = V_DIV(one, st), albedo = V_MUL(ss, inverse_st);
+    const V str = V_SQRT(V_MUL(V_MUL(V_SET(3), sa), st)), s = printed ? st : str;
+    const V zr = inverse_st, zv = V_MUL(zr, V_SET(virtual_depth)), factor = printed ? V_MUL(zr, zv) : zv;
+    const V dr = V_SQRT(V_FMA(r, r, V_MUL(zr, zr))), dv = V_SQRT(V_FMA(r, r, V_MUL(zv, zv))),
+            q = printed ? dr : dv;
+    const V ir = V_DIV(one, dr), iv = V_DIV(one, dv);
+    const V er = V_MUL(V_EXP(V_NEG(V_MUL(s, dr))), V_MUL(ir, V_MUL(ir, ir)));
+    const V ev = V_MUL(V_EXP(V_NEG(V_MUL(s, dv))), V_MUL(iv, V_MUL(iv, iv)));
+    const V br = V_FMA(s, dr, one), bv = V_FMA(s, q, one);
+    const V scale = V_MUL(albedo, V_SET(0.079577471545947668)); /* 1 / (4 pi) */
+    const V first = V_MUL(br, er), second = V_MUL(bv, ev), f = V_FMA(zr, first, V_MUL(factor, second));
     if (d) {
-        const V ddr = VNEG(VMUL(VMUL(zr, er), VFMA(VMUL(s, dr), s, VMUL(VSET(3), VADD(s, ir)))));
-        const V ddv = VNEG(VMUL(VMUL(factor, second), VFMA(VSET(3), iv, s)));
-        const V dq = VMUL(VMUL(factor, ev), s);
-        const V to_dr = printed ? VADD(ddr, dq) : ddr, to_dv = printed ? ddv : VADD(ddv, dq);
-        const V ds = VFNMA(VMUL(zr, er), VMUL(s, VMUL(dr, dr)), VMUL(VMUL(factor, ev), VFNMA(dv, bv, q)));
-        const V dfactor = printed ? VMUL(VMUL(VSET(2), second), zv) : VMUL(second, VSET(virtual_depth));
-        const V dzv = VMUL(VMUL(to_dv, VMUL(zv, iv)), VSET(virtual_depth));
-        const V dz = VADD(VADD(first, dfactor), VFMA(to_dr, VMUL(zr, ir), dzv));
-        V dst = VNEG(VMUL(dz, VMUL(zr, zr))), dsa = VSET(0);
+        const V ddr = V_NEG(V_MUL(V_MUL(zr, er), V_FMA(V_MUL(s, dr), s, V_MUL(V_SET(3), V_ADD(s, ir)))));
+        const V ddv = V_NEG(V_MUL(V_MUL(factor, second), V_FMA(V_SET(3), iv, s)));
+        const V dq = V_MUL(V_MUL(factor, ev), s);
+        const V to_dr = printed ? V_ADD(ddr, dq) : ddr, to_dv = printed ? ddv : V_ADD(ddv, dq);
+        const V ds =
+            V_FNMA(V_MUL(zr, er), V_MUL(s, V_MUL(dr, dr)), V_MUL(V_MUL(factor, ev), V_FNMA(dv, bv, q)));
+        const V dfactor = printed ? V_MUL(V_MUL(V_SET(2), second), zv) : V_MUL(second, V_SET(virtual_depth));
+        const V dzv = V_MUL(V_MUL(to_dv, V_MUL(zv, iv)), V_SET(virtual_depth));
+        const V dz = V_ADD(V_ADD(first, dfactor), V_FMA(to_dr, V_MUL(zr, ir), dzv));
+        V dst = V_NEG(V_MUL(dz, V_MUL(zr, zr))), dsa = V_SET(0);
         if (printed) {
-            dst = VADD(dst, ds);
+            dst = V_ADD(dst, ds);
         } else { /* str^2 = 3 sa st */
-            const V k = VMUL(VMUL(ds, VSET(1.5)), VDIV(one, VMAX(str, VMUL(VSET(1e-7), st))));
-            dst = VFMA(k, sa, dst);
-            dsa = VMUL(k, st);
+            const V k = V_MUL(V_MUL(ds, V_SET(1.5)), V_DIV(one, V_MAX(str, V_MUL(V_SET(1e-7), st))));
+            dst = V_FMA(k, sa, dst);
+            dsa = V_MUL(k, st);
         }
-        d[0] = VMUL(scale, VFMA(VDIV(f, ss), VMUL(sa, inverse_st), dst));
-        d[1] = VMUL(scale, VFNMA(f, inverse_st, VADD(dst, dsa)));
-        d[2] = VMUL(VMUL(scale, r), VFMA(to_dr, ir, VMUL(to_dv, iv)));
+        d[0] = V_MUL(scale, V_FMA(V_DIV(f, ss), V_MUL(sa, inverse_st), dst));
+        d[1] = V_MUL(scale, V_FNMA(f, inverse_st, V_ADD(dst, dsa)));
+        d[2] = V_MUL(V_MUL(scale, r), V_FMA(to_dr, ir, V_MUL(to_dv, iv)));
     }
-    return VMUL(scale, f);
+    return V_MUL(scale, f);
 }
 
 /* ==== >>colour_kernel  eqs. 3, 8 and 13: a block's colour from the networks' outputs ==== */
@@ -14559,45 +14461,45 @@ SSDGS__FI V F(dipole)(const int printed, V ss, V sa, V r, R virtual_depth, V *d)
 SSDGS__FI V F(dipole_of)(const ssdgs__lighting *k, const R *network, int c, int s, V unit[3], V *d) {
     const int first = k->per_channel_optics ? c : 0, absorb = k->per_channel_optics ? 3 + c : 1,
               separation = k->per_channel_optics ? 6 : 2;
-    unit[0] = F(sigmoid)(VLOAD(network + first * SSDGS__BLOCK + s));
-    unit[1] = F(sigmoid)(VLOAD(network + absorb * SSDGS__BLOCK + s));
-    unit[2] = F(sigmoid)(VLOAD(network + separation * SSDGS__BLOCK + s));
-    return F(dipole)(k->printed_dipole, VFMA(unit[0], VSET(2), VSET(0.05)),
-                     VFMA(unit[1], VSET(2), VSET(0.05)), VFMA(unit[2], VSET(3), VSET(0.1)), k->virtual_depth,
-                     d);
+    unit[0] = F(sigmoid)(V_LOAD(network + first * SSDGS__BLOCK + s));
+    unit[1] = F(sigmoid)(V_LOAD(network + absorb * SSDGS__BLOCK + s));
+    unit[2] = F(sigmoid)(V_LOAD(network + separation * SSDGS__BLOCK + s));
+    return F(dipole)(k->printed_dipole, V_FMA(unit[0], V_SET(2), V_SET(0.05)),
+                     V_FMA(unit[1], V_SET(2), V_SET(0.05)), V_FMA(unit[2], V_SET(3), V_SET(0.1)),
+                     k->virtual_depth, d);
 }
 
 /* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
 SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R *out) {
     const R *gauss = in->gauss, *rows = in->geometry, *visibility = in->visibility, *shadow = in->shadow;
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-                factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
-        V profile = VSET(0), unit[3];
+        const V irradiance = V_LOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
+                factor = F(shadow_factor)(k, V_LOAD(visibility + s), shadow ? V_LOAD(shadow + s) : V_SET(0));
+        V profile = V_SET(0), unit[3];
         R *o = out + s;
         for (int c = 0; c < 3; c++) {
-            const V power = VMUL(irradiance, VSET(k->intensity[c])), shaded = VMUL(power, factor);
+            const V power = V_MUL(irradiance, V_SET(k->intensity[c])), shaded = V_MUL(power, factor);
             const V lit = k->deferred ? power : shaded;
             if (k->diffuse) {
-                const V kd = F(softplus)(VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
-                const V f =
-                    VMUL(VMUL(kd, VSET(0.31830988618379067)), VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
-                VSTORE(o + c * SSDGS__BLOCK, VFMA(f, lit, VLOAD(o + c * SSDGS__BLOCK)));
+                const V kd = F(softplus)(V_LOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
+                const V f = V_MUL(V_MUL(kd, V_SET(0.31830988618379067)),
+                                  V_LOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
+                V_STORE(o + c * SSDGS__BLOCK, V_FMA(f, lit, V_LOAD(o + c * SSDGS__BLOCK)));
             }
             if (k->specular) {
-                const V ks = F(softplus)(VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));
-                const V f = VMUL(ks, VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s));
-                VSTORE(o + (3 + c) * SSDGS__BLOCK, VFMA(f, lit, VLOAD(o + (3 + c) * SSDGS__BLOCK)));
+                const V ks = F(softplus)(V_LOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));
+                const V f = V_MUL(ks, V_LOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s));
+                V_STORE(o + (3 + c) * SSDGS__BLOCK, V_FMA(f, lit, V_LOAD(o + (3 + c) * SSDGS__BLOCK)));
             }
             if (k->scattering) {
-                const V kss = F(softplus)(VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
+                const V kss = F(softplus)(V_LOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, NULL);
-                VSTORE(o + (6 + c) * SSDGS__BLOCK,
-                       VFMA(VMUL(kss, profile), k->shadow_on_scattering ? shaded : power,
-                            VLOAD(o + (6 + c) * SSDGS__BLOCK)));
+                V_STORE(o + (6 + c) * SSDGS__BLOCK,
+                        V_FMA(V_MUL(kss, profile), k->shadow_on_scattering ? shaded : power,
+                              V_LOAD(o + (6 + c) * SSDGS__BLOCK)));
             }
         }
-        VSTORE(o + 9 * SSDGS__BLOCK, VADD(factor, VLOAD(o + 9 * SSDGS__BLOCK)));
+        V_STORE(o + 9 * SSDGS__BLOCK, V_ADD(factor, V_LOAD(o + 9 * SSDGS__BLOCK)));
     }
 }
 
@@ -14610,68 +14512,70 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
     R *dgauss = out->gauss, *drows = out->geometry, *dshadow = out->shadow, *doptics = out->optics;
     R *dvisibility = out->visibility;
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
-        const V irradiance = VLOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
-                factor = F(shadow_factor)(k, VLOAD(visibility + s), shadow ? VLOAD(shadow + s) : VSET(0));
-        const V cosine = VLOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s),
-                gloss = VLOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
-        const V direct = k->deferred ? VSET(1) : factor;
-        V dirradiance = VSET(0), dcosine = VSET(0), dgloss = VSET(0), dfactor = VSET(0), ddirect = VSET(0),
-          profile = VSET(0), unit[3], d[3], dunit[3];
-        for (int i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = VSET(0);
+        const V irradiance = V_LOAD(rows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s),
+                factor = F(shadow_factor)(k, V_LOAD(visibility + s), shadow ? V_LOAD(shadow + s) : V_SET(0));
+        const V cosine = V_LOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s),
+                gloss = V_LOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s);
+        const V direct = k->deferred ? V_SET(1) : factor;
+        V dirradiance = V_SET(0), dcosine = V_SET(0), dgloss = V_SET(0), dfactor = V_SET(0),
+          ddirect = V_SET(0), profile = V_SET(0), unit[3], d[3], dunit[3];
+        for (int i = 0; i < 3; i++) unit[i] = d[i] = dunit[i] = V_SET(0);
         for (int c = 0; c < 3; c++) {
             if (k->diffuse) { /* (c_d / pi) f_d S */
-                const V raw = VLOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
-                const V kd = VMUL(F(softplus)(raw), VSET(0.31830988618379067)), surface = VMUL(kd, cosine);
-                const V push = VMUL(VLOAD(ddiffuse + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                        lit = VMUL(VMUL(push, irradiance), direct);
+                const V raw = V_LOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s);
+                const V kd = V_MUL(F(softplus)(raw), V_SET(0.31830988618379067)), surface = V_MUL(kd, cosine);
+                const V push = V_MUL(V_LOAD(ddiffuse + c * SSDGS__BLOCK + s), V_SET(k->intensity[c])),
+                        lit = V_MUL(V_MUL(push, irradiance), direct);
                 R *to = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
-                VSTORE(to,
-                       VFMA(VMUL(VMUL(lit, cosine), VSET(0.31830988618379067)), F(sigmoid)(raw), VLOAD(to)));
-                dcosine = VFMA(lit, kd, dcosine);
-                dirradiance = VFMA(VMUL(push, direct), surface, dirradiance);
-                ddirect = VFMA(VMUL(push, irradiance), surface, ddirect);
+                V_STORE(to, V_FMA(V_MUL(V_MUL(lit, cosine), V_SET(0.31830988618379067)), F(sigmoid)(raw),
+                                  V_LOAD(to)));
+                dcosine = V_FMA(lit, kd, dcosine);
+                dirradiance = V_FMA(V_MUL(push, direct), surface, dirradiance);
+                ddirect = V_FMA(V_MUL(push, irradiance), surface, ddirect);
             }
             if (k->specular) { /* c_s f_s S */
-                const V raw = VLOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
-                const V push = VMUL(VLOAD(dspecular + c * SSDGS__BLOCK + s), VSET(k->intensity[c])),
-                        lobe_lit = VMUL(VMUL(push, irradiance), direct), shine = VMUL(ks, gloss);
+                const V raw = V_LOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s), ks = F(softplus)(raw);
+                const V push = V_MUL(V_LOAD(dspecular + c * SSDGS__BLOCK + s), V_SET(k->intensity[c])),
+                        lobe_lit = V_MUL(V_MUL(push, irradiance), direct), shine = V_MUL(ks, gloss);
                 R *to = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
-                VSTORE(to, VFMA(VMUL(lobe_lit, gloss), F(sigmoid)(raw), VLOAD(to)));
-                dgloss = VFMA(lobe_lit, ks, dgloss);
-                dirradiance = VFMA(VMUL(push, direct), shine, dirradiance);
-                ddirect = VFMA(VMUL(push, irradiance), shine, ddirect);
+                V_STORE(to, V_FMA(V_MUL(lobe_lit, gloss), F(sigmoid)(raw), V_LOAD(to)));
+                dgloss = V_FMA(lobe_lit, ks, dgloss);
+                dirradiance = V_FMA(V_MUL(push, direct), shine, dirradiance);
+                ddirect = V_FMA(V_MUL(push, irradiance), shine, ddirect);
             }
             if (k->scattering) { /* c_sss f_sss */
-                const V g = VMUL(VLOAD(dcolor + c * SSDGS__BLOCK + s), VSET(k->intensity[c]));
-                const V raw = VLOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s),
+                const V g = V_MUL(V_LOAD(dcolor + c * SSDGS__BLOCK + s), V_SET(k->intensity[c]));
+                const V raw = V_LOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s),
                         kss = F(softplus)(raw);
                 R *to = dgauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s;
-                const V power = k->shadow_on_scattering ? VMUL(g, factor) : g, lamp = VMUL(power, irradiance);
+                const V power = k->shadow_on_scattering ? V_MUL(g, factor) : g,
+                        lamp = V_MUL(power, irradiance);
                 if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, d);
-                VSTORE(to, VFMA(VMUL(lamp, profile), F(sigmoid)(raw), VLOAD(to)));
-                dirradiance = VFMA(power, VMUL(kss, profile), dirradiance);
-                if (k->shadow_on_scattering) dfactor = VFMA(VMUL(g, irradiance), VMUL(kss, profile), dfactor);
-                const V dprofile = VMUL(lamp, kss);
-                for (int i = 0; i < 3; i++) dunit[i] = VFMA(dprofile, d[i], dunit[i]);
+                V_STORE(to, V_FMA(V_MUL(lamp, profile), F(sigmoid)(raw), V_LOAD(to)));
+                dirradiance = V_FMA(power, V_MUL(kss, profile), dirradiance);
+                if (k->shadow_on_scattering)
+                    dfactor = V_FMA(V_MUL(g, irradiance), V_MUL(kss, profile), dfactor);
+                const V dprofile = V_MUL(lamp, kss);
+                for (int i = 0; i < 3; i++) dunit[i] = V_FMA(dprofile, d[i], dunit[i]);
                 if (k->per_channel_optics || c == 2)
                     for (int i = 0; i < 2; i++) { /* sigma = 2 sigmoid(o) + 0.05 */
-                        VSTORE(doptics + (k->per_channel_optics ? 3 * i + c : i) * SSDGS__BLOCK + s,
-                               VMUL(VMUL(VSET(2), dunit[i]), VFNMA(unit[i], unit[i], unit[i])));
-                        dunit[i] = VSET(0);
+                        V_STORE(doptics + (k->per_channel_optics ? 3 * i + c : i) * SSDGS__BLOCK + s,
+                                V_MUL(V_MUL(V_SET(2), dunit[i]), V_FNMA(unit[i], unit[i], unit[i])));
+                        dunit[i] = V_SET(0);
                     }
             }
         }
         if (k->scattering)
-            VSTORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
-                   VMUL(VMUL(VSET(3), dunit[2]), VFNMA(unit[2], unit[2], unit[2])));
-        if (!k->deferred) dfactor = VADD(dfactor, ddirect); /* else S is the pixel's for these two */
+            V_STORE(doptics + (k->per_channel_optics ? 6 : 2) * SSDGS__BLOCK + s,
+                    V_MUL(V_MUL(V_SET(3), dunit[2]), V_FNMA(unit[2], unit[2], unit[2])));
+        if (!k->deferred) dfactor = V_ADD(dfactor, ddirect); /* else S is the pixel's for these two */
         if (k->shadow) {
-            VSTORE(dshadow + s, F(shadow_factor_backward)(k, VLOAD(visibility + s), factor, &dfactor));
-            VSTORE(dvisibility + s, dfactor);
+            V_STORE(dshadow + s, F(shadow_factor_backward)(k, V_LOAD(visibility + s), factor, &dfactor));
+            V_STORE(dvisibility + s, dfactor);
         }
-        VSTORE(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, dirradiance);
-        VSTORE(drows + SSDGS__COSINE * SSDGS__BLOCK + s, dcosine);
-        VSTORE(drows + SSDGS__GLOSS * SSDGS__BLOCK + s, dgloss);
+        V_STORE(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, dirradiance);
+        V_STORE(drows + SSDGS__COSINE * SSDGS__BLOCK + s, dcosine);
+        V_STORE(drows + SSDGS__GLOSS * SSDGS__BLOCK + s, dgloss);
     }
 }
 
@@ -14686,59 +14590,60 @@ SSDGS__FN void F(ssim_row)(const ssdgs__ssim_row *at, R sums[3]) {
     R *scratch = at->scratch, *d_mean = at->d_mean, *d_square = at->d_square, *d_product = at->d_product;
     const size_t stride = at->stride;
     const int width = at->width;
-    const V c1 = VSET(1e-4), c2 = VSET(9e-4), half = VSET(0.5), zero = VSET(0);
+    const V c1 = V_SET(1e-4), c2 = V_SET(9e-4), half = V_SET(0.5), zero = V_SET(0);
     for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[5];
         for (int m = 0; m < 5; m++) sum[m] = zero;
         for (int t = -5; t <= 5; t++) {
-            const V w = VSET(ssdgs__window[t + 5]);
-            const V i = VLOAD(image + t * (ptrdiff_t)stride + x),
-                    j = VLOAD(reference + t * (ptrdiff_t)stride + x);
-            const V wi = VMUL(w, i), wj = VMUL(w, j);
-            sum[0] = VADD(sum[0], wi);
-            sum[1] = VADD(sum[1], wj);
-            sum[2] = VFMA(wi, i, sum[2]);
-            sum[3] = VFMA(wj, j, sum[3]);
-            sum[4] = VFMA(wi, j, sum[4]);
+            const V w = V_SET(ssdgs__window[t + 5]);
+            const V i = V_LOAD(image + t * (ptrdiff_t)stride + x),
+                    j = V_LOAD(reference + t * (ptrdiff_t)stride + x);
+            const V wi = V_MUL(w, i), wj = V_MUL(w, j);
+            sum[0] = V_ADD(sum[0], wi);
+            sum[1] = V_ADD(sum[1], wj);
+            sum[2] = V_FMA(wi, i, sum[2]);
+            sum[3] = V_FMA(wj, j, sum[3]);
+            sum[4] = V_FMA(wi, j, sum[4]);
         }
-        for (int m = 0; m < 5; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+        for (int m = 0; m < 5; m++) V_STORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
     }
     V total[3][SSDGS__NV];
     for (int m = 0; m < 3 * SSDGS__NV; m++) total[m / SSDGS__NV][m % SSDGS__NV] = zero;
     for (int x = 0; x < width; x += SSDGS__VW) {
         const int v = x / SSDGS__VW % SSDGS__NV;
         V e[5];
-        const VM inside = VLT(VLOAD(ssdgs__count), VSET(width - x));
+        const VM inside = V_LT(V_LOAD(ssdgs__count), V_SET(width - x));
         for (int m = 0; m < 5; m++) {
             const R *row = scratch + (size_t)m * stride + 16 + x;
             e[m] = zero;
-            for (int t = -5; t <= 5; t++) e[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), e[m]);
+            for (int t = -5; t <= 5; t++) e[m] = V_FMA(V_SET(ssdgs__window[t + 5]), V_LOAD(row + t), e[m]);
         }
-        const V mi = VADD(e[0], half);
-        const V mj = VADD(e[1], half);
-        V vi = VFNMA(e[0], e[0], e[2]);
-        const VM varies = VLT(zero, vi);
-        vi = VMAX(vi, zero);
-        const V vj = VMAX(VFNMA(e[1], e[1], e[3]), zero);
-        const V cov = VSEL(VAND(varies, VLT(zero, vj)), VFNMA(e[0], e[1], e[4]),
-                           zero); /* what does not vary does so with nothing */
-        const V a1 = VFMA(VMUL(VSET(2), mi), mj, c1);
-        const V a2 = VFMA(VSET(2), cov, c2);
-        const V b1 = VFMA(mi, mi, VFMA(mj, mj, c1));
-        const V b2 = VADD(VADD(vi, vj), c2);
-        const V inverse = VDIV(VSET(1), VMUL(b1, b2));
-        const V ssim = VMUL(VMUL(a1, a2), inverse);
-        const V by_cov = VMUL(VMUL(VSET(2), a1), inverse);
-        const V by_var = VSEL(varies, VNEG(VDIV(ssim, b2)), zero);
-        V by_mean = VMUL(VSET(2), VFNMA(VMUL(ssim, mi), VDIV(VSET(1), b1), VMUL(VMUL(mj, a2), inverse)));
-        by_mean = VFNMA(by_cov, e[1], VFNMA(VMUL(VSET(2), by_var), e[0], by_mean));
-        VSTORE(d_mean + x, VSEL(inside, by_mean, zero));
-        VSTORE(d_square + x, VSEL(inside, by_var, zero));
-        VSTORE(d_product + x, VSEL(inside, by_cov, zero));
-        const V diff = VSEL(inside, VSUB(VLOAD(image + x), VLOAD(reference + x)), zero);
-        total[0][v] = VADD(total[0][v], VSEL(inside, ssim, zero));
-        total[1][v] = VADD(total[1][v], VABS(diff));
-        total[2][v] = VFMA(diff, diff, total[2][v]);
+        const V mi = V_ADD(e[0], half);
+        const V mj = V_ADD(e[1], half);
+        V vi = V_FNMA(e[0], e[0], e[2]);
+        const VM varies = V_LT(zero, vi);
+        vi = V_MAX(vi, zero);
+        const V vj = V_MAX(V_FNMA(e[1], e[1], e[3]), zero);
+        const V cov = V_SEL(V_AND(varies, V_LT(zero, vj)), V_FNMA(e[0], e[1], e[4]),
+                            zero); /* what does not vary does so with nothing */
+        const V a1 = V_FMA(V_MUL(V_SET(2), mi), mj, c1);
+        const V a2 = V_FMA(V_SET(2), cov, c2);
+        const V b1 = V_FMA(mi, mi, V_FMA(mj, mj, c1));
+        const V b2 = V_ADD(V_ADD(vi, vj), c2);
+        const V inverse = V_DIV(V_SET(1), V_MUL(b1, b2));
+        const V ssim = V_MUL(V_MUL(a1, a2), inverse);
+        const V by_cov = V_MUL(V_MUL(V_SET(2), a1), inverse);
+        const V by_var = V_SEL(varies, V_NEG(V_DIV(ssim, b2)), zero);
+        V by_mean =
+            V_MUL(V_SET(2), V_FNMA(V_MUL(ssim, mi), V_DIV(V_SET(1), b1), V_MUL(V_MUL(mj, a2), inverse)));
+        by_mean = V_FNMA(by_cov, e[1], V_FNMA(V_MUL(V_SET(2), by_var), e[0], by_mean));
+        V_STORE(d_mean + x, V_SEL(inside, by_mean, zero));
+        V_STORE(d_square + x, V_SEL(inside, by_var, zero));
+        V_STORE(d_product + x, V_SEL(inside, by_cov, zero));
+        const V diff = V_SEL(inside, V_SUB(V_LOAD(image + x), V_LOAD(reference + x)), zero);
+        total[0][v] = V_ADD(total[0][v], V_SEL(inside, ssim, zero));
+        total[1][v] = V_ADD(total[1][v], V_ABS(diff));
+        total[2][v] = V_FMA(diff, diff, total[2][v]);
     }
     for (int m = 0; m < 3; m++) sums[m] = F(sum)(total[m]);
 }
@@ -14753,26 +14658,26 @@ SSDGS__FN void F(ssim_backward_row)(const ssdgs__ssim_row *at, R by_l1, R by_ssi
     const int width = at->width;
     for (int x = -16; x + 16 < (int)stride; x += SSDGS__VW) {
         V sum[3];
-        for (int m = 0; m < 3; m++) sum[m] = VSET(0);
+        for (int m = 0; m < 3; m++) sum[m] = V_SET(0);
         for (int t = -5; t <= 5; t++) {
-            const V w = VSET(ssdgs__window[t + 5]);
-            sum[0] = VFMA(w, VLOAD(d_mean + t * (ptrdiff_t)stride + x), sum[0]);
-            sum[1] = VFMA(w, VLOAD(d_square + t * (ptrdiff_t)stride + x), sum[1]);
-            sum[2] = VFMA(w, VLOAD(d_product + t * (ptrdiff_t)stride + x), sum[2]);
+            const V w = V_SET(ssdgs__window[t + 5]);
+            sum[0] = V_FMA(w, V_LOAD(d_mean + t * (ptrdiff_t)stride + x), sum[0]);
+            sum[1] = V_FMA(w, V_LOAD(d_square + t * (ptrdiff_t)stride + x), sum[1]);
+            sum[2] = V_FMA(w, V_LOAD(d_product + t * (ptrdiff_t)stride + x), sum[2]);
         }
-        for (int m = 0; m < 3; m++) VSTORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
+        for (int m = 0; m < 3; m++) V_STORE(scratch + (size_t)m * stride + 16 + x, sum[m]);
     }
     for (int x = 0; x < width; x += SSDGS__VW) {
-        const V i = VLOAD(image + x), j = VLOAD(reference + x), diff = VSUB(i, j), zero = VSET(0);
+        const V i = V_LOAD(image + x), j = V_LOAD(reference + x), diff = V_SUB(i, j), zero = V_SET(0);
         V b[3];
         for (int m = 0; m < 3; m++) {
             const R *row = scratch + (size_t)m * stride + 16 + x;
             b[m] = zero;
-            for (int t = -5; t <= 5; t++) b[m] = VFMA(VSET(ssdgs__window[t + 5]), VLOAD(row + t), b[m]);
+            for (int t = -5; t <= 5; t++) b[m] = V_FMA(V_SET(ssdgs__window[t + 5]), V_LOAD(row + t), b[m]);
         }
-        V g = VMUL(VSET(by_ssim), VFMA(VMUL(VSET(2), i), b[1], VFMA(j, b[2], b[0])));
-        g = VADD(g, VSEL(VLT(zero, diff), VSET(by_l1), VSEL(VLT(diff, zero), VSET(-by_l1), zero)));
-        VSTORE(gradient + x, g);
+        V g = V_MUL(V_SET(by_ssim), V_FMA(V_MUL(V_SET(2), i), b[1], V_FMA(j, b[2], b[0])));
+        g = V_ADD(g, V_SEL(V_LT(zero, diff), V_SET(by_l1), V_SEL(V_LT(diff, zero), V_SET(-by_l1), zero)));
+        V_STORE(gradient + x, g);
     }
 }
 
@@ -14783,37 +14688,37 @@ SSDGS__FN void F(ssim_backward_row)(const ssdgs__ssim_row *at, R by_l1, R by_ssi
    rows of the stride. */
 SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size_t stride, int y, R weight,
                                 R *out) {
-    const V zero = VSET(0), most = VSET(1e12);
+    const V zero = V_SET(0), most = V_SET(1e12);
     const R focal[2] = {camera->fx, camera->fy};
     for (int x = 0; x < camera->width; x += SSDGS__VW) {
         const ptrdiff_t step[2] = {1, (ptrdiff_t)stride};
-        const V here = VLOAD(depth + x);
+        const V here = V_LOAD(depth + x);
         V slope[2], least = here;
         for (int i = 0; i < 2; i++) {
-            const V before = VLOAD(depth + x - step[i]), after = VLOAD(depth + x + step[i]);
-            const V rise[2] = {VSUB(here, before), VSUB(after, here)};
-            const VM nearer = VLT(VABS(rise[0]), VABS(rise[1]));
-            least = VMIN(least, VMIN(before, after));
-            slope[i] = VDIV(VMUL(VSET(focal[i]), VSEL(nearer, rise[0], rise[1])),
-                            VMAX(VSEL(nearer, before, after), VSET(1e-30)));
-            slope[i] = VMAX(VNEG(most), VMIN(most, slope[i]));
+            const V before = V_LOAD(depth + x - step[i]), after = V_LOAD(depth + x + step[i]);
+            const V rise[2] = {V_SUB(here, before), V_SUB(after, here)};
+            const VM nearer = V_LT(V_ABS(rise[0]), V_ABS(rise[1]));
+            least = V_MIN(least, V_MIN(before, after));
+            slope[i] = V_DIV(V_MUL(V_SET(focal[i]), V_SEL(nearer, rise[0], rise[1])),
+                             V_MAX(V_SEL(nearer, before, after), V_SET(1e-30)));
+            slope[i] = V_MAX(V_NEG(most), V_MIN(most, slope[i]));
         }
-        const VM known = VLT(zero, least);
-        const V ray =
-            VDIV(VADD(VADD(VLOAD(ssdgs__count), VSET(x)), VSET((R)0.5 - camera->cx)), VSET(camera->fx));
+        const VM known = V_LT(zero, least);
+        const V ray = V_DIV(V_ADD(V_ADD(V_LOAD(ssdgs__count), V_SET(x)), V_SET((R)0.5 - camera->cx)),
+                            V_SET(camera->fx));
         V n[3];
         n[0] = slope[0];
         n[1] = slope[1];
-        n[2] = VNEG(
-            VFMA(slope[0], ray, VFMA(slope[1], VSET(((R)y + (R)0.5 - camera->cy) / camera->fy), VSET(1))));
-        const V length = VDIV(VSET(-weight), VSQRT(VDOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
+        n[2] = V_NEG(V_FMA(slope[0], ray,
+                           V_FMA(slope[1], V_SET(((R)y + (R)0.5 - camera->cy) / camera->fy), V_SET(1))));
+        const V length = V_DIV(V_SET(-weight), V_SQRT(V_DOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
         for (int i = 0; i < 3; i++)
-            VSTORE(out + (size_t)i * stride + x,
-                   VSEL(known,
-                        VMUL(length, VDOT3(VSET(camera->view[i]), VSET(camera->view[4 + i]),
-                                           VSET(camera->view[8 + i]), n[0], n[1], n[2])),
-                        zero));
-        VSTORE(out + 3 * stride + x, VSEL(known, VSET(weight), zero));
+            V_STORE(out + (size_t)i * stride + x,
+                    V_SEL(known,
+                          V_MUL(length, V_DOT3(V_SET(camera->view[i]), V_SET(camera->view[4 + i]),
+                                               V_SET(camera->view[8 + i]), n[0], n[1], n[2])),
+                          zero));
+        V_STORE(out + 3 * stride + x, V_SEL(known, V_SET(weight), zero));
     }
 }
 
@@ -14823,7 +14728,7 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
     int bad = 0;
 #if SSDGS__VW > 1
     for (; i + SSDGS__VW <= n; i += SSDGS__VW)
-        bad |= VBITS(VGE(VSET(FLT_MAX), VABS(VLOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
+        bad |= V_BITS(V_GE(V_SET(FLT_MAX), V_ABS(V_LOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
 #endif
     for (; i < n; i++) bad |= !ssdgs__finite(values[i]);
     return !bad;
@@ -14834,17 +14739,17 @@ SSDGS__FN int F(finite)(const R *values, size_t n) {
    subnormals agree. Gradients are cut at 1e18, so no square and no product with a rate overflows. */
 SSDGS__FI void F(adam_lanes)(R *parameter, const R *gradient, R *mean, R *square,
                              const ssdgs__adam_rate *rate) {
-    V g = VLOAD(gradient);
-    g = VSEL(VLT(VABS(g), VSET(4e-18)), VSET(0), VMAX(VSET(-1e18), VMIN(VSET(1e18), g)));
-    V m = VFMA(VSET(0.9), VLOAD(mean), VMUL(VSET(1 - 0.9), g));
-    V v = VFMA(VSET(0.999), VLOAD(square), VMUL(VMUL(VSET(1 - 0.999), g), g));
-    m = VSEL(VLT(VABS(m), VSET(1e-30)), VSET(0), m);
-    v = VSEL(VLT(v, VSET(1e-36)), VSET(0), v);
-    VSTORE(mean, m);
-    VSTORE(square, v);
-    m = VMUL(VSET(rate->rate), VMUL(m, VSET(rate->correct_mean)));
-    v = VADD(VSQRT(VMUL(v, VSET(rate->correct_square))), VSET(rate->epsilon));
-    VSTORE(parameter, VSUB(VLOAD(parameter), VDIV(m, v)));
+    V g = V_LOAD(gradient);
+    g = V_SEL(V_LT(V_ABS(g), V_SET(4e-18)), V_SET(0), V_MAX(V_SET(-1e18), V_MIN(V_SET(1e18), g)));
+    V m = V_FMA(V_SET(0.9), V_LOAD(mean), V_MUL(V_SET(1 - 0.9), g));
+    V v = V_FMA(V_SET(0.999), V_LOAD(square), V_MUL(V_MUL(V_SET(1 - 0.999), g), g));
+    m = V_SEL(V_LT(V_ABS(m), V_SET(1e-30)), V_SET(0), m);
+    v = V_SEL(V_LT(v, V_SET(1e-36)), V_SET(0), v);
+    V_STORE(mean, m);
+    V_STORE(square, v);
+    m = V_MUL(V_SET(rate->rate), V_MUL(m, V_SET(rate->correct_mean)));
+    v = V_ADD(V_SQRT(V_MUL(v, V_SET(rate->correct_square))), V_SET(rate->epsilon));
+    V_STORE(parameter, V_SUB(V_LOAD(parameter), V_DIV(m, v)));
 }
 
 SSDGS__FN void F(adam)(R *parameter, const R *gradient, R *mean, R *square, size_t n,
@@ -14876,7 +14781,6 @@ static const ssdgs__kernels F(kernels) = {SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__T
 #undef SSDGS__TRAINED
 
 #endif /* SSDGS__SCALAR */
-#endif /* SSDGS__ISA, else the names alone */
 
 #undef SSDGS__NAME
 #undef SSDGS__TR
@@ -14886,32 +14790,32 @@ static const ssdgs__kernels F(kernels) = {SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__T
 #undef V
 #undef VM
 #undef SSDGS__VW
-#undef VLOAD
-#undef VSTORE
-#undef VSET
-#undef VADD
-#undef VSUB
-#undef VMUL
-#undef VDIV
-#undef VFMA
-#undef VFNMA
-#undef VMIN
-#undef VMAX
-#undef VSQRT
-#undef VLT
-#undef VGE
-#undef VAND
-#undef VBITS
-#undef VSEL
-#undef VROUND
-#undef VLDEXP
-#undef VEXPONENT
-#undef VEXP
-#undef VLOG
-#undef VNEG
-#undef VUNROLL
-#undef VABS
-#undef VDOT3
+#undef V_LOAD
+#undef V_STORE
+#undef V_SET
+#undef V_ADD
+#undef V_SUB
+#undef V_MUL
+#undef V_DIV
+#undef V_FMA
+#undef V_FNMA
+#undef V_MIN
+#undef V_MAX
+#undef V_SQRT
+#undef V_LT
+#undef V_GE
+#undef V_AND
+#undef V_BITS
+#undef V_SEL
+#undef V_ROUND
+#undef V_LDEXP
+#undef V_EXPONENT
+#undef V_EXP
+#undef V_LOG
+#undef V_NEG
+#undef V_UNROLL
+#undef V_ABS
+#undef V_DOT3
 #undef F
 #undef SSDGS__FN
 #undef SSDGS__TRAINS

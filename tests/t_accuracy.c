@@ -9,9 +9,9 @@
         size_t i; \
         V s, c; \
         for (i = 0; i < n; i += (size_t)F(lanes)) { \
-            const V x = VLOAD(a + i), y = VLOAD(b + i); \
+            const V x = V_LOAD(a + i), y = V_LOAD(b + i); \
             s = x, c = y; \
-            VSTORE(out + i, value); \
+            V_STORE(out + i, value); \
         } \
         (void)s, (void)c; \
     }
@@ -32,9 +32,9 @@
                               size_t n) { \
         for (size_t i = 0; i < n; i += SSDGS__VW) { \
             V slope[3]; \
-            VSTORE(f + i, F(dipole)(form == SSDGS_DIPOLE_PRINTED, VLOAD(ss + i), VLOAD(sa + i), \
-                                    VLOAD(r + i), virtual_depth, slope)); \
-            for (size_t j = 0; j < 3; j++) VSTORE(d + j * n + i, slope[j]); \
+            V_STORE(f + i, F(dipole)(form == SSDGS_DIPOLE_PRINTED, V_LOAD(ss + i), V_LOAD(sa + i), \
+                                     V_LOAD(r + i), virtual_depth, slope)); \
+            for (size_t j = 0; j < 3; j++) V_STORE(d + j * n + i, slope[j]); \
         } \
     } \
     static const SSDGS__UNUSED ssdgs__kernels

@@ -710,8 +710,7 @@ static int has_heights(ssdgs_model *model, ssdgs_model *back) {
    them back. */
 static void test_versions(void) {
     static const struct {
-        unsigned char version;
-        int loads, heights;
+        int version, loads, heights;
     } cases[6] = {{0, 0, 0},   {100, 1, 1},           {200, 1, 1},
                   {201, 1, 0}, {SSDGS_VERSION, 1, 0}, {SSDGS_VERSION + 1, 0, 0}};
     ssdgs_model *model = make_model(3);
@@ -731,7 +730,8 @@ static void test_versions(void) {
     bytes edited = emit(&cut, &v);
     for (int i = 0; i < 6 && CHECK(setting[0] && setting[1]); i++) {
         ssdgs_model *back = NULL, *bare = NULL;
-        *setting[0] = cases[i].version;
+        setting[0][0] = (unsigned char)(cases[i].version & 255);
+        setting[0][1] = (unsigned char)(cases[i].version >> 8);
         if (!cases[i].loads) {
             CHECK(refused(file.data, file.size) &&
                   strstr(ssdgs_error_message(context), "; this library reads 1 to "));
