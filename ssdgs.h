@@ -2430,42 +2430,78 @@ static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SS
     first[5] = first[4] + ssdgs__network_count(settings, 1);
 }
 
-SSDGS_API ssdgs_settings ssdgs_settings_default(void) {
+/* Every setting once, in the order of files: member, its property there, values (0: one), whether these are
+   whole numbers, range, default, published, and what held where older files lack it (-1: none does). */
+/* clang-format off */
+#define SSDGS__SETTINGS(S) \
+    S(version, "version", 0, 1, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, -1) \
+    S(terms, "terms", 0, 1, 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, -1) \
+    S(baked, "baked", 0, 1, 0, 1, 0, 0, -1) \
+    S(transfer, "transfer", 0, 1, 0, SSDGS_TRANSFER_NONE, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE, -1) \
+    S(dipole, "dipole", 0, 1, 0, SSDGS_DIPOLE_PRINTED, 0, 0, -1) \
+    S(asg, "asg", 0, 1, 0, SSDGS_ASG_DEFERRED, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC, -1) \
+    S(per_channel_optics, "per_channel_optics", 0, 1, 0, 1, 1, 0, -1) \
+    S(depth_cue, "depth_cue", 0, 1, 0, 1, 0, 0, -1) \
+    S(transport, "transport", 0, 1, 0, 1, 1, 0, 0) \
+    S(residual_shadow, "residual_shadow", 0, 1, 0, 1, 1, 0, -1) \
+    S(shadow_on_scattering, "shadow_on_scattering", 0, 1, 0, 1, 0, 0, -1) \
+    S(scattering.layers, "scattering_layers", 0, 1, 0, SSDGS_MAX_LAYERS, 3, 6, -1) \
+    S(scattering.width, "scattering_width", 0, 1, 0, SSDGS_MAX_WIDTH, 128, 256, -1) \
+    S(octaves.view, "view_octaves", 0, 1, 0, 8, 0, 4, 4) \
+    S(octaves.light, "light_octaves", 0, 1, 0, 8, 1, 4, 4) \
+    S(shadow.layers, "shadow_layers", 0, 1, 0, SSDGS_MAX_LAYERS, 4, 4, -1) \
+    S(shadow.width, "shadow_width", 0, 1, 0, SSDGS_MAX_WIDTH, 32, 32, -1) \
+    S(light_map.blur, "light_blur", 0, 1, 0, SSDGS_BLUR_FLOOR, SSDGS_BLUR_FLOOR, SSDGS_BLUR_ADD, -1) \
+    S(light_map.size, "light_map_size", 0, 1, 0, 8192, 0, 0, -1) \
+    S(light_map.bias, "light_bias", 0, 0, 0, 1e30, 0.06, 0, -1) \
+    S(pixel_variance, "pixel_variance", 0, 0, 0.01, 10, 0.1, 0.3, 0.3) \
+    S(eta, "eta", 0, 0, 1, 2.5, 1.3, 1.3, -1) \
+    S(centre, "centre_", 3, 0, -1e30, 1e30, 0, 0, -1) \
+    S(length_unit, "length_unit", 0, 0, 1e-15, 1e15, 0.5, 1, -1) \
+    S(light_scale, "light_scale", 0, 0, 0, SSDGS__MOST_LIGHT, 1, 1, -1) \
+    S(ambient, "ambient_", 3, 0, 0, SSDGS__MOST_LIGHT, 0, 0, 0) \
+    S(origin, "origin_", 3, 0, -1e9, 1e9, 0, 0, 0) \
+    S(placement.turn, "placement_turn_", 3, 0, -7, 7, 0, 0, 0) \
+    S(placement.scale, "placement_scale", 0, 0, -1e9, 1e9, 1, 1, 1) \
+    S(placement.move, "placement_move_", 3, 0, -1e9, 1e9, 0, 0, 0) \
+    S(medium.scattering, "medium_scattering_", 3, 0, 0, 1e12, 0, 0, 0) \
+    S(medium.absorption, "medium_absorption_", 3, 0, 0, 1e12, 0, 0, 0)
+/* clang-format on */
+typedef struct ssdgs__setting {
+    const char *name;
+    size_t at;
+    int count, whole;
+    double low, high, standard, published;
+} ssdgs__setting;
+#define SSDGS__S(member, property, count, whole, low, high, standard, published, before) \
+    {#member, offsetof(ssdgs_settings, member), count, whole, low, high, standard, published},
+static const ssdgs__setting ssdgs__settings[] = {SSDGS__SETTINGS(SSDGS__S)};
+#undef SSDGS__S
+enum { SSDGS__SETTING_COUNT = sizeof ssdgs__settings / sizeof *ssdgs__settings };
+
+/* Reads or, where `set` is not NULL, sets value i of a setting. */
+static double ssdgs__setting_of(const ssdgs__setting *entry, ssdgs_settings *s, int i, const double *set) {
+    unsigned char *const at = (unsigned char *)s + entry->at;
+    int whole;
+    ssdgs_real real;
+    if (set && entry->whole) whole = (int)*set, memcpy(at, &whole, sizeof whole);
+    else if (set) real = (ssdgs_real)*set, memcpy(at + (size_t)i * sizeof real, &real, sizeof real);
+    if (entry->whole) return memcpy(&whole, at, sizeof whole), (double)whole;
+    return memcpy(&real, at + (size_t)i * sizeof real, sizeof real), (double)real;
+}
+
+static ssdgs_settings ssdgs__settings_preset(int published) {
     ssdgs_settings s;
     memset(&s, 0, sizeof s);
-    s.version = SSDGS_VERSION;
-    s.terms = SSDGS_ALL_TERMS;
-    s.transfer = SSDGS_TRANSFER_SRGB;
-    s.asg = SSDGS_ASG_DEFERRED;
-    s.per_channel_optics = s.transport = s.residual_shadow = 1;
-    s.scattering.layers = 3;
-    s.scattering.width = 128;
-    s.octaves.light = 1;
-    s.shadow.layers = 4;
-    s.shadow.width = 32;
-    s.light_map.blur = SSDGS_BLUR_FLOOR;
-    s.light_map.bias = (ssdgs_real)0.06;
-    s.pixel_variance = (ssdgs_real)0.1;
-    s.eta = (ssdgs_real)1.3;
-    s.length_unit = (ssdgs_real)0.5;
-    s.light_scale = s.placement.scale = 1;
+    for (int k = 0; k < SSDGS__SETTING_COUNT; k++)
+        for (int i = 0; !i || i < ssdgs__settings[k].count; i++)
+            ssdgs__setting_of(ssdgs__settings + k, &s, i,
+                              published ? &ssdgs__settings[k].published : &ssdgs__settings[k].standard);
     return s;
 }
 
-SSDGS_API ssdgs_settings ssdgs_settings_published(void) {
-    ssdgs_settings s = ssdgs_settings_default();
-    s.transfer = SSDGS_TRANSFER_NONE;
-    s.asg = SSDGS_ASG_GEOMETRIC;
-    s.per_channel_optics = s.transport = s.residual_shadow = 0;
-    s.scattering.layers = 6;
-    s.scattering.width = 256;
-    s.octaves.view = s.octaves.light = 4;
-    s.light_map.blur = SSDGS_BLUR_ADD;
-    s.light_map.bias = 0;
-    s.pixel_variance = (ssdgs_real)0.3;
-    s.length_unit = 1;
-    return s;
-}
+SSDGS_API ssdgs_settings ssdgs_settings_default(void) { return ssdgs__settings_preset(0); }
+SSDGS_API ssdgs_settings ssdgs_settings_published(void) { return ssdgs__settings_preset(1); }
 
 #define SSDGS__RANGE_OF(what, type, s, field, low, high) \
     if (!((type)(s)->field >= (type)(low) && (type)(s)->field <= (type)(high)) || \
@@ -2523,78 +2559,43 @@ static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
 }
 
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
+    ssdgs_settings copy = *s;
     if (s->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
-#define SSDGS__RANGE(field, low, high) \
-    SSDGS__RANGE_OF("settings", float, s, field, low, high) /* as files hold it */
-    SSDGS__RANGE(terms, 0, SSDGS_ALL_TERMS);
-    SSDGS__RANGE(baked, 0, 1);
-    SSDGS__RANGE(transfer, 0, SSDGS_TRANSFER_NONE);
     if (s->dipole == 2 || s->dipole == 3)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "settings: dipole = %d, %s, was never better and is gone; train with 0 or 1",
                            s->dipole, s->dipole == 2 ? "the released form" : "Burley's profile");
-    SSDGS__RANGE(dipole, 0, SSDGS_DIPOLE_PRINTED);
     if (s->asg == 1)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "settings: asg = 1, the released angular form, is gone; train with 0 or 2");
-    SSDGS__RANGE(asg, 0, SSDGS_ASG_DEFERRED);
-    SSDGS__RANGE(per_channel_optics, 0, 1);
-    SSDGS__RANGE(depth_cue, 0, 1);
-    SSDGS__RANGE(transport, 0, 1);
-    SSDGS__RANGE(residual_shadow, 0, 1);
-    SSDGS__RANGE(shadow_on_scattering, 0, 1);
-    SSDGS__RANGE(scattering.layers, 0, SSDGS_MAX_LAYERS);
     if (s->scattering.layers == 1)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed",
                            SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(scattering.width, s->scattering.layers > 1, SSDGS_MAX_WIDTH);
-    SSDGS__RANGE(octaves.view, 0, 8);
-    SSDGS__RANGE(octaves.light, 0, 8);
-    SSDGS__RANGE(shadow.layers, 0, SSDGS_MAX_LAYERS);
-    SSDGS__RANGE(shadow.width, s->shadow.layers > 1, SSDGS_MAX_WIDTH);
-    SSDGS__RANGE(light_map.blur, 0, SSDGS_BLUR_FLOOR);
-    SSDGS__RANGE(light_map.size, 0, 8192);
-    SSDGS__RANGE(light_map.bias, 0, (ssdgs_real)1e30);
-    SSDGS__RANGE(pixel_variance, (ssdgs_real)0.01, 10);
-    SSDGS__RANGE(eta, 1, (ssdgs_real)2.5);
-    SSDGS__RANGE(length_unit, (ssdgs_real)1e-15, (ssdgs_real)1e15);
-    SSDGS__RANGE(light_scale, 0, (ssdgs_real)SSDGS__MOST_LIGHT);
-    SSDGS__RANGE(ambient[0], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
-    SSDGS__RANGE(ambient[1], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
-    SSDGS__RANGE(ambient[2], 0, (ssdgs_real)SSDGS__MOST_LIGHT);
-    SSDGS__RANGE(centre[0], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(centre[1], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(centre[2], (ssdgs_real)-1e30, (ssdgs_real)1e30);
-    SSDGS__RANGE(origin[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(origin[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(origin[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(placement.turn[0], -7, 7);
-    SSDGS__RANGE(placement.turn[1], -7, 7);
-    SSDGS__RANGE(placement.turn[2], -7, 7);
-    SSDGS__RANGE(placement.move[0], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(placement.move[1], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(placement.move[2], (ssdgs_real)-1e9, (ssdgs_real)1e9);
-    SSDGS__RANGE(placement.scale, (ssdgs_real)-1e9, (ssdgs_real)1e9);
+    const int medium = ssdgs__has_medium(s, s->terms);
+    for (int k = 0; k < SSDGS__SETTING_COUNT; k++) {
+        const ssdgs__setting *entry = ssdgs__settings + k;
+        const int of_medium = entry->at >= offsetof(ssdgs_settings, medium.scattering);
+        double low = entry->low; /* some depends on others */
+        if (entry->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
+        if (entry->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
+        if (entry->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
+        for (int i = 0; !i || i < entry->count; i++) {
+            const double value = ssdgs__setting_of(entry, &copy, i, NULL);
+            const int within =
+                (float)value >= (float)low && (float)value <= (float)entry->high; /* of files */
+            if ((within || (of_medium && !medium)) && ssdgs__finite((ssdgs_real)value)) continue;
+            const char index[4] = {'[', (char)('0' + i), ']', 0};
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s%s = %g is not within %g .. %g",
+                               entry->name, entry->count ? index : "", value, low, entry->high);
+        }
+    }
     if (s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: placement.scale = %g is too small",
                            (double)s->placement.scale);
-    const int medium = ssdgs__has_medium(s, s->terms);
     if (medium && !s->transport)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
-    for (int i = 0; i < 3; i++) {
-        const ssdgs_real scattering = s->medium.scattering[i], absorption = s->medium.absorption[i];
-        if (!medium && ssdgs__finite(scattering) && ssdgs__finite(absorption)) continue;
-        if (!((float)scattering >= (float)1e-12 && (float)scattering <= (float)1e12) ||
-            !(absorption >= 0 && (float)absorption <= (float)1e12))
-            return ssdgs__fail(
-                context, SSDGS_ERR_ARGUMENT,
-                "settings: medium.scattering[%d] = %g, medium.absorption[%d] = %g, where 1e-12 .. "
-                "1e12 and 0 .. 1e12 are allowed",
-                i, (double)scattering, i, (double)absorption);
-    }
-#undef SSDGS__RANGE
     return SSDGS_OK;
 }
 
@@ -8588,21 +8589,15 @@ typedef struct ssdgs__ply_field {
     int count;        /* of those; 0 = the stem is the name */
     int word;         /* of the first; of a setting where it lies in ssdgs_settings, bytes */
     int integer;
-    int added;    /* 1: a setting that files of older versions lack: */
-    float before; /* what held then */
+    double before; /* of a setting, where files of older versions lack it; -1: none may */
 } ssdgs__ply_field;
 
 #define SSDGS__V(stem, count, word) \
-    { SSDGS__PLY_VERTEX, stem, count, word, 0, 0, 0 }
-#define SSDGS__IN(stem, member) \
-    { SSDGS__PLY_SETTINGS, stem, 0, offsetof(ssdgs_settings, member), 1, 0, 0 }
-#define SSDGS__I(member) SSDGS__IN(#member, member)
-#define SSDGS__R(stem, count, member) \
-    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member), 0, 0, 0 }
-#define SSDGS__ADDED(stem, count, member, integer, before) \
-    { SSDGS__PLY_SETTINGS, stem, count, offsetof(ssdgs_settings, member), integer, 1, before }
+    { SSDGS__PLY_VERTEX, stem, count, word, 0, -1 }
+#define SSDGS__S(member, property, count, whole, low, high, standard, published, before) \
+    {SSDGS__PLY_SETTINGS, property, count, offsetof(ssdgs_settings, member), whole, before},
 #define SSDGS__G(kind, stem, count, group) \
-    { kind, stem, count, 4 * group, 0, 0, 0 }
+    { kind, stem, count, 4 * group, 0, -1 }
 /* In the order of the file; red, green, blue are only read. */
 static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__V("x", 0, SSDGS_POSITION),
@@ -8624,48 +8619,14 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__V("red", 0, SSDGS__PLY_RGB),
     SSDGS__V("green", 0, SSDGS__PLY_RGB + 1),
     SSDGS__V("blue", 0, SSDGS__PLY_RGB + 2),
-    SSDGS__I(version),
-    SSDGS__I(terms),
-    SSDGS__I(baked),
-    SSDGS__I(transfer),
-    SSDGS__I(dipole),
-    SSDGS__I(asg),
-    SSDGS__I(per_channel_optics),
-    SSDGS__I(depth_cue),
-    SSDGS__ADDED("transport", 0, transport, 1, 0),
-    SSDGS__I(residual_shadow),
-    SSDGS__I(shadow_on_scattering),
-    SSDGS__IN("scattering_layers", scattering.layers),
-    SSDGS__IN("scattering_width", scattering.width),
-    SSDGS__ADDED("view_octaves", 0, octaves.view, 1, 4),
-    SSDGS__ADDED("light_octaves", 0, octaves.light, 1, 4),
-    SSDGS__IN("shadow_layers", shadow.layers),
-    SSDGS__IN("shadow_width", shadow.width),
-    SSDGS__IN("light_blur", light_map.blur),
-    SSDGS__IN("light_map_size", light_map.size),
-    SSDGS__R("light_bias", 0, light_map.bias),
-    SSDGS__ADDED("pixel_variance", 0, pixel_variance, 0, 0.3f),
-    SSDGS__R("eta", 0, eta),
-    SSDGS__R("centre_", 3, centre),
-    SSDGS__R("length_unit", 0, length_unit),
-    SSDGS__R("light_scale", 0, light_scale),
-    SSDGS__ADDED("ambient_", 3, ambient, 0, 0),
-    SSDGS__ADDED("origin_", 3, origin, 0, 0),
-    SSDGS__ADDED("placement_turn_", 3, placement.turn, 0, 0),
-    SSDGS__ADDED("placement_scale", 0, placement.scale, 0, 1),
-    SSDGS__ADDED("placement_move_", 3, placement.move, 0, 0),
-    SSDGS__ADDED("medium_scattering_", 3, medium.scattering, 0, 0),
-    SSDGS__ADDED("medium_absorption_", 3, medium.absorption, 0, 0),
+    SSDGS__SETTINGS(SSDGS__S) /* they follow each other */
     SSDGS__G(SSDGS__PLY_BASIS, "q", 4, SSDGS__ASG_BASIS),
     SSDGS__G(SSDGS__PLY_BASIS, "sharpness", 2, SSDGS__ASG_SHARPNESS),
     SSDGS__G(SSDGS__PLY_BASIS, "sigma", 0, SSDGS__ASG_SIGMA),
     SSDGS__G(SSDGS__PLY_SCATTERING, "value", 0, SSDGS__SCATTERING_NET),
     SSDGS__G(SSDGS__PLY_SHADOW, "value", 0, SSDGS__SHADOW_NET)};
 #undef SSDGS__V
-#undef SSDGS__IN
-#undef SSDGS__I
-#undef SSDGS__R
-#undef SSDGS__ADDED
+#undef SSDGS__S
 #undef SSDGS__G
 
 typedef struct ssdgs__ply_cursor { /* walks properties: set field to NULL, then call ssdgs__ply_next */
@@ -9100,7 +9061,7 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     ssdgs__ply_cursor cursor;
     char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
-        if (cursor.word >= first && cursor.word < last && !cursor.field->added &&
+        if (cursor.word >= first && cursor.word < last && cursor.field->before < 0 &&
             !(ply->known[kind]->present >> cursor.word & 1))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
                                ply->name, ssdgs__ply_kinds[kind], ssdgs__ply_name(&cursor, name),
@@ -9129,7 +9090,7 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     if (result) return result;
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);)
-        words[cursor.word] = ssdgs__ply_bits((double)cursor.field->before);
+        words[cursor.word] = ssdgs__ply_bits(cursor.field->before);
     ply->at = element->data;
     if (element->count != 1 || !ssdgs__ply_row(ply, element, words))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: ssdgs_settings is not one row of numbers",
