@@ -5586,6 +5586,7 @@ typedef struct ssdgs__node_job {
     const ssdgs_frame *frame;
     ssdgs__tree *trees;                /* (objects) those without transport have no leaves */
     const ssdgs__cached_light *lights; /* of those whose transport is ready nothing changes */
+    int points;                        /* what tasks on leaves make: 0: nodes, 1: points */
 } ssdgs__node_job;
 
 /* A Gaussian as a node of its own. */
@@ -5636,26 +5637,6 @@ static size_t ssdgs__leaf_parts(const ssdgs_frame *frame, const ssdgs_placed *o,
     return count;
 }
 
-/* The lowest nodes of a chunk, all lights. */
-static void ssdgs__leaf_task(void *data, int chunk) {
-    const ssdgs__node_job *job = (const ssdgs__node_job *)data;
-    const ssdgs_frame *frame = job->frame;
-    ssdgs__piece piece;
-    for (int at = chunk * SSDGS__CHUNK;
-         ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
-        const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
-        for (int light = 0; light < frame->light_count; light++) {
-            if (job->lights[light].transport_ready || ssdgs__beyond(frame, light, piece.object)) continue;
-            for (size_t leaf = (size_t)piece.begin / SSDGS__LEAF;
-                 SSDGS__LEAF * leaf < (size_t)piece.end && tree->leaves; leaf++) {
-                ssdgs__node parts[SSDGS__LEAF];
-                tree->nodes[tree->count * (size_t)light + leaf] =
-                    ssdgs__node_join(parts, ssdgs__leaf_parts(frame, piece.object, light, leaf, parts));
-            }
-        }
-    }
-}
-
 /* The higher nodes of an object, all lights. */
 static void ssdgs__join_task(void *data, int index) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
@@ -5698,7 +5679,8 @@ static void ssdgs__points_of(const ssdgs_frame *frame, const ssdgs__tree *tree, 
     if (others.flux > 0) ssdgs__point_put(points + 4 * nodes[leaf].points++, &others);
 }
 
-static void ssdgs__points_task(void *data, int chunk) {
+/* The lowest nodes of a chunk, all lights, or the points that stand for them. */
+static void ssdgs__leaf_task(void *data, int chunk) {
     const ssdgs__node_job *job = (const ssdgs__node_job *)data;
     const ssdgs_frame *frame = job->frame;
     ssdgs__piece piece;
@@ -5707,8 +5689,14 @@ static void ssdgs__points_task(void *data, int chunk) {
         const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
         for (int light = 0; light < frame->light_count && tree->leaves; light++) {
             if (job->lights[light].transport_ready || ssdgs__beyond(frame, light, piece.object)) continue;
-            for (int g = piece.begin; g < piece.end; g += SSDGS__LEAF)
-                ssdgs__points_of(frame, tree, light, (size_t)g / SSDGS__LEAF);
+            for (size_t leaf = (size_t)piece.begin / SSDGS__LEAF; SSDGS__LEAF * leaf < (size_t)piece.end;
+                 leaf++) {
+                ssdgs__node parts[SSDGS__LEAF];
+                if (job->points) ssdgs__points_of(frame, tree, light, leaf);
+                else
+                    tree->nodes[tree->count * (size_t)light + leaf] =
+                        ssdgs__node_join(parts, ssdgs__leaf_parts(frame, piece.object, light, leaf, parts));
+            }
         }
     }
 }
@@ -5740,9 +5728,11 @@ static ssdgs_result ssdgs__nodes(const ssdgs_frame *frame, ssdgs__node_job *job)
         node += tree->count * lights;
         points += tree->leaves * SSDGS__LEAF * 4 * lights;
     }
+    job->points = 0;
     ssdgs__parallel(context, chunks, ssdgs__leaf_task, job);
     ssdgs__parallel(context, frame->object_count, ssdgs__join_task, job);
-    ssdgs__parallel(context, chunks, ssdgs__points_task, job);
+    job->points = 1; /* of the nodes' sums */
+    ssdgs__parallel(context, chunks, ssdgs__leaf_task, job);
     return SSDGS_OK;
 }
 
