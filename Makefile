@@ -26,7 +26,7 @@ SOURCES = $(filter-out tests/t_gpu.c,$(wildcard tests/t_*.c)) # which is `make t
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
 	$(BUILD)/multi $(BUILD)/compile_c $(BUILD)/compile_cpp $(BUILD)/readme $(BUILD)/manual $(BUILD)/fuzz
-BUILDS = builds examples
+BUILDS = builds examples shown
 RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 MODEL = examples/data/waxcow.ply
@@ -86,6 +86,8 @@ $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
 $(BUILD)/builds.log: %.log: $(OBJECTS) $(BUILD)/gpu_shaders.h
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
+$(BUILD)/shown.log: %.log: | $(BUILD)
+	@sh tests/shown.sh $(KEEP_LOG)
 $(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 

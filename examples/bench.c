@@ -884,7 +884,8 @@ static void meter_release(void *user, void *memory) {
 
 /* The session holds a model of so many Gaussians, and no more. */
 static void open_metered(const bench *b, session *s, meter *m, int gaussians) {
-    ssdgs_allocator allocator = {meter_allocate, meter_release, m};
+    ssdgs_allocator allocator;
+    allocator.allocate = meter_allocate, allocator.release = meter_release, allocator.user = m;
     memset(m, 0, sizeof *m);
     open_session(b, s, b->best_isa, 0, 0, &allocator);
     if (gaussians) replicate(s, gaussians);

@@ -1,15 +1,13 @@
 /* cc -O2 examples/engine.c -o engine -lm -lpthread: how a game engine draws with ssdgs.h. Meshes, a floor and
-   a box, and three objects of two models stand in a level, under a spot that moves and a sun. Everything
-   hides and shadows everything. usage: engine [--frames N] [--size W H] [--out PREFIX] [MODEL.ply
+   a box, and three objects of two models stand in a level, under a spot that moves, a sun and a fill light.
+   Everything hides and shadows everything. usage: engine [--frames N] [--size W H] [--out PREFIX] [MODEL.ply
    [MODEL.ply]]; writes PREFIX000.png and so on, and PREFIXsheet.png with nine of them; PREFIX is
    build/engine_. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
 
-static char program[] = "engine";
-
-enum { OBJECTS = 3, LIGHTS = 2, TILES = 24, SHEET = 3, BALL = 2000 };
+enum { OBJECTS = 3, LIGHTS = 3, TILES = 24, SHEET = 3, BALL = 2000 };
 
 /* ---- the engine: its framebuffer, its triangles, its matrices (OpenGL's) ---- */
 
@@ -28,6 +26,7 @@ typedef struct level {
     ssdgs_model *models[2];
     ssdgs_real low[2][3], high[2][3]; /* their bounds */
     ssdgs_scene *scene;
+    ssdgs_render_stats stats; /* of the last frame */
     float *color, *alpha;
 } level;
 
@@ -137,6 +136,7 @@ static void draw_meshes(level *l) {
 /* Whether the box stands between a point and a light: what a shadow map would say. */
 static int box_hides(const level *l, int light, const float point[3]) {
     float begin = 1e-3f, end = 1;
+    if (l->lights[light].unshadowed) return 0;
     for (int c = 0; c < 3; c++) {
         const ssdgs_light *lamp = l->lights + light;
         const float from = point[c];
@@ -205,12 +205,17 @@ static ssdgs_result shade_meshes(level *l) {
 
 /* ---- the level ---- */
 
-/* A ball of flat discs, for those who bring no model: matt and red, or mirroring and white. */
-static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **out) {
+/* A ball of flat discs, for those who bring no model: of wax, or of gold, a mirror of microfacets. */
+static ssdgs_result make_ball(ssdgs_context *context, int metal, ssdgs_model **out) {
+    const float scattering[3] = {40, 32, 24}, absorption[3] = {0.05f, 0.2f, 0.8f},
+                gold[3] = {1, 0.78f, 0.34f};
+    const float roughness[2] = {0.3f, 0.3f};
     ssdgs_settings settings = ssdgs_settings_default();
-    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM | SSDGS_SHADOW_TERM;
-    settings.shadow.layers = 0; /* nothing here is trained */
+    settings.terms = SSDGS_SHADOW_TERM | (metal ? SSDGS_SPECULAR_TERM : SSDGS_SCATTERING_TERM);
+    settings.shadow.layers = settings.scattering.layers = 0; /* nothing here is trained */
     settings.light_map.bias = 0.16f;
+    memcpy(settings.medium.scattering, scattering, sizeof scattering);
+    memcpy(settings.medium.absorption, absorption, sizeof absorption);
     ssdgs_result result = ssdgs_model_create(context, &settings, BALL, out);
     for (int i = 0; i < BALL && !result; i++) {
         const float z = 1 - (2 * (float)i + 1) / (float)BALL, r = sqrtf(1 - z * z), turn = 2.4f * (float)i;
@@ -219,14 +224,15 @@ static ssdgs_result make_ball(ssdgs_context *context, int shiny, ssdgs_model **o
         for (int c = 0; c < 3; c++) {
             g.position[c] = 0.5f * (g.normal[c] = normal[c]);
             g.scale[c] = c < 2 ? 0.03f : 0.002f;
-            g.diffuse[c] = shiny ? 0.05f : c ? 0.2f : 0.8f;
-            g.specular[c] = shiny ? 3.0f : 0.3f;
+            g.scattering[c] = 1; /* as the medium has it */
         }
         memset(g.rotation, 0, sizeof g.rotation); /* none: the third axis is the normal */
         g.opacity = 0.99f;
-        g.sharpness[0] = g.sharpness[1] = shiny ? 20.0f : 4.0f;
-        g.f0 = shiny ? 0.6f : 0.04f;
-        result = ssdgs_model_set(*out, i, &g);
+        g.softness = 1; /* the discs are too coarse for sharp shadows */
+        if (metal) result = ssdgs_gaussian_mirror(*out, roughness, &g);
+        for (int c = 0; c < 3 && metal; c++) g.specular[c] *= gold[c];
+        if (metal) g.f0 = 0.9f;
+        if (!result) result = ssdgs_model_set(*out, i, &g);
     }
     return result ? result : ssdgs_model_sort(*out);
 }
@@ -248,15 +254,19 @@ static ssdgs_object place(const level *l, int model, float height, float x, floa
 
 static void move(level *l, float t) { /* t: 0 .. 1 */
     const float turn = 6.2831853f * t, sun[3] = {-0.48f, 0.36f, -0.8f}, aim[3] = {0, 0.2f, 0.4f};
+    const float beside[3] = {0.6f, 0.7f, -0.4f};
     const float eye[3] = {3.2f * sinf(0.5f * sinf(turn)), -3.2f * cosf(0.5f * sinf(turn)), 1.7f};
     look_at(eye, aim, l->view);
     perspective(0.75f, (float)l->width / (float)l->height, 0.05f, l->projection);
     const float lamp[3] = {2.2f * cosf(turn), -1.2f + 0.8f * sinf(turn), 2.6f};
     const float beam[3] = {aim[0] - lamp[0], aim[1] - lamp[1], aim[2] - lamp[2]}, unit = 1 / l->light_scale;
     const float warm[3] = {30 * unit, 30 * unit, 24 * unit},
-                cool[3] = {0.5f * unit, 0.6f * unit, 0.7f * unit};
+                cool[3] = {0.5f * unit, 0.6f * unit, 0.7f * unit},
+                faint[3] = {0.2f * unit, 0.2f * unit, 0.2f * unit};
     l->lights[0] = ssdgs_light_spot(lamp, beam, warm, 0.3f, 0.5f);
     l->lights[1] = ssdgs_light_directional(sun, cool);
+    l->lights[2] = ssdgs_light_directional(beside, faint);
+    l->lights[2].unshadowed = 1; /* fills shadows in, and costs no map */
     l->objects[0] = place(l, 0, 1.0f, -0.75f, 0.1f, turn);
     l->objects[1] = place(l, 1, 0.8f, 0.85f, 0.3f, 0.6f);
     l->objects[2] = place(l, 0, 0.5f, 0.15f, -0.8f, 2 - turn);
@@ -268,6 +278,7 @@ static ssdgs_result draw_frame(level *l, float t) {
     ssdgs_image image;
     ssdgs_render_options options = ssdgs_render_options_default();
     move(l, t);
+    options.antialias = 1; /* models are seen from farther away than their photographs */
     for (int i = 0; i < 9; i++) options.ambient[i / 3][i % 3] = sky[i / 3][i % 3] / l->light_scale;
     memset(&image, 0, sizeof image);
     image.color = l->color;
@@ -280,27 +291,63 @@ static ssdgs_result draw_frame(level *l, float t) {
     if (!result) result = shade_meshes(l);
     if (!result)
         result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options,
-                                    &image, NULL);
+                                    &image, &l->stats);
     if (!result)
         ssdgs_blend_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
                            4 * (ptrdiff_t)l->width);
     return result;
 }
 
+/* The engine's log, of any thread. */
+static void hear(void *user, ssdgs_result code, const char *message) {
+    (void)user;
+    fprintf(stderr, "engine: %s%s\n", code ? "" : "note: ", message);
+}
+
+static ssdgs_result open_context(int threads, ssdgs_context **out) {
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.logger.write = hear;
+    desc.threads = threads;
+    return ssdgs_context_create(&desc, out);
+}
+
+typedef struct load {
+    const char *path; /* NULL: a ball */
+    ssdgs_context *context;
+    ssdgs_model *model;
+    ssdgs_result result;
+} load;
+
+/* A job of a loader thread. It has a context of its own, as one serves one thread at a time. */
+static void load_model(void *loads, int index) {
+    load *job = (load *)loads + index;
+    job->result = open_context(1, &job->context);
+    if (!job->result)
+        job->result = job->path ? ssdgs_model_load(job->context, job->path, &job->model, NULL)
+                                : make_ball(job->context, index, &job->model);
+}
+
 static ssdgs_result open_level(level *l, const char *const models[2]) {
     const ssdgs_occluder meshes = {mesh_shadow, l, 1}; /* the box does not move; a moving one changes the 1 */
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
+    load loads[2];
     memcpy(l->box_low, low, sizeof low);
     memcpy(l->box_high, high, sizeof high);
-    ssdgs_context_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.logger.write = olat_hear;
-    desc.logger.user = program;
-    ssdgs_result result = ssdgs_context_create(&desc, &l->context);
-    for (int i = 0; i < 2 && !result; i++)
-        result = models[i] ? ssdgs_model_load(l->context, models[i], l->models + i, NULL)
-                           : make_ball(l->context, i, l->models + i);
-    for (int i = 0; i < 2 && !result; i++) result = ssdgs_model_bounds(l->models[i], l->low[i], l->high[i]);
+    memset(loads, 0, sizeof loads);
+    for (int i = 0; i < 2; i++) loads[i].path = models[i];
+    ssdgs_result result = open_context(0, &l->context);
+    if (!result)
+        result = ssdgs_context_run(l->context, 2, load_model, loads); /* or threads of the engine's */
+    for (int i = 0; i < 2; i++) {
+        ssdgs_result loaded = loads[i].result;
+        l->models[i] = loads[i].model;
+        if (!loaded) loaded = ssdgs_model_move(l->models[i], l->context);
+        if (!loaded) loaded = ssdgs_model_bounds(l->models[i], l->low[i], l->high[i]);
+        if (!loaded) printf("model %d: %d Gaussians\n", i, ssdgs_model_count(l->models[i]));
+        if (!result) result = loaded;
+        ssdgs_context_destroy(loads[i].context);
+    }
     if (!result) result = ssdgs_scene_create(l->context, &l->scene);
     if (result) return result;
     ssdgs_scene_occlude(l->scene, &meshes);
@@ -370,7 +417,13 @@ int main(int argc, char **argv) {
                        l.pixels + 4 * (size_t)y * (size_t)l.width, 4 * (size_t)l.width);
         }
     }
-    if (result) fprintf(stderr, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(l.context));
+    if (result) fprintf(stderr, "engine: %s\n", ssdgs_result_string(result)); /* the log has said more */
+    else if (!failed)
+        printf("last frame: %d Gaussians shaded, %d skipped; %d light maps; camera at rest: %d;\n"
+               "  %.0f shadows kept, %.0f %% of the networks' work\n",
+               l.stats.shaded, l.stats.skipped, l.stats.light_views, l.stats.camera_cached,
+               (double)l.stats.shadows_cached, 100 * l.stats.network_work);
+    ssdgs_context_trim(l.context); /* as when a menu hides the level: its next frame takes the memory anew */
     if (!result && !failed) failed = write_png(out, "sheet.png", SHEET * l.width, SHEET * l.height, sheet);
     ssdgs_scene_destroy(l.scene);
     for (int i = 0; i < 2; i++) ssdgs_model_destroy(l.models[i]);

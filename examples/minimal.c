@@ -19,6 +19,7 @@ static ssdgs_gaussian disc(const float position[3], const float normal[3], float
     }
     memset(g.rotation, 0, sizeof g.rotation); /* none: the third axis is the normal */
     g.opacity = 0.99f;
+    g.sharpness[0] = g.sharpness[1] = 6; /* how narrow the highlight is */
     return g;
 }
 

@@ -328,6 +328,8 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
         fprintf(stderr, "%d/%d loss %.4f PSNR %.1f %d Gaussians %.1f/s %s left%s", done, total, stats->loss,
                 r->psnr, stats->gaussians, r->speed, clock_text((total - done) / r->speed, left),
                 r->terminal && !finished ? "   " : "\n");
+        if (finished && stats->skipped_steps)
+            fprintf(stderr, "%d steps were refused: a gradient was not finite\n", stats->skipped_steps);
         r->drawn = now;
         r->drawn_at = done;
         r->percent = percent / 5;

@@ -19,6 +19,15 @@ static void end(int number) {
 
 static char program[] = "view";
 
+/* What a model is, and what reading it mended. */
+static void tell(const char *name, const ssdgs_model *model, const ssdgs_load_stats *read) {
+    const int mended = read->zero_rotations + read->clamped_opacities + read->clamped_scales;
+    fprintf(stderr, "view: %s: %d Gaussians", name, ssdgs_model_count(model));
+    if (read->dropped || mended) fprintf(stderr, ", %d dropped, %d mended", read->dropped, mended);
+    fprintf(stderr, "%s%s%s\n", read->sorted ? ", sorted" : "", read->plain ? ", plain splats" : "",
+            read->untrained ? ", without the settings and networks that an editor has dropped" : "");
+}
+
 static int usage(void) {
     fprintf(stderr, "usage: view MODEL.ply [MODEL.ply ...] [--port N] [--page view.html] [--gpu]\n");
     return 2;
@@ -53,8 +62,11 @@ int main(int argc, char **argv) {
         printf("on %s\n", gpu_name(device));
     } else if (wants_gpu) fprintf(stderr, "view: %s: the CPU renders\n", error);
     ssdgs_result result = ssdgs_context_create(&desc, &s.show.context);
-    for (int i = 0; i < s.show.count && !result; i++)
-        result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, NULL);
+    for (int i = 0; i < s.show.count && !result; i++) {
+        ssdgs_load_stats read;
+        result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, &read);
+        if (!result) tell(s.show.names[i], s.show.models[i], &read);
+    }
     if (!result) result = view_arrange(&s.show);
     if (!result && !*page && view_page(__FILE__, argv[0], page, sizeof page, error)) failed = 1;
     if (!result && !failed) failed = view_open(&s, page, error);
