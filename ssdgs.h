@@ -1095,11 +1095,9 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#ifndef SSDGS_NO_STDIO
-#include <stdio.h>
-#endif
 
 #ifndef SSDGS_ASSERT
 #define SSDGS_ASSERT(condition) ((void)0) /* invariants: a bug of the library's where one is false */

@@ -19,7 +19,7 @@ check "exported, not in compile_c.c" \
     "$(for name in $(exported "$build/ssdgs.o"); do grep -qw "$name" tests/compile_c.c || echo "$name"; done)"
 # t_calls.c makes every call from within another, but for what only computes or reads
 pure='ssdgs_(context_(create|isa|threads)|error_message|.*_(string|default|exact|fast|preview|published)|model_(settings|count|arrays|peek)'
-pure="$pure|camera_look_at|srgb_.*|to_.*|blend_pixels|compose|stage_.*)"
+pure="$pure|camera_look_at|light_(point|directional|spot)|srgb_.*|to_.*|blend_pixels|compose|stage_.*)"
 check "exported, not in t_calls.c's call_everything" \
     "$(for name in $(exported "$build/ssdgs.o" | grep -Evx "$pure"); do grep -Eq "(REFUSED|IGNORED)\($name," tests/t_calls.c || echo "$name"; done)"
 check "exported with SSDGS_STATIC" "$(exported "$build/kernels.o")" # which is built with it
@@ -33,7 +33,7 @@ compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax
 for example in train relight minimal engine export view check ball bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
 done
-for header in files json images flip olat; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
+for header in files json images flip olat judge reduce sky; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
     case $header in files | json) : ;; *) echo '#include "ssdgs.h"' ;; esac >"$build/header.c"
     printf '#include "examples/%s.h"\nint main(void) { return 0; }\n' "$header" >>"$build/header.c"
     compiles "$header.h alone" "$build/header.c" "$@" -I.
