@@ -71,7 +71,7 @@ $(DEMO)/waxcow.ply $(DEMO)/waxcow_published.ply: | $(BUILD)/train
 	  $(if $(findstring published,$@),--preset published --iterations 1000,--iterations $(ITERATIONS))
 
 # Each program closes with "N passed, N failed"; one that does not counts as one failed. With make -j they run side by side.
-LOGS = $(TESTS:=.log) $(BUILDS:%=$(BUILD)/%.log)
+LOGS = $(BUILDS:%=$(BUILD)/%.log) $(TESTS:=.log) # the longest first: nothing waits for them alone at the end
 KEEP_LOG = >$@ 2>&1 || echo "exit $$?" >>$@; echo "== $*"; cat $@
 test: $(LOGS) $(EXAMPLES) $(BUILD)/show ## every test; SSDGS_GOLDEN=folder reads the golden files there
 	@passed=0; failed=0; for log in $(LOGS); do \
