@@ -1725,12 +1725,13 @@ static void ssdgs__append(char *text, size_t *at, const char *more) {
     text[*at] = 0;
 }
 
-/* A whole number in full, others to seven digits, with a point wherever the program's locale has another. */
+/* A whole number in full, others to seven digits, with a point wherever the program's locale has another; nan
+   without a sign. */
 static void ssdgs__append_number(char *text, size_t *at, double value) {
     char digits[40], one[2] = {0, 0};
     snprintf(digits, sizeof digits, value > -1e15 && value < 1e15 && value == floor(value) ? "%.0f" : "%.7g",
              value);
-    for (const char *c = digits; *c; c++) {
+    for (const char *c = digits + !strncmp(digits, "-nan", 4); *c; c++) {
         *one = strchr("+-0123456789einfa", *c) ? *c : '.';
         if ((*c & 0xC0) != 0x80) ssdgs__append(text, at, one); /* else the rest of a point in UTF-8 */
     }
