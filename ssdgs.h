@@ -64,10 +64,9 @@ WHAT IT COMPUTES
   S      light that arrives (eqs. 6, 7), refined by the shadow network (eq. 8)
   f_sss  a dipole (eq. 5) of the optical parameters that the scattering network predicts (eq. 4)
   ssdgs_settings_published() is the paper's model. ssdgs_settings_default() differs in what measured as
-  better. It shades in linear light. Highlights and shadow edges are computed per pixel, from blended
-Gaussians
-  ("deferred"). The scattering network is smaller and has five more inputs: the light that a true dipole
-  brings from elsewhere on the object.
+  better. It shades in linear light. Highlights and shadow edges are computed per pixel, of what Gaussians
+  blend to ("deferred"). The scattering network is smaller and has five more inputs: the light that a true
+  dipole brings from elsewhere on the object.
 
 CONVENTIONS
   camera  x right, y down, z forward; the centre of pixel (0,0), top left, is (0.5, 0.5); no lens distortion.
@@ -86,7 +85,8 @@ CONVENTIONS
 MEMORY, THREADS, DETERMINISM
   Memory comes from desc.allocator, on the thread that called the library; libc's own is not in it.
   A frame allocates only where it is larger than every earlier one: in pixels, lights, Gaussians or tile
-  entries. Pixels, planes and paths stay the caller's. Objects may be destroyed in any order.
+  entries. Pixels, planes and paths stay the caller's. Contexts, models, scenes and trainers
+  may be destroyed in any order.
   A context serves one thread at a time, with all that was made on it; contexts share nothing. Hooks,
   allocator, log, tracer and progress run on the caller's thread, an occluder on any. A call made while
   another is at work on the context returns ERR_ARGUMENT; progress may call all but the trainer's destruction.
@@ -95,14 +95,15 @@ MEMORY, THREADS, DETERMINISM
   The same calls give the same bits for any number of threads, and of processes that share training's batches
   (options.sum). AVX2, AVX-512 and NEON give the same bits; so do SSE2, WebAssembly and scalar code; the two
   groups differ, as FMA rounds once. Builds agree as far as their libm does, but not with clang's -ffast-math
-  or -ffp-contract=fast, nor on x87. Threads keep the rounding mode in which their context was made.
+  or -ffp-contract=fast, nor on x87. Threads keep the rounding mode in which their context was made: a
+  host that changes its own gets bits that depend on the threads.
 
 ERRORS
   Calls return SSDGS_OK, which is 0, or a code. ssdgs_error_message() names the file, byte, argument or
   parameter. Where making or loading something fails, *out becomes NULL. Nothing exits or prints.
-  All values that a call reads of cameras, lights, networks and ASG must be finite. Gaussians that are not are
-  not drawn, or black; infinite sizes and opacities are clamped. A training step whose gradient is not finite
-  changes nothing; ssdgs_trainer_run() ends after ten in a row.
+  All values that a call reads of cameras, lights, networks and ASG must be finite. Gaussians that are not
+  finite are not drawn, or black; infinite sizes and opacities are clamped. A training step whose gradient is
+  not finite changes nothing; ssdgs_trainer_run() ends after ten in a row.
 
 FILES
   A model is one binary little-endian PLY: vertices as splat viewers know them with our raw parameters added,
@@ -113,7 +114,8 @@ FILES
   Reading takes ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
   (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties.
   Editors of splats drop what lies behind the vertices, and move these: ssdgs_model_adopt() mends that.
-  Checkpoints have native byte order, and fit one version, precision, set of options and photographs.
+  Checkpoints have native byte order, and fit one version, precision, set of options and photographs; else the
+  message names the first that differs.
   Files are written under another name and renamed when complete: a link is replaced, not followed. A process
   that is killed may leave a file PATH.tmp.*
 
@@ -137,10 +139,10 @@ SCENES, as engines have them: examples/engine.c is one
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
-  photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with the
-number of Gaussians: examples/reduce.h makes levels of detail. Skipped without changing any bit: Gaussians
-that no pixel blends, neurons that are 0 in a whole block of 64 Gaussians, terms not asked for, results of the
-last frame that still hold.
+  photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with
+  the number of Gaussians: examples/reduce.h makes levels of detail.
+  Skipped without changing any bit: Gaussians that no pixel blends, neurons that are 0 in a whole block of 64
+  Gaussians, terms not asked for, results of the last frame that still hold.
 
 MACROS, defined before the header; those with * in every file that includes it
   SSDGS_IMPLEMENTATION  in one file: the code
@@ -160,7 +162,8 @@ BESIDE IT, in examples/, headers on this interface
   Nothing finds cameras or lights (options.refine corrects small errors), traces light between objects,
   undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
 
-CHANGES, for programs written for 0.2.5
+CHANGES, for programs written for 0.2.4
+  a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
   ssdgs_model_reduce(model, n)   reduce_model(context, &model, n) of examples/reduce.h: another model
   ssdgs_environment(context, ..) sky_lights(..) of examples/sky.h, which returns what is wrong
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
@@ -179,7 +182,7 @@ CONTENTS, search for the tag
   eq. 5  dipole                       eq. 6, 7  walk_light                  eq. 8  shadow_factor
   eq. 9  reflect; highlight           eq. 10  half_vector                   eq. 12  asg; deferred: glow
   eq. 14  colour                      loss  ssim_row                        Adam  adam_lanes
-  each X with X_backward behind it */
+  where X has a gradient, X_backward stands behind it */
 
 /* ==== the interface ==== */
 
@@ -2429,64 +2432,79 @@ static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SS
     first[5] = first[4] + ssdgs__network_count(settings, 1);
 }
 
-/* Every setting once, in the order of files: member, its property there, values (0: one), whether these are
-   whole numbers, range, default, published, and what held where older files lack it (-1: none does). */
+/* Every setting once, in the order of files: member, its property there, values (0: one), type (an int, or a
+   real), range, default, published, and what held where older files lack it (-1: none does). */
 /* clang-format off */
 #define SSDGS__SETTINGS(S) \
-    S(version, "version", 0, 1, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, -1) \
-    S(terms, "terms", 0, 1, 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, -1) \
-    S(baked, "baked", 0, 1, 0, 1, 0, 0, -1) \
-    S(transfer, "transfer", 0, 1, 0, SSDGS_TRANSFER_NONE, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE, -1) \
-    S(dipole, "dipole", 0, 1, 0, SSDGS_DIPOLE_PRINTED, 0, 0, -1) \
-    S(asg, "asg", 0, 1, 0, SSDGS_ASG_DEFERRED, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC, -1) \
-    S(per_channel_optics, "per_channel_optics", 0, 1, 0, 1, 1, 0, -1) \
-    S(depth_cue, "depth_cue", 0, 1, 0, 1, 0, 0, -1) \
-    S(transport, "transport", 0, 1, 0, 1, 1, 0, 0) \
-    S(residual_shadow, "residual_shadow", 0, 1, 0, 1, 1, 0, -1) \
-    S(shadow_on_scattering, "shadow_on_scattering", 0, 1, 0, 1, 0, 0, -1) \
-    S(scattering.layers, "scattering_layers", 0, 1, 0, SSDGS_MAX_LAYERS, 3, 6, -1) \
-    S(scattering.width, "scattering_width", 0, 1, 0, SSDGS_MAX_WIDTH, 128, 256, -1) \
-    S(octaves.view, "view_octaves", 0, 1, 0, 8, 0, 4, 4) \
-    S(octaves.light, "light_octaves", 0, 1, 0, 8, 1, 4, 4) \
-    S(shadow.layers, "shadow_layers", 0, 1, 0, SSDGS_MAX_LAYERS, 4, 4, -1) \
-    S(shadow.width, "shadow_width", 0, 1, 0, SSDGS_MAX_WIDTH, 32, 32, -1) \
-    S(light_map.blur, "light_blur", 0, 1, 0, SSDGS_BLUR_FLOOR, SSDGS_BLUR_FLOOR, SSDGS_BLUR_ADD, -1) \
-    S(light_map.size, "light_map_size", 0, 1, 0, 8192, 0, 0, -1) \
-    S(light_map.bias, "light_bias", 0, 0, 0, 1e30, 0.06, 0, -1) \
-    S(pixel_variance, "pixel_variance", 0, 0, 0.01, 10, 0.1, 0.3, 0.3) \
-    S(eta, "eta", 0, 0, 1, 2.5, 1.3, 1.3, -1) \
-    S(centre, "centre_", 3, 0, -1e30, 1e30, 0, 0, -1) \
-    S(length_unit, "length_unit", 0, 0, 1e-15, 1e15, 0.5, 1, -1) \
-    S(light_scale, "light_scale", 0, 0, 0, SSDGS__MOST_LIGHT, 1, 1, -1) \
-    S(ambient, "ambient_", 3, 0, 0, SSDGS__MOST_LIGHT, 0, 0, 0) \
-    S(origin, "origin_", 3, 0, -1e9, 1e9, 0, 0, 0) \
-    S(placement.turn, "placement_turn_", 3, 0, -7, 7, 0, 0, 0) \
-    S(placement.scale, "placement_scale", 0, 0, -1e9, 1e9, 1, 1, 1) \
-    S(placement.move, "placement_move_", 3, 0, -1e9, 1e9, 0, 0, 0) \
-    S(medium.scattering, "medium_scattering_", 3, 0, 0, 1e12, 0, 0, 0) \
-    S(medium.absorption, "medium_absorption_", 3, 0, 0, 1e12, 0, 0, 0)
+    S(version, "version", 0, 'i', SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, -1) \
+    S(terms, "terms", 0, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, -1) \
+    S(baked, "baked", 0, 'i', 0, 1, 0, 0, -1) \
+    S(transfer, "transfer", 0, 'i', 0, SSDGS_TRANSFER_NONE, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE, -1) \
+    S(dipole, "dipole", 0, 'i', 0, SSDGS_DIPOLE_PRINTED, 0, 0, -1) \
+    S(asg, "asg", 0, 'i', 0, SSDGS_ASG_DEFERRED, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC, -1) \
+    S(per_channel_optics, "per_channel_optics", 0, 'i', 0, 1, 1, 0, -1) \
+    S(depth_cue, "depth_cue", 0, 'i', 0, 1, 0, 0, -1) \
+    S(transport, "transport", 0, 'i', 0, 1, 1, 0, 0) \
+    S(residual_shadow, "residual_shadow", 0, 'i', 0, 1, 1, 0, -1) \
+    S(shadow_on_scattering, "shadow_on_scattering", 0, 'i', 0, 1, 0, 0, -1) \
+    S(scattering.layers, "scattering_layers", 0, 'i', 0, SSDGS_MAX_LAYERS, 3, 6, -1) \
+    S(scattering.width, "scattering_width", 0, 'i', 0, SSDGS_MAX_WIDTH, 128, 256, -1) \
+    S(octaves.view, "view_octaves", 0, 'i', 0, 8, 0, 4, 4) \
+    S(octaves.light, "light_octaves", 0, 'i', 0, 8, 1, 4, 4) \
+    S(shadow.layers, "shadow_layers", 0, 'i', 0, SSDGS_MAX_LAYERS, 4, 4, -1) \
+    S(shadow.width, "shadow_width", 0, 'i', 0, SSDGS_MAX_WIDTH, 32, 32, -1) \
+    S(light_map.blur, "light_blur", 0, 'i', 0, SSDGS_BLUR_FLOOR, SSDGS_BLUR_FLOOR, SSDGS_BLUR_ADD, -1) \
+    S(light_map.size, "light_map_size", 0, 'i', 0, 8192, 0, 0, -1) \
+    S(light_map.bias, "light_bias", 0, 'r', 0, 1e30, 0.06, 0, -1) \
+    S(pixel_variance, "pixel_variance", 0, 'r', 0.01, 10, 0.1, 0.3, 0.3) \
+    S(eta, "eta", 0, 'r', 1, 2.5, 1.3, 1.3, -1) \
+    S(centre, "centre_", 3, 'r', -1e30, 1e30, 0, 0, -1) \
+    S(length_unit, "length_unit", 0, 'r', 1e-15, 1e15, 0.5, 1, -1) \
+    S(light_scale, "light_scale", 0, 'r', 0, SSDGS__MOST_LIGHT, 1, 1, -1) \
+    S(ambient, "ambient_", 3, 'r', 0, SSDGS__MOST_LIGHT, 0, 0, 0) \
+    S(origin, "origin_", 3, 'r', -1e9, 1e9, 0, 0, 0) \
+    S(placement.turn, "placement_turn_", 3, 'r', -7, 7, 0, 0, 0) \
+    S(placement.scale, "placement_scale", 0, 'r', -1e9, 1e9, 1, 1, 1) \
+    S(placement.move, "placement_move_", 3, 'r', -1e9, 1e9, 0, 0, 0) \
+    S(medium.scattering, "medium_scattering_", 3, 'r', 0, 1e12, 0, 0, 0) \
+    S(medium.absorption, "medium_absorption_", 3, 'r', 0, 1e12, 0, 0, 0)
 /* clang-format on */
 typedef struct ssdgs__setting {
     const char *name;
     size_t at;
-    int count, whole;
+    int count, type;
     double low, high, standard, published;
 } ssdgs__setting;
-#define SSDGS__S(member, property, count, whole, low, high, standard, published, before) \
-    {#member, offsetof(ssdgs_settings, member), count, whole, low, high, standard, published},
+#define SSDGS__S(member, property, count, type, low, high, standard, published, before) \
+    {#member, offsetof(ssdgs_settings, member), count, type, low, high, standard, published},
 static const ssdgs__setting ssdgs__settings[] = {SSDGS__SETTINGS(SSDGS__S)};
 #undef SSDGS__S
 enum { SSDGS__SETTING_COUNT = sizeof ssdgs__settings / sizeof *ssdgs__settings };
 
-/* Reads or, where `set` is not NULL, sets value i of a setting. */
-static double ssdgs__setting_of(const ssdgs__setting *entry, ssdgs_settings *s, int i, const double *set) {
-    unsigned char *const at = (unsigned char *)s + entry->at;
+/* A number among settings and options: an int, a ssdgs_real or a uint64_t. */
+static size_t ssdgs__number_size(int type) {
+    return type == 'i' ? sizeof(int) : type == 'r' ? sizeof(ssdgs_real) : sizeof(uint64_t);
+}
+
+static double ssdgs__number_get(int type, const unsigned char *at) {
     int whole;
     ssdgs_real real;
-    if (set && entry->whole) whole = (int)*set, memcpy(at, &whole, sizeof whole);
-    else if (set) real = (ssdgs_real)*set, memcpy(at + (size_t)i * sizeof real, &real, sizeof real);
-    if (entry->whole) return memcpy(&whole, at, sizeof whole), (double)whole;
-    return memcpy(&real, at + (size_t)i * sizeof real, sizeof real), (double)real;
+    uint64_t wide;
+    if (type == 'i') return memcpy(&whole, at, sizeof whole), (double)whole;
+    if (type == 'r') return memcpy(&real, at, sizeof real), (double)real;
+    return memcpy(&wide, at, sizeof wide), (double)wide;
+}
+
+/* Sets an int or a real. */
+static void ssdgs__number_put(int type, unsigned char *at, double value) {
+    const int whole = type == 'i' ? (int)value : 0;
+    const ssdgs_real real = (ssdgs_real)value;
+    if (type == 'i') memcpy(at, &whole, sizeof whole);
+    else memcpy(at, &real, sizeof real);
+}
+
+static size_t ssdgs__setting_at(const ssdgs__setting *entry, int i) {
+    return entry->at + (size_t)i * ssdgs__number_size(entry->type);
 }
 
 static ssdgs_settings ssdgs__settings_preset(int published) {
@@ -2494,8 +2512,9 @@ static ssdgs_settings ssdgs__settings_preset(int published) {
     memset(&s, 0, sizeof s);
     for (int k = 0; k < SSDGS__SETTING_COUNT; k++)
         for (int i = 0; !i || i < ssdgs__settings[k].count; i++)
-            ssdgs__setting_of(ssdgs__settings + k, &s, i,
-                              published ? &ssdgs__settings[k].published : &ssdgs__settings[k].standard);
+            ssdgs__number_put(ssdgs__settings[k].type,
+                              (unsigned char *)&s + ssdgs__setting_at(ssdgs__settings + k, i),
+                              published ? ssdgs__settings[k].published : ssdgs__settings[k].standard);
     return s;
 }
 
@@ -2558,7 +2577,6 @@ static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
 }
 
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
-    ssdgs_settings copy = *s;
     if (s->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
     if (s->dipole == 2 || s->dipole == 3)
@@ -2581,7 +2599,8 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
         if (entry->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (entry->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
         for (int i = 0; !i || i < entry->count; i++) {
-            const double value = ssdgs__setting_of(entry, &copy, i, NULL);
+            const double value =
+                ssdgs__number_get(entry->type, (const unsigned char *)s + ssdgs__setting_at(entry, i));
             const int within =
                 (float)value >= (float)low && (float)value <= (float)entry->high; /* of files */
             if ((within || (of_medium && !medium)) && ssdgs__finite((ssdgs_real)value)) continue;
@@ -8577,14 +8596,14 @@ typedef struct ssdgs__ply_field {
     const char *stem; /* of the names stem0, stem1, .. */
     int count;        /* of those; 0 = the stem is the name */
     int word;         /* of the first; of a setting where it lies in ssdgs_settings, bytes */
-    int integer;
-    double before; /* of a setting, where files of older versions lack it; -1: none may */
+    int type;         /* of a setting: 'i' int, 'r' real; else 0 */
+    double before;    /* of a setting, where files of older versions lack it; -1: none may */
 } ssdgs__ply_field;
 
 #define SSDGS__V(stem, count, word) \
     { SSDGS__PLY_VERTEX, stem, count, word, 0, -1 }
-#define SSDGS__S(member, property, count, whole, low, high, standard, published, before) \
-    {SSDGS__PLY_SETTINGS, property, count, offsetof(ssdgs_settings, member), whole, before},
+#define SSDGS__S(member, property, count, type, low, high, standard, published, before) \
+    {SSDGS__PLY_SETTINGS, property, count, offsetof(ssdgs_settings, member), type, before},
 #define SSDGS__G(kind, stem, count, group) \
     { kind, stem, count, 4 * group, 0, -1 }
 /* In the order of the file; red, green, blue are only read. */
@@ -9087,15 +9106,11 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);) {
         const double value = ssdgs__ply_value(words[cursor.word]);
-        const ssdgs_real real = (ssdgs_real)value;
         if (!ssdgs__ply_finite(words[cursor.word]) ||
-            (cursor.field->integer && (fabs(value) > 1e6 || floor(value) != value)))
+            (cursor.field->type == 'i' && (fabs(value) > 1e6 || floor(value) != value)))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: setting %s is not finite or not whole",
                                ply->name, ssdgs__ply_name(&cursor, name));
-        int integer = cursor.field->integer ? (int)value : 0;
-        unsigned char *to = (unsigned char *)settings + ssdgs__ply_setting(&cursor);
-        if (cursor.field->integer) memcpy(to, &integer, sizeof integer);
-        else memcpy(to, &real, sizeof real);
+        ssdgs__number_put(cursor.field->type, (unsigned char *)settings + ssdgs__ply_setting(&cursor), value);
     }
     if (settings->version < 1 || settings->version > SSDGS_VERSION)
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: version %d; this library reads 1 to %d",
@@ -9585,15 +9600,12 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
         uint32_t *word = &words[cursor.word];
-        ssdgs_real real;
-        if (cursor.field->integer) {
-            memcpy(word, (const unsigned char *)settings + ssdgs__ply_setting(&cursor), sizeof *word);
-        } else if (kind == SSDGS__PLY_SETTINGS) {
-            memcpy(&real, (const unsigned char *)settings + ssdgs__ply_setting(&cursor), sizeof real);
-            *word = ssdgs__ply_bits((double)real);
+        if (kind == SSDGS__PLY_SETTINGS) {
+            const double value = ssdgs__number_get(cursor.field->type, (const unsigned char *)settings +
+                                                                           ssdgs__ply_setting(&cursor));
+            *word = cursor.field->type == 'i' ? (uint32_t)(int)value : ssdgs__ply_bits(value);
         } else if (cursor.word < SSDGS_CHANNELS) {
-            real = *ssdgs__ply_cell(model, row, &cursor);
-            *word = ssdgs__ply_bits((double)real);
+            *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
         }
         ssdgs__writer_word(writer, *word);
     }
@@ -9623,7 +9635,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
         for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
-            snprintf(line, sizeof line, "property %s %s\n", cursor.field->integer ? "int" : "float",
+            snprintf(line, sizeof line, "property %s %s\n", cursor.field->type == 'i' ? "int" : "float",
                      ssdgs__ply_name(&cursor, name));
             ssdgs__writer_text(&writer, line);
         }
@@ -11777,43 +11789,30 @@ static uint64_t ssdgs__fold_many(uint64_t hash, const void *data, size_t size) {
     return ssdgs__fold(ssdgs__fold(hash, lane, sizeof lane), bytes, size);
 }
 
-/* What must be the same where a run goes on: numbers of options and settings, by their names. Not what the
-   trainer makes of the photographs: centre, length_unit, light_scale. */
+/* What must be the same where a run goes on: besides settings, these options. */
 typedef struct ssdgs__member {
     const char *name;
-    int in_options, type; /* 'i' int, 'r' real, 'u' uint64_t */
+    int type; /* 'i' int, 'r' real, 'u' uint64_t */
     size_t at;
 } ssdgs__member;
 
 #define SSDGS__O(type, name) \
-    { #name, 1, type, offsetof(ssdgs_train_options, name) }
-#define SSDGS__S(type, name) \
-    { #name, 0, type, offsetof(ssdgs_settings, name) }
-#define SSDGS__3(one, name) one('r', name[0]), one('r', name[1]), one('r', name[2])
+    { #name, type, offsetof(ssdgs_train_options, name) }
+#define SSDGS__3(name) SSDGS__O('r', name[0]), SSDGS__O('r', name[1]), SSDGS__O('r', name[2])
 #define SSDGS__R(name) SSDGS__O('r', rates.name.start), SSDGS__O('r', rates.name.end)
 /* clang-format off */
 static const ssdgs__member ssdgs__members[] = {
     SSDGS__O('i', iterations), SSDGS__O('u', seed), SSDGS__O('i', schedule), SSDGS__O('i', random_background),
     SSDGS__O('i', initial_points), SSDGS__O('i', max_gaussians), SSDGS__O('i', densify_every),
     SSDGS__O('i', densify_from), SSDGS__O('i', densify_until), SSDGS__O('i', opacity_reset_every),
-    SSDGS__O('i', batch), SSDGS__O('i', refine), SSDGS__3(SSDGS__O, background), SSDGS__O('r', dssim),
-    SSDGS__O('r', normal_weight), SSDGS__3(SSDGS__O, bounds_min), SSDGS__3(SSDGS__O, bounds_max),
+    SSDGS__O('i', batch), SSDGS__O('i', refine), SSDGS__3(background), SSDGS__O('r', dssim),
+    SSDGS__O('r', normal_weight), SSDGS__3(bounds_min), SSDGS__3(bounds_max),
     SSDGS__O('r', densify_gradient), SSDGS__O('r', prune_outside), SSDGS__O('r', adam_epsilon),
     SSDGS__O('r', finish), SSDGS__R(position), SSDGS__R(opacity), SSDGS__R(scale), SSDGS__R(rotation),
     SSDGS__R(color), SSDGS__R(asg), SSDGS__R(frame), SSDGS__R(material), SSDGS__R(shadow),
-    SSDGS__R(scattering), SSDGS__R(camera), SSDGS__R(light),
-    SSDGS__S('i', terms), SSDGS__S('i', baked), SSDGS__S('i', transfer), SSDGS__S('i', dipole),
-    SSDGS__S('i', asg), SSDGS__S('i', per_channel_optics), SSDGS__S('i', depth_cue), SSDGS__S('i', transport),
-    SSDGS__S('i', residual_shadow), SSDGS__S('i', shadow_on_scattering), SSDGS__S('i', scattering.layers),
-    SSDGS__S('i', scattering.width), SSDGS__S('i', shadow.layers), SSDGS__S('i', shadow.width),
-    SSDGS__S('i', octaves.view), SSDGS__S('i', octaves.light), SSDGS__S('i', light_map.blur),
-    SSDGS__S('i', light_map.size), SSDGS__S('r', light_map.bias), SSDGS__S('r', pixel_variance),
-    SSDGS__S('r', eta), SSDGS__3(SSDGS__S, ambient), SSDGS__3(SSDGS__S, origin),
-    SSDGS__3(SSDGS__S, placement.turn), SSDGS__S('r', placement.scale), SSDGS__3(SSDGS__S, placement.move),
-    SSDGS__3(SSDGS__S, medium.scattering), SSDGS__3(SSDGS__S, medium.absorption)};
+    SSDGS__R(scattering), SSDGS__R(camera), SSDGS__R(light)};
 /* clang-format on */
 #undef SSDGS__O
-#undef SSDGS__S
 #undef SSDGS__3
 #undef SSDGS__R
 
@@ -12009,35 +12008,44 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
     return 1;
 }
 
-static double ssdgs__member_value(int type, const unsigned char *at) {
-    int whole;
-    ssdgs_real real;
-    uint64_t wide;
-    if (type == 'i') return memcpy(&whole, at, sizeof whole), (double)whole;
-    if (type == 'r') return memcpy(&real, at, sizeof real), (double)real;
-    return memcpy(&wide, at, sizeof wide), (double)wide;
+#define SSDGS__ANOTHER ": a run goes on with the same options, settings and photographs"
+
+/* Compares one number of a checkpoint with the trainer's. index: "[1]", of a value in an array, or "". */
+static ssdgs_result ssdgs__checkpoint_number(ssdgs_context *context, const char *path, const char *name,
+                                             const char *index, int type, const unsigned char *there,
+                                             const unsigned char *here) {
+    if (!memcmp(there, here, ssdgs__number_size(type))) return SSDGS_OK;
+    return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER,
+                       path, name, index, ssdgs__number_get(type, there), ssdgs__number_get(type, here));
 }
 
 /* Whether a checkpoint is of the trainer's run; the message names the first thing that differs. */
 static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const char *path,
                                            const ssdgs__checkpoint_head *own,
                                            const ssdgs__checkpoint_head *head, const unsigned char *hashes) {
-#define SSDGS__ANOTHER ": a run goes on with the same options, settings and photographs"
     ssdgs_context *context = trainer->context;
-    for (size_t i = 0; i < sizeof ssdgs__members / sizeof *ssdgs__members; i++) {
+    const unsigned char *there = (const unsigned char *)&head->options,
+                        *here = (const unsigned char *)&own->options;
+    ssdgs_result result = SSDGS_OK;
+    for (size_t i = 0; i < sizeof ssdgs__members / sizeof *ssdgs__members && !result; i++) {
         const ssdgs__member *m = ssdgs__members + i;
-        const size_t at = m->at + (m->in_options ? offsetof(ssdgs__checkpoint_head, options)
-                                                 : offsetof(ssdgs__checkpoint_head, settings)),
-                     size = m->type == 'i'   ? sizeof(int)
-                            : m->type == 'r' ? sizeof(ssdgs_real)
-                                             : sizeof(uint64_t);
-        const unsigned char *there = (const unsigned char *)head + at,
-                            *here = (const unsigned char *)own + at;
-        if (memcmp(there, here, size))
-            return ssdgs__fail(context, SSDGS_ERR_FORMAT,
-                               "%s: %s was %g in its run and is %g now" SSDGS__ANOTHER, path, m->name,
-                               ssdgs__member_value(m->type, there), ssdgs__member_value(m->type, here));
+        result = ssdgs__checkpoint_number(context, path, m->name, "", m->type, there + m->at, here + m->at);
     }
+    there = (const unsigned char *)&head->settings;
+    here = (const unsigned char *)&own->settings;
+    for (int k = 0; k < SSDGS__SETTING_COUNT; k++) {
+        const ssdgs__setting *entry = ssdgs__settings + k;
+        const int made = entry->at == offsetof(ssdgs_settings, centre) ||
+                         entry->at == offsetof(ssdgs_settings, length_unit) ||
+                         entry->at == offsetof(ssdgs_settings, light_scale); /* of the photographs */
+        for (int i = 0; (!i || i < entry->count) && !made && !result; i++) {
+            const char index[4] = {'[', (char)('0' + i), ']', 0};
+            const size_t at = ssdgs__setting_at(entry, i);
+            result = ssdgs__checkpoint_number(context, path, entry->name, entry->count ? index : "",
+                                              entry->type, there + at, here + at);
+        }
+    }
+    if (result) return result;
     if (head->photo_count != own->photo_count)
         return ssdgs__fail(context, SSDGS_ERR_FORMAT,
                            "%s: its run had %d photographs, this one has %d" SSDGS__ANOTHER, path,
@@ -12045,13 +12053,13 @@ static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const c
     if (head->global_count != own->global_count) /* from here on the file is as long as this run's */
         return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: its counts are out of range", path);
     ssdgs__checkpoint_photo *const photos = ssdgs__checkpoint_photos(trainer);
-    ssdgs_result result = photos ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    result = photos ? SSDGS_OK : SSDGS_ERR_MEMORY;
     for (int i = 0; i < own->photo_count && !result; i++, hashes += sizeof *photos) {
-        ssdgs__checkpoint_photo there;
-        memcpy(&there, hashes, sizeof there);
-        const char *what = there.camera != photos[i].camera   ? "another camera"
-                           : there.lights != photos[i].lights ? "other lights"
-                           : there.pixels != photos[i].pixels ? "other pixels"
+        ssdgs__checkpoint_photo saved;
+        memcpy(&saved, hashes, sizeof saved);
+        const char *what = saved.camera != photos[i].camera   ? "another camera"
+                           : saved.lights != photos[i].lights ? "other lights"
+                           : saved.pixels != photos[i].pixels ? "other pixels"
                                                               : NULL;
         if (what)
             result = ssdgs__fail(context, SSDGS_ERR_FORMAT,
@@ -12059,8 +12067,8 @@ static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const c
     }
     ssdgs__release(context, photos);
     return result;
-#undef SSDGS__ANOTHER
 }
+#undef SSDGS__ANOTHER
 
 static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path) {
     ssdgs_context *context = trainer->context;
