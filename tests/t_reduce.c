@@ -331,7 +331,53 @@ static void test_after_frame(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Each Gaussian that is not merged stays as it is, also of many, and networks and lobes are the old ones. */
+static void test_rest(void) {
+    enum { N = 5000 };
+    static unsigned char met[N];
+    ssdgs_context *context = open_context(2);
+    ssdgs_model *model = new_model(context, NULL, N);
+    for (int i = 0; i < N; i++) {
+        ssdgs_gaussian g = any(i);
+        g.material[0] = (ssdgs_real)i;
+        set(model, i, &g);
+    }
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
+    ssdgs_real *const lists[5] = {v.asg_basis, v.asg_sharpness, v.asg_sigma, v.scattering, v.shadow};
+    const size_t counts[5] = {4 * SSDGS_ASG_COUNT, 2 * SSDGS_ASG_COUNT, SSDGS_ASG_COUNT, v.scattering_count,
+                              v.shadow_count};
+    ssdgs_real *before[5];
+    for (int k = 0; k < 5; k++) {
+        before[k] = (ssdgs_real *)malloc(counts[k] * sizeof(ssdgs_real));
+        if (!CHECK(before[k])) exit(1);
+        for (size_t i = 0; i < counts[k]; i++)
+            before[k][i] = lists[k][i] = (ssdgs_real)draw(100000 * (uint64_t)k + i);
+    }
+    CHECK(!reduce_model(context, &model, N - 1));
+    const ssdgs_model_view w = ssdgs_model_arrays(model);
+    const ssdgs_real *const after[5] = {w.asg_basis, w.asg_sharpness, w.asg_sigma, w.scattering, w.shadow};
+    CHECK(w.count == N - 1 && w.scattering_count == counts[3] && w.shadow_count == counts[4]);
+    for (int k = 0; k < 5; k++) {
+        CHECK(!memcmp(before[k], after[k], counts[k] * sizeof(ssdgs_real)));
+        free(before[k]);
+    }
+    int kept = 0;
+    for (int i = 0; i < N - 1; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        const int name = (int)g.material[0];
+        const ssdgs_gaussian old = any(name);
+        if (met[name] || memcmp(g.position, old.position, sizeof g.position) != 0) continue;
+        met[name] = 1;
+        kept++;
+    }
+    CHECK(kept == N - 2); /* two became one */
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
+    test_rest();
     test_moments();
     test_after_frame();
     test_twins();
