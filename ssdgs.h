@@ -129,12 +129,9 @@ SCENES, as engines have them: examples/engine.c is one
                                      by ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer
   A light's map covers what it reaches, with up to 1024 pixels a side by default. So give lights a range: they
-  cost what they reach, and keep their maps while nothing there moves. A directional light's map covers all
-  objects of the array: leave out what is far away.
+  cost what they reach, and keep their maps while they and what they reach stay, dark or not. A directional
+  light's map covers all objects of the array: leave out what is far away.
   All objects share the largest one's shadow bias: a very large model removes contact shadows of small ones.
-  All maps are made again when the number of lights or objects, a model, options.stop, alpha_threshold or
-  light_detail changes. When a light's intensity becomes 0, the maps of all later lights are made again: put
-  flickering lights last.
   If models have different settings.light_scale, set object.tint to compensate.
 
 SPEED
@@ -859,10 +856,11 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    have left it calls fetch. frame.memory says whose frame it is, a model's or a scene's; models have
    revisions; `released` hears when one of either is gone.
 
-   The stages up to WALK run for the views of frame.batch, then perhaps for more views. A view that is
-   `cached` is the last frame's of that memory. So is what these stages found for it, in `seen` and the
-   light's rows too, and they leave it as it is. So what a hook has left for a view stays until that stage
-   works on the view again, or the memory is released. Where it is lost, PROJECT clears `cached`.
+   The stages up to WALK run for the views of frame.batch, then perhaps for more views. For a view
+   that is `cached` these stages have found all that they would find, in `seen` and the light's rows too, and
+   leave it as it is; those up to BIN also where `cached` is 1. So what a hook has left for a view stays
+   until that stage works on the view again, or the memory is released. Where it is lost, PROJECT clears
+   `cached`.
 
    A result other than SSDGS_OK ends the frame, of which nothing is kept; ssdgs_stage_fail() says why.
 
@@ -948,11 +946,11 @@ typedef struct ssdgs_splat_view {
     int orthographic;
     ssdgs_real distance; /* of a point light seen as a parallel one, else 1 */
     int by_distance;     /* order by distance, not by depth */
-    int cached;          /* 1: everything up to SSDGS_STAGE_WALK is the last frame's */
     int compensate;      /* opacity compensated for the blur */
     int blur;            /* ssdgs_blur */
     ssdgs_real variance; /* px^2, of the blur */
     ssdgs_real fx, fy, cx, cy, view[12], near_plane;
+    int cached; /* 1: everything up to SSDGS_STAGE_BIN is an earlier frame's, 2: up to SSDGS_STAGE_WALK */
     /* SSDGS_STAGE_PROJECT */
     ssdgs_record *record; /* (n) */
     ssdgs_real *depth;    /* (n) camera depth or distance to the light; negative = not drawn, see
@@ -989,7 +987,7 @@ typedef struct ssdgs_placed {
     int light_count;                          /* the frame's, 0 where colours are baked */
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
-    int moved;                                /* since the last frame */
+    uint64_t key;             /* of revision, first, rotation, scale and offset: equal where these are */
     double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
     ssdgs_real tint[3], roughness, specular, translucency;
     ssdgs_real medium[15];      /* RGB weights of true transport's lengths, where a medium scatters */
@@ -1900,6 +1898,29 @@ static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer
     if (!buffer->memory) return SSDGS_ERR_MEMORY;
     buffer->bytes = bytes + bytes / 8;
     return SSDGS_OK;
+}
+
+/* The same, but what is there stays. */
+static ssdgs_result ssdgs__grow(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
+    ssdgs__buffer grown = {NULL, 0};
+    if (buffer->memory && ssdgs__times(count, size) <= buffer->bytes) return SSDGS_OK;
+    const ssdgs_result result = ssdgs__reserve(context, &grown, count, size);
+    if (!result && buffer->memory) memcpy(grown.memory, buffer->memory, buffer->bytes);
+    if (result) return result;
+    ssdgs__release(context, buffer->memory);
+    *buffer = grown;
+    return SSDGS_OK;
+}
+
+/* ---- hashes, of files and of what frames depend on ---- */
+
+#define SSDGS__FOLD_START UINT64_C(0xCBF29CE484222325)
+#define SSDGS__FOLD(key, value) ((key) = ssdgs__fold((key), &(value), sizeof(value)))
+
+static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
+    const unsigned char *bytes = (const unsigned char *)data;
+    for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3);
+    return hash;
 }
 
 /* ==== >>threads  a pool per context ==== */
@@ -3484,30 +3505,27 @@ typedef struct ssdgs__view_memory {
     uint64_t chunk_room[SSDGS__BIN_CHUNKS];
 } ssdgs__view_memory;
 
-/* What the last frame showed. While that stays, so do its results. */
-typedef struct ssdgs__cache {
-    int objects; /* how many; -1: nothing is kept */
-    ssdgs_camera camera;
-    ssdgs_render_options options;
-    ssdgs_occluder occluder;
-    ssdgs_real bias[2], near_plane;       /* as the frame's */
-    int terms, light_count, maps, hidden; /* hidden: by scene_depth */
-    int camera_ready, lights_ready, bounds_ready;
-    uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
-} ssdgs__cache;
+/* Of a light. */
+typedef struct ssdgs__light_memory {
+    uint64_t key, shadow_key,
+        transport_key;         /* what the maps, the shadow network's outputs, transport rest on */
+    int made, wanted;          /* SSDGS__MADE_*: there for the key, needed by the frame */
+    int kept, transport_ready; /* 1: all that is wanted was there */
+    int first, views;          /* its views among the frame's */
+} ssdgs__light_memory;
 
-/* A light of the last frame; kept: this frame's is the same, and its views are the last one's. */
-typedef struct ssdgs__cached_light {
-    ssdgs_light light;
-    int first, views, kept, shadows_ready, transport_ready; /* first: of its views among the frame's */
-} ssdgs__cached_light;
+enum { SSDGS__MADE_VISIBILITY = 1, SSDGS__MADE_MAP = 2, SSDGS__MADE_CUE = 4, SSDGS__MADE_FLUX = 8 };
 
 /* Of a model or a scene, kept from frame to frame: what the last one found is there for the next. */
 typedef struct ssdgs__frame_memory {
-    ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, cached_lights, shadow_logit,
+    ssdgs__buffer views, view_memory, seen, visibility, cue, flux, nodes, points, lights, shadow_logit,
         shadow_known, transport, transport_known, objects, object_of, material_of, reach;
-    int view_room;
-    ssdgs__cache cache;
+    int ready;                         /* 1: what the keys stand for is there */
+    uint64_t camera_key, walk_key;     /* of the camera's view up to BIN, and up to WALK */
+    uint64_t bounds_key;               /* of `scene` */
+    int mapped;                        /* lights whose maps were asked for and are there */
+    ssdgs_real bias;                   /* for who asks them */
+    uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
     ssdgs__bounds scene;
 } ssdgs__frame_memory;
 
@@ -3539,19 +3557,23 @@ static void ssdgs__scratch_destroy(ssdgs_context *context, ssdgs__scratch *scrat
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
     if (!m) return;
     ssdgs__gone(context, m);
-    for (int v = 0; v < m->view_room; v++)
+    for (size_t v = 0; v < m->view_memory.bytes / sizeof(ssdgs__view_memory); v++)
         ssdgs__buffers_release(context, (ssdgs__view_memory *)m->view_memory.memory + v,
                                offsetof(ssdgs__view_memory, chunk_room));
-    ssdgs__buffers_release(context, m, offsetof(ssdgs__frame_memory, view_room));
+    ssdgs__buffers_release(context, m, offsetof(ssdgs__frame_memory, ready));
     ssdgs__release(context, m);
 }
 
-#define SSDGS__RESERVE(buffer, pointer, type, count) \
+#define SSDGS__RESERVE_BY(reserve, buffer, pointer, type, count) \
     do { \
-        const ssdgs_result reserved_ = ssdgs__reserve(context, &(buffer), (size_t)(count), sizeof(type)); \
+        const ssdgs_result reserved_ = reserve(context, &(buffer), (size_t)(count), sizeof(type)); \
         if (reserved_) return reserved_; \
         (pointer) = (type *)(buffer).memory; \
     } while (0)
+#define SSDGS__RESERVE(buffer, pointer, type, count) \
+    SSDGS__RESERVE_BY(ssdgs__reserve, buffer, pointer, type, count)
+#define SSDGS__KEEP(buffer, pointer, type, count) /* what is there stays */ \
+    SSDGS__RESERVE_BY(ssdgs__grow, buffer, pointer, type, count)
 
 SSDGS_API void ssdgs_context_trim(ssdgs_context *context) {
     if (!context || SSDGS__ENTER(context, "ssdgs_context_trim")) return;
@@ -3589,19 +3611,6 @@ SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
     (void)ssdgs__leave(to, SSDGS_OK);
     if (result) return ssdgs__leave(from, result);
     ssdgs__leave_and_drop(from);
-    return SSDGS_OK;
-}
-
-/* Room for `count` views; what the present ones own is kept. */
-static ssdgs_result ssdgs__views_reserve(ssdgs_context *context, ssdgs__frame_memory *m, int count) {
-    if (count <= m->view_room) return SSDGS_OK;
-    ssdgs__view_memory *grown =
-        (ssdgs__view_memory *)ssdgs__allocate(context, ssdgs__times((size_t)count, sizeof *grown));
-    if (!grown) return SSDGS_ERR_MEMORY;
-    if (m->view_room) memcpy(grown, m->view_memory.memory, (size_t)m->view_room * sizeof *grown);
-    ssdgs__release(context, m->view_memory.memory);
-    m->view_memory.memory = grown;
-    m->view_room = count;
     return SSDGS_OK;
 }
 
@@ -4165,7 +4174,7 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     const ssdgs__bounds bounds = ssdgs__light_bounds(frame, index), *b = &bounds;
     const ssdgs_light *light = frame->lights + index;
     const double detail = (double)frame->options.light_detail;
-    if (!ssdgs__casts(light)) return 0;
+    if (light->unshadowed) return 0;
     double centre[3], position[3], to_scene[3], radius2 = 0, distance2 = 0;
     ssdgs_real place[3];
     ssdgs__light_place(light, place);
@@ -4351,85 +4360,20 @@ static int ssdgs__has_transport(const ssdgs_placed *o) {
     return (o->terms & SSDGS_SCATTERING_TERM) && o->settings.transport && o->light_count;
 }
 
-/* Whether the lights' maps serve these terms. */
-static int ssdgs__needs_light(const ssdgs_frame *frame, int terms) {
+/* Whether something in the frame needs the lights' maps. */
+static int ssdgs__needs_light(const ssdgs_frame *frame) {
     if (frame->maps) return 1;
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_settings *s = &frame->objects[i].settings;
-        const int asked = s->baked ? 0 : s->terms & terms;
+        const int asked = s->baked ? 0 : s->terms & frame->terms;
         if (asked & SSDGS_SHADOW_TERM) return 1;
         if ((asked & SSDGS_SCATTERING_TERM) && (s->depth_cue || s->transport)) return 1;
     }
     return 0;
 }
 
-static ssdgs__cached_light *ssdgs__cached_lights(const ssdgs_frame *frame) {
-    return (ssdgs__cached_light *)frame->memory->cached_lights.memory;
-}
-
-/* Finds what of the last frame still holds, then notes this one. In training nothing does: the model changes.
-   same: the last frame's objects. lights_ready: its maps were made. stirred: for the camera and each light,
-   whether an object that moved is or was in reach. */
-static void ssdgs__compare_cache(ssdgs_frame *frame, int same, int lights_ready,
-                                 const unsigned char *stirred) {
-    ssdgs__cache *cache = &frame->memory->cache;
-    const ssdgs_render_options *now = &frame->options, *old = &cache->options;
-    ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
-    const ssdgs_camera *a = &frame->camera, *b = &cache->camera;
-    int known = !frame->training && same;
-    cache->objects = frame->training ? -1 : frame->object_count;
-    known =
-        known && now->alpha_threshold >= old->alpha_threshold && now->alpha_threshold <= old->alpha_threshold;
-    cache->bounds_ready = cache->bounds_ready && known;
-    for (int i = 0; i < frame->object_count; i++)
-        cache->bounds_ready = cache->bounds_ready && !frame->objects[i].moved;
-    known = known && !memcmp(&now->stop, &old->stop, sizeof now->stop);
-    cache->camera_ready =
-        cache->camera_ready && known && !stirred[0] && !frame->scene_depth && !cache->hidden &&
-        !memcmp(&cache->near_plane, &frame->near_plane, sizeof cache->near_plane) && a->width == b->width &&
-        a->height == b->height && now->antialias == old->antialias &&
-        !memcmp(&now->max_error, &old->max_error, sizeof now->max_error) &&
-        !memcmp(&a->fx, &b->fx, sizeof *a - offsetof(ssdgs_camera, fx));
-    ssdgs_occluder occluder;
-    memset(&occluder, 0, sizeof occluder);
-    if (frame->occluder) occluder = *frame->occluder;
-    known = known && lights_ready && frame->light_count == cache->light_count &&
-            !memcmp(cache->bias, frame->bias, sizeof cache->bias) &&
-            occluder.shadow == cache->occluder.shadow && occluder.user == cache->occluder.user &&
-            occluder.revision == cache->occluder.revision && frame->maps <= cache->maps &&
-            !memcmp(&now->light_detail, &old->light_detail, sizeof now->light_detail) &&
-            ssdgs__needs_light(frame, frame->terms) == ssdgs__needs_light(frame, cache->terms) &&
-            !(frame->terms & ~cache->terms &
-              (SSDGS_SCATTERING_TERM | SSDGS_SHADOW_TERM)); /* for depth cue and flux; for light maps */
-    for (int i = 0; i < frame->light_count; i++) {
-        const ssdgs_light *light = frame->lights + i, *last = &lights[i].light;
-        ssdgs_real place[3], last_place[3];
-        ssdgs__light_place(light, place);
-        ssdgs__light_place(last, last_place);
-        lights[i].kept = known && !stirred[1 + i] && light->kind == last->kind &&
-                         ssdgs__casts(light) == ssdgs__casts(last) &&
-                         ssdgs__limited(light) == ssdgs__limited(last) && /* else other bounds */
-                         !memcmp(place, last_place, sizeof place) &&
-                         !memcmp(&light->range, &last->range, sizeof light->range);
-        if (light->kind == SSDGS_LIGHT_SPOT) /* whose map follows its cone; a focus is of shading alone */
-            lights[i].kept = lights[i].kept &&
-                             !memcmp(light->direction, last->direction, sizeof light->direction) &&
-                             !memcmp(light->cone, last->cone, sizeof light->cone);
-        lights[i].shadows_ready = lights[i].kept && lights[i].shadows_ready;
-        lights[i].transport_ready =
-            lights[i].kept && lights[i].transport_ready &&
-            !memcmp(&now->transport_detail, &old->transport_detail, sizeof now->transport_detail);
-        lights[i].light = *light;
-    }
-    cache->camera = *a;
-    cache->hidden = frame->scene_depth != NULL;
-    cache->occluder = occluder;
-    cache->maps = frame->maps;
-    memcpy(cache->bias, frame->bias, sizeof cache->bias);
-    cache->near_plane = frame->near_plane;
-    cache->options = *now;
-    cache->terms = frame->terms;
-    cache->light_count = frame->light_count;
+static ssdgs__light_memory *ssdgs__light_memories(const ssdgs_frame *frame) {
+    return (ssdgs__light_memory *)frame->memory->lights.memory;
 }
 
 /* ---- the light table: what kernels need of each light, made once a frame ---- */
@@ -4637,39 +4581,32 @@ static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     o->mask = object->mask;
 }
 
-/* Puts the objects into the frame, one after the other. same: they are the last frame's, perhaps moved.
-   tuned: the translucency of one has changed. */
+/* Puts the objects into the frame, one after the other. */
 static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *objects, int count,
-                                     int light_count, int *same, int *tuned) {
+                                     int light_count) {
     ssdgs_context *context = frame->context;
     ssdgs__frame_memory *m = frame->memory;
-    const int known = m->cache.objects, fits = m->objects.bytes >= (size_t)count * sizeof(ssdgs_placed);
     uint64_t at = 0;
-    m->cache.objects = -1; /* until the whole list is this frame's */
     SSDGS__RESERVE(m->objects, frame->objects, ssdgs_placed, count + 1);
-    *same = known == count && fits;
-    *tuned = 0;
     frame->object_count = count;
     frame->settings = ssdgs_settings_default();
     frame->near_plane = (ssdgs_real)1e30;
     for (int i = 0; i < count; i++) {
         ssdgs_placed o, *last = frame->objects + i;
         ssdgs__place(objects + i, &o);
-        const int kept = i < known && fits && last->revision == o.revision;
-        if (!kept) {
-            const ssdgs_result result = ssdgs__globals_check(o.model);
-            if (result) return result;
-        }
-        *same = *same && kept;
-        o.moved = !kept || memcmp(last->rotation, o.rotation, sizeof o.rotation) ||
-                  memcmp(&last->scale, &o.scale, sizeof o.scale) ||
-                  memcmp(last->offset, o.offset, sizeof o.offset);
-        const int retuned = kept && memcmp(&last->translucency, &o.translucency, sizeof o.translucency);
-        if (kept && !retuned) memcpy(o.medium, last->medium, sizeof o.medium);
+        const int known = last->revision == o.revision; /* that of no model is 0 */
+        const ssdgs_result result = known ? SSDGS_OK : ssdgs__globals_check(o.model);
+        if (result) return result;
+        if (known && !memcmp(&last->translucency, &o.translucency, sizeof o.translucency))
+            memcpy(o.medium, last->medium, sizeof o.medium);
         else if (ssdgs__has_medium(&o.settings, o.settings.terms))
             ssdgs__medium_weights(&o.settings, o.translucency, o.medium);
-        *tuned |= retuned;
         o.first = (int)at;
+        o.key = ssdgs__fold(SSDGS__FOLD_START, &o.revision, sizeof o.revision);
+        SSDGS__FOLD(o.key, o.first);
+        SSDGS__FOLD(o.key, o.rotation);
+        SSDGS__FOLD(o.key, o.scale);
+        SSDGS__FOLD(o.key, o.offset);
         o.terms = o.settings.terms & frame->options.terms;
         o.light_count = o.settings.baked ? 0 : light_count;
         frame->light_count = o.light_count > frame->light_count ? o.light_count : frame->light_count;
@@ -4719,7 +4656,7 @@ static ssdgs_result ssdgs__materials(ssdgs_frame *frame) {
 typedef struct ssdgs__request {
     const ssdgs_object *objects;
     int object_count;
-    const ssdgs_camera *camera;
+    const ssdgs_camera *camera; /* NULL: nobody looks; what is there of the camera's view stays */
     const ssdgs_light *lights;
     int light_count;
     const ssdgs_render_options *options; /* NULL: default */
@@ -4815,17 +4752,12 @@ static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
     return angle - asin(o->radius / distance) <= (double)light->cone[1] + 1e-3;
 }
 
-/* Where the objects of several are, and which of them the camera and the lights reach. stirred: (1 + lights)
-   for the camera and each light, whether one that has moved is or was among them. */
-static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int same, unsigned char **stirred) {
+/* Where the objects of several are, and which of them the camera and the lights reach. */
+static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
     unsigned char *reach;
-    const size_t size = ssdgs__times((size_t)count + 1, (size_t)rows);
-    const int known = same && frame->memory->reach.bytes >= size;
-    SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, size);
-    *stirred = reach + (ptrdiff_t)count * rows;
-    memset(*stirred, 0, (size_t)rows);
+    SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, ssdgs__times((size_t)count + 1, (size_t)rows));
     frame->reach = several ? reach : NULL;
     for (int i = 0; i < count; i++) {
         ssdgs_placed *o = frame->objects + i;
@@ -4846,9 +4778,7 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int same, unsigned cha
         for (int row = 0; row < rows; row++) {
             const int in =
                 anywhere || (row ? ssdgs__in_light(frame->lights + row - 1, o) : ssdgs__in_sight(frame, o));
-            unsigned char *at = reach + (ptrdiff_t)row * count + i;
-            (*stirred)[row] |= (unsigned char)(o->moved && (in || !known || *at));
-            *at = (unsigned char)in;
+            reach[(ptrdiff_t)row * count + i] = (unsigned char)in;
         }
     }
     return SSDGS_OK;
@@ -4863,10 +4793,124 @@ static int ssdgs__has_ambient(const ssdgs_render_options *options) {
 
 static ssdgs_result ssdgs__expose(ssdgs_placed *o);
 
-/* Checks a request, places its objects, finds what is cached, reserves memory. */
+/* ---- what earlier frames have found: results have a key of all that they depend on; equal keys, equal
+ * results ---- */
+
+/* Of what is drawn and where it stands: all objects, or those that `reach` has. */
+static uint64_t ssdgs__objects_key(const ssdgs_frame *frame, const unsigned char *reach) {
+    uint64_t key = ssdgs__fold(SSDGS__FOLD_START, &frame->count, sizeof frame->count); /* rows are as long */
+    SSDGS__FOLD(key, frame->options.alpha_threshold);
+    for (int i = 0; i < frame->object_count; i++)
+        if (!reach || reach[i]) SSDGS__FOLD(key, frame->objects[i].key);
+    return key;
+}
+
+/* Of the camera's view, up to BIN, or of a light's. */
+static uint64_t ssdgs__views_key(const ssdgs_frame *frame, int light, const ssdgs_splat_view *views,
+                                 int count) {
+    uint64_t key = ssdgs__objects_key(frame, ssdgs__reach(frame, light));
+    for (int i = 0; i < count; i++) key = ssdgs__fold(key, views + i, offsetof(ssdgs_splat_view, cached));
+    return key;
+}
+
+static void ssdgs__begin_camera(ssdgs_frame *frame) {
+    ssdgs__frame_memory *m = frame->memory;
+    const ssdgs_camera *camera = &frame->camera;
+    ssdgs_splat_view v;
+    memset(&v, 0, sizeof v);
+    v.light = -1;
+    v.distance = 1;
+    v.width = camera->width;
+    v.height = camera->height;
+    v.fx = camera->fx;
+    v.fy = camera->fy;
+    v.cx = camera->cx;
+    v.cy = camera->cy;
+    v.near_plane = camera->near_plane > 0 ? camera->near_plane : frame->near_plane;
+    v.compensate = frame->options.antialias;
+    v.variance = frame->settings.pixel_variance;
+    memcpy(v.view, camera->view, sizeof v.view);
+    const uint64_t key = ssdgs__views_key(frame, -1, &v, 1);
+    uint64_t walk = ssdgs__fold(key, &frame->options.stop, sizeof frame->options.stop);
+    SSDGS__FOLD(walk, frame->options.max_error);
+    if (frame->scene_depth) walk = 0; /* what it hides may change behind the pointer */
+    if (key != m->camera_key) *frame->views = v;
+    frame->views->cached = key != m->camera_key ? 0 : walk && walk == m->walk_key ? 2 : 1;
+    m->camera_key = key;
+    m->walk_key = walk;
+}
+
+/* A dark light's views are not made, but what is there of them stays. */
+static void ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted) {
+    const ssdgs_light *light = frame->lights + index;
+    ssdgs__light_memory *own = ssdgs__light_memories(frame) + index;
+    ssdgs_splat_view views[6];
+    ssdgs_real place[3];
+    ssdgs__light_place(light, place);
+    uint64_t key = ssdgs__views_key(frame, index, views, ssdgs__light_views(frame, index, views));
+    SSDGS__FOLD(key, light->kind);
+    SSDGS__FOLD(key, place);
+    SSDGS__FOLD(key, own->first);
+    SSDGS__FOLD(key, frame->options.stop);
+    SSDGS__FOLD(key, frame->bias);
+    if (frame->occluder) {
+        SSDGS__FOLD(key, frame->occluder->shadow);
+        SSDGS__FOLD(key, frame->occluder->user);
+        SSDGS__FOLD(key, frame->occluder->revision);
+    }
+    own->wanted = ssdgs__casts(light) ? wanted : 0;
+    own->kept = key == own->key && !(own->wanted & ~own->made);
+    own->key = key;
+    if (!own->kept) own->made = own->wanted;
+    for (int i = 0; i < own->views; i++) {
+        ssdgs_splat_view *v = frame->views + own->first + i;
+        if (!own->kept) *v = views[i];
+        v->cached = own->kept || !own->wanted ? 2 : 0;
+    }
+}
+
+/* Lays out the views, and finds what is there of them. looks: 0: no camera does. */
+static ssdgs_result ssdgs__begin_views(ssdgs_frame *frame, int wanted, int looks) {
+    ssdgs_context *context = frame->context;
+    ssdgs__frame_memory *m = frame->memory;
+    ssdgs__light_memory *lights;
+    const int light_count = wanted ? frame->light_count : 0;
+    SSDGS__KEEP(m->lights, lights, ssdgs__light_memory, frame->light_count + 1);
+    frame->view_count = 1;
+    if (light_count) {
+        const uint64_t key = ssdgs__objects_key(frame, NULL);
+        const ssdgs_result result = key != m->bounds_key ? ssdgs__scene_bounds(frame, &m->scene) : SSDGS_OK;
+        if (result) return result;
+        m->bounds_key = key;
+        memset(lights + light_count, 0, m->lights.bytes - (size_t)light_count * sizeof *lights);
+    }
+    for (int i = 0; i < light_count; i++) {
+        lights[i].first = frame->view_count;
+        lights[i].views = ssdgs__light_views(frame, i, NULL);
+        frame->view_count += lights[i].views;
+    }
+    const ssdgs_result result =
+        ssdgs__grow(context, &m->view_memory, (size_t)frame->view_count, sizeof(ssdgs__view_memory));
+    if (result) return result;
+    SSDGS__KEEP(m->views, frame->views, ssdgs_splat_view, frame->view_count);
+    frame->batch[1] = frame->view_count;
+    if (looks) ssdgs__begin_camera(frame);
+    else frame->views->cached = 2;
+    for (int i = 0; i < light_count; i++) ssdgs__begin_light(frame, i, wanted);
+    return SSDGS_OK;
+}
+
+/* Forgets what earlier frames have found. */
+static void ssdgs__frame_forget(ssdgs__frame_memory *m) {
+    m->camera_key = m->walk_key = m->bounds_key = 0;
+    if (m->lights.memory) memset(m->lights.memory, 0, m->lights.bytes);
+    if (m->objects.memory) memset(m->objects.memory, 0, m->objects.bytes);
+}
+
+/* Checks a request, places its objects, reserves memory, finds what is there from earlier frames. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *context,
                                        ssdgs__frame_memory **memory, const ssdgs__request *request) {
-    const ssdgs_camera *camera = request->camera;
+    const ssdgs_camera nobody = ssdgs__no_camera(), *camera = request->camera ? request->camera : &nobody;
     const ssdgs_image *image = request->image;
     const int light_count = request->light_count, training = request->training;
     const int components = request->components || (image && ssdgs__components_asked(image));
@@ -4905,74 +4949,20 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
-    const int lights_ready = m->cache.lights_ready;
-    m->cache.lights_ready = 0; /* again once the walks are done */
-    int same, tuned;
-    unsigned char *stirred;
-    result = ssdgs__place_all(frame, request->objects, request->object_count, light_count, &same, &tuned);
+    if (!m->ready || training) ssdgs__frame_forget(m);
+    m->ready = m->mapped = 0; /* again once the walks are done */
+    result = ssdgs__place_all(frame, request->objects, request->object_count, light_count);
     for (int i = 0; !result && ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
         result = ssdgs__expose(frame->objects + i);
+    if (!result) result = ssdgs__find_reach(frame);
     if (result) return result;
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
-    const int needs_light = ssdgs__needs_light(frame, frame->terms);
-    ssdgs__cached_light *cached;
-    SSDGS__RESERVE(m->cached_lights, cached, ssdgs__cached_light, frame->light_count + 1);
-    result = ssdgs__find_reach(frame, same, &stirred);
-    if (result) return result;
-    ssdgs__compare_cache(frame, same, lights_ready, stirred);
-    for (int i = 0; i < frame->light_count; i++) cached[i].transport_ready &= !tuned;
-    frame->view_count = 1;
-    if (needs_light && frame->light_count) {
-        if (!m->cache.bounds_ready) {
-            result = ssdgs__scene_bounds(frame, &m->scene);
-            if (result) return result;
-            m->cache.bounds_ready = m->cache.objects >= 0;
-        }
-        for (int i = 0, moved = 0; i < frame->light_count; i++) {
-            /* if a light has another number of views, those of all later lights move */
-            const int views = ssdgs__light_views(frame, i, NULL);
-            cached[i].kept = cached[i].kept && !moved;
-            moved |= views != cached[i].views;
-            cached[i].views = views;
-            cached[i].first = frame->view_count;
-            frame->view_count += views;
-        }
-    }
-    result = ssdgs__views_reserve(context, m, frame->view_count);
-    if (result) return result;
-    if (m->views.bytes < (size_t)frame->view_count * sizeof *frame->views) { /* they are new memory */
-        m->cache.camera_ready = 0;
-        for (int i = 0; i < frame->light_count; i++) cached[i].kept = 0;
-    }
-    SSDGS__RESERVE(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    if (!m->cache.camera_ready) {
-        memset(frame->views, 0, sizeof *frame->views);
-        frame->views[0].light = -1;
-        frame->views[0].distance = 1;
-        frame->views[0].width = camera->width;
-        frame->views[0].height = camera->height;
-        frame->views[0].fx = camera->fx;
-        frame->views[0].fy = camera->fy;
-        frame->views[0].cx = camera->cx;
-        frame->views[0].cy = camera->cy;
-        frame->views[0].near_plane = camera->near_plane > 0 ? camera->near_plane : frame->near_plane;
-        frame->views[0].compensate = frame->options.antialias;
-        frame->views[0].variance = frame->settings.pixel_variance;
-        memcpy(frame->views[0].view, camera->view, sizeof camera->view);
-    }
-    frame->views[0].cached = m->cache.camera_ready;
-    frame->batch[1] = frame->view_count;
-    for (int i = 0, j = 1; needs_light && i < frame->light_count; i++) {
-        if (!cached[i].kept) ssdgs__light_views(frame, i, frame->views + j);
-        for (const int end = j + cached[i].views; j < end; j++) frame->views[j].cached = cached[i].kept;
-    }
-    m->cache.camera_ready = 0; /* again once the walks are done */
-    memset(m->cache.counts, 0, sizeof m->cache.counts);
+    memset(m->counts, 0, sizeof m->counts);
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-    SSDGS__RESERVE(m->seen, frame->seen, unsigned char, n);
+    SSDGS__KEEP(m->seen, frame->seen, unsigned char, n);
     const size_t lit = ssdgs__times(n, (size_t)frame->light_count + 1);
-    SSDGS__RESERVE(m->visibility, frame->visibility, ssdgs_real, lit);
+    SSDGS__KEEP(m->visibility, frame->visibility, ssdgs_real, lit);
     int deferred = 0, cue = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
@@ -4980,8 +4970,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         cue |= (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
         transport |= ssdgs__has_transport(o);
     }
-    if (cue) SSDGS__RESERVE(m->cue, frame->depth_cue, ssdgs_real, lit);
-    if (transport) SSDGS__RESERVE(m->flux, frame->flux, ssdgs_real, lit);
+    if (cue) SSDGS__KEEP(m->cue, frame->depth_cue, ssdgs_real, lit);
+    if (transport) SSDGS__KEEP(m->flux, frame->flux, ssdgs_real, lit);
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
     SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
     if (deferred) {
@@ -5014,8 +5004,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
+    const int maps = frame->maps || (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM));
+    const int wanted = !ssdgs__needs_light(frame)
+                           ? 0
+                           : SSDGS__MADE_VISIBILITY | (maps ? SSDGS__MADE_MAP : 0) |
+                                 (cue ? SSDGS__MADE_CUE : 0) | (transport ? SSDGS__MADE_FLUX : 0);
     result = ssdgs__light_table(frame);
-    return result ? result : ssdgs__materials(frame);
+    if (!result) result = ssdgs__materials(frame);
+    return result ? result : ssdgs__begin_views(frame, wanted, request->camera != NULL);
 }
 
 /* Begins a frame of one model, in its space and memory. */
@@ -5409,8 +5405,8 @@ static void ssdgs__tile_scene_depth(const ssdgs_frame *frame, ssdgs__tile *tile,
 static void ssdgs__walk_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const ssdgs_splat_view *v = frame->views + frame->batch[0];
-    for (; v->cached || index >= v->tiles_x * v->tiles_y; v++)
-        index -= v->cached ? 0 : v->tiles_x * v->tiles_y;
+    for (; v->cached == 2 || index >= v->tiles_x * v->tiles_y; v++)
+        index -= v->cached == 2 ? 0 : v->tiles_x * v->tiles_y;
     ssdgs__tile tile = ssdgs__tile_of(frame, v, index, 0);
     if (!tile.count) return;
     ssdgs_real scene_depth[256];
@@ -5519,7 +5515,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         ssdgs_splat_view *v = frame->views + i;
         ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i),
                            *own = (ssdgs__view_memory *)frame->memory->view_memory.memory + i;
-        if (v->cached) continue;
+        if (v->cached == 2) continue;
         tiles += v->tiles_x * v->tiles_y;
         if (v->light < 0) {
             SSDGS__RESERVE(m->seen, v->tile_seen, uint16_t, v->instances + 1);
@@ -5530,7 +5526,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             frame->light_instances += v->instances;
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->light_map = NULL;
-            if (!frame->maps && !(frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM))) continue;
+            if (!(ssdgs__light_memories(frame)[v->light].wanted & SSDGS__MADE_MAP)) continue;
             const int all = v->tiles_x * v->tiles_y;
             uint32_t used = 0;
             SSDGS__RESERVE(own->map_tile, v->map_tile, uint32_t, all + 1);
@@ -5540,7 +5536,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
         }
     }
     ssdgs__parallel(context, tiles, ssdgs__walk_task, frame);
-    if (!frame->batch[0] && !frame->views->cached)
+    if (!frame->batch[0] && frame->views->cached < 2)
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_camera_task, frame);
     ssdgs__gather_job job;
     job.frame = frame;
@@ -5603,7 +5599,7 @@ typedef struct ssdgs__tree {
 typedef struct ssdgs__node_job {
     const ssdgs_frame *frame;
     ssdgs__tree *trees;                /* (objects) those without transport have no leaves */
-    const ssdgs__cached_light *lights; /* of those whose transport is ready nothing changes */
+    const ssdgs__light_memory *lights; /* of those whose transport is ready nothing changes */
     int points;                        /* what tasks on leaves make: 0: nodes, 1: points */
 } ssdgs__node_job;
 
@@ -5727,7 +5723,7 @@ static ssdgs_result ssdgs__nodes(const ssdgs_frame *frame, ssdgs__node_job *job)
     ssdgs__node *node;
     ssdgs_real *points;
     job->frame = frame;
-    job->lights = ssdgs__cached_lights(frame);
+    job->lights = ssdgs__light_memories(frame);
     SSDGS__RESERVE(frame->scratch->trees, job->trees, ssdgs__tree, frame->object_count + 1);
     for (int i = 0; i < frame->object_count; i++) {
         ssdgs__tree *tree = job->trees + i;
@@ -5976,24 +5972,31 @@ static void ssdgs__transport_task(void *data, int slot) {
 /* Transport to what is to be shaded: (lights, blocks, SSDGS__LENGTHS, SSDGS__BLOCK). */
 static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums) {
     ssdgs_context *context = frame->context;
-    ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
+    ssdgs__light_memory *lights = ssdgs__light_memories(frame);
     ssdgs__transport_job job;
     job.blocks = (frame->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     const size_t blocks = (size_t)job.blocks * (size_t)frame->light_count;
-    for (int i = 0; i < frame->light_count; i++)
-        lights[i].transport_ready |= !ssdgs__casts(frame->lights + i);
     SSDGS__RESERVE(frame->scratch->sources, job.sources, ssdgs_real,
                    (size_t)SSDGS__SOURCES * 9 * SSDGS__SLOTS);
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
                    blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
+    uint64_t objects = ssdgs__fold(SSDGS__FOLD_START, &frame->options.transport_detail, sizeof(ssdgs_real));
+    SSDGS__FOLD(objects, frame->light_count); /* the nodes' places */
+    for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
+        const int has = ssdgs__has_transport(o);
+        SSDGS__FOLD(objects, has);
+        SSDGS__FOLD(objects, o->translucency);
+    }
+    for (int i = 0; i < frame->light_count; i++) {
+        const uint64_t key = ssdgs__fold(lights[i].key, &objects, sizeof objects);
+        const int casts = ssdgs__casts(frame->lights + i), known = key == lights[i].transport_key;
+        if (!known) memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
+        if (!known) lights[i].transport_key = casts ? key : 0;
+        lights[i].transport_ready = known || !casts;
+    }
     const ssdgs_result result = ssdgs__nodes(frame, &job.tree);
     if (result) return result;
-    for (int i = 0; i < frame->light_count; i++) {
-        if (!lights[i].transport_ready)
-            memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
-        lights[i].transport_ready = 1;
-    }
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
     return SSDGS_OK;
@@ -6337,7 +6340,7 @@ static size_t ssdgs__block_lane(const ssdgs__shade_job *job, int block, int s) {
 static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                 ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->count * (size_t)light;
-    if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return 0;
+    if (!job->shadow_known) return 0;
     for (int s = 0; s < SSDGS__BLOCK; s++)
         if (!job->shadow_known[first + at[s]]) return 0;
     for (int s = 0; s < SSDGS__BLOCK; s++) shadow[s] = job->shadow_logit[first + at[s]];
@@ -6347,7 +6350,7 @@ static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const si
 static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
                                const ssdgs_real *shadow) {
     const size_t first = (size_t)job->frame->count * (size_t)light;
-    if (!job->shadow_known || !ssdgs__cached_lights(job->frame)[light].kept) return;
+    if (!job->shadow_known) return;
     for (int s = 0; s < SSDGS__BLOCK; s++) {
         job->shadow_known[first + at[s]] = 1;
         job->shadow_logit[first + at[s]] = shadow[s];
@@ -6878,17 +6881,17 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         transport |= ssdgs__has_transport(frame->objects + i);
         shadows |= job.layouts[i].shadow_layers > 0;
     }
-    if (shadows && !frame->training) { /* room from the first frame on, use from the second */
+    if (shadows && !frame->training) {
         const size_t n = (size_t)frame->count, pairs = n * (size_t)frame->light_count;
-        ssdgs__cached_light *lights = ssdgs__cached_lights(frame);
-        SSDGS__RESERVE(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
-        SSDGS__RESERVE(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
+        ssdgs__light_memory *lights = ssdgs__light_memories(frame);
+        SSDGS__KEEP(frame->memory->shadow_logit, job.shadow_logit, ssdgs_real, pairs + 1);
+        SSDGS__KEEP(frame->memory->shadow_known, job.shadow_known, unsigned char, pairs + 1);
         for (int i = 0; i < frame->light_count; i++) {
-            if (lights[i].kept && !lights[i].shadows_ready) memset(job.shadow_known + n * (size_t)i, 0, n);
-            lights[i].shadows_ready = lights[i].kept;
+            if (lights[i].shadow_key != lights[i].key) memset(job.shadow_known + n * (size_t)i, 0, n);
+            lights[i].shadow_key = lights[i].key;
         }
     }
-    job.counts = frame->memory->cache.counts;
+    job.counts = frame->memory->counts;
     if (transport) {
         result = ssdgs__transport(frame, &job.transport);
         if (result) return result;
@@ -7273,7 +7276,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
-    const int first = ssdgs__cached_lights(frame)[light].first;
+    const int first = ssdgs__light_memories(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i);
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
@@ -7465,7 +7468,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
     const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
-    const int first = ssdgs__cached_lights(frame)[light].first;
+    const int first = ssdgs__light_memories(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
@@ -7714,7 +7717,7 @@ static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
    the lights that fit SSDGS__BATCH_BYTES, at least one. */
 static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     const ssdgs_gpu_hook *gpu = &frame->context->gpu;
-    ssdgs__cache *cache = &frame->memory->cache;
+    ssdgs__frame_memory *m = frame->memory;
     const int walks = last < SSDGS_STAGE_WALK ? last : SSDGS_STAGE_WALK, finds = first <= walks;
     const size_t room = SSDGS__BATCH_BYTES / (80 * ((size_t)frame->count + 1));
     ssdgs_result result = SSDGS_OK;
@@ -7731,7 +7734,11 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
     if (!result)
         result = ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
     if (!result && gpu->fetch) result = gpu->fetch(gpu->user, frame, SSDGS_STAGE_COUNT);
-    if (finds) cache->camera_ready = cache->lights_ready = !result;
+    if (finds) {
+        m->ready = !result && !frame->training;
+        m->mapped = m->ready && frame->maps ? frame->light_count : 0;
+        m->bias = frame->bias[1];
+    }
     return result;
 }
 
@@ -7812,13 +7819,15 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     double done = 0, all = 0;
     stats->visible = frame->views[0].visible;
     stats->shaded = frame->shaded_count;
-    stats->light_views = frame->view_count - 1;
-    stats->camera_cached = frame->views[0].cached;
-    for (int l = 0; frame->view_count > 1 && l < frame->light_count; l++)
-        stats->lights_cached += ssdgs__cached_lights(frame)[l].kept;
+    stats->camera_cached = frame->views[0].cached > 0;
+    for (int l = 0; frame->view_count > 1 && l < frame->light_count; l++) {
+        const ssdgs__light_memory *light = ssdgs__light_memories(frame) + l;
+        stats->lights_cached += light->kept;
+        stats->light_views += light->wanted ? light->views : 0;
+    }
     for (int i = 0; i < frame->count; i++) stats->skipped += frame->seen[i] == SSDGS_SKIPPED;
     for (int c = 0; c < SSDGS__SLOTS; c++) {
-        const uint64_t *counts = frame->memory->cache.counts + 3 * c;
+        const uint64_t *counts = frame->memory->counts + 3 * c;
         done += (double)counts[0];
         all += (double)counts[1];
         stats->shadows_cached += (size_t)counts[2];
@@ -7961,7 +7970,7 @@ SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene) {
 
 /* Ends a call on a scene. One that failed leaves no maps: those there are belong to an earlier frame. */
 static ssdgs_result ssdgs__scene_leave(ssdgs_scene *scene, ssdgs_result result) {
-    if (result && scene->frame) scene->frame->cache.lights_ready = 0;
+    if (result && scene->frame) scene->frame->mapped = 0;
     return ssdgs__leave(scene->context, result);
 }
 
@@ -7999,12 +8008,7 @@ static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request 
     ssdgs_frame frame;
     ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
-    if (result) return result;
-    const int kept = frame.views[0].cached;
-    frame.views[0].cached = 1;
-    result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
-    scene->frame->cache.camera_ready = kept && !result;
-    return result;
+    return result ? result : ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
 }
 
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
@@ -8013,9 +8017,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
     if (!scene) return SSDGS_ERR_ARGUMENT;
     const ssdgs_result result = SSDGS__ENTER(scene->context, "ssdgs_scene_light");
     if (result) return result;
-    const int seen = scene->frame && scene->frame->cache.camera.width > 0; /* else by no camera so far */
-    const ssdgs_camera camera = seen ? scene->frame->cache.camera : ssdgs__no_camera();
-    ssdgs__request request = ssdgs__request_of(objects, object_count, &camera, lights, light_count, options);
+    ssdgs__request request = ssdgs__request_of(objects, object_count, NULL, lights, light_count, options);
     request.maps = scene->maps = 1;
     request.mirrored = 1;
     request.occluder = ssdgs__occluder_of(scene);
@@ -8047,15 +8049,15 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     if (count < 0 || (count && (!points || !fraction)))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            count < 0 ? "%d points" : "%d points, but an array is NULL", count);
-    if (!m || !m->cache.lights_ready || !m->cache.maps || light < 0 || light >= m->cache.light_count)
+    if (!m || light < 0 || light >= m->mapped)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
                            light);
-    const ssdgs__cached_light *lights = (const ssdgs__cached_light *)m->cached_lights.memory;
-    job.view = (const ssdgs_splat_view *)m->views.memory + lights[light].first;
-    job.end = job.view + lights[light].views;
+    const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;
+    job.view = (const ssdgs_splat_view *)m->views.memory + own->first;
+    job.end = job.view + (own->wanted ? own->views : 0);
     job.points = points;
     job.fraction = fraction;
-    job.bias = m->cache.bias[1];
+    job.bias = m->bias;
     job.count = count;
     ssdgs__parallel(context, ssdgs__chunks(count), ssdgs__shadow_task, &job);
     return SSDGS_OK;
@@ -8076,19 +8078,15 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
                                        const ssdgs_real direction[3], ssdgs_real *exposure,
                                        ssdgs_real *sums) {
     const ssdgs_object object = ssdgs__object_alone(model);
-    const ssdgs_camera camera = ssdgs__no_camera();
     const ssdgs_render_options options = ssdgs_render_options_preview();
     static const ssdgs_real even[3] = {1, 1, 1};
     const ssdgs_real along[3] = {-direction[0], -direction[1], -direction[2]};
     const ssdgs_light light = ssdgs_light_directional(along, even);
-    ssdgs__request request = ssdgs__request_of(&object, 1, &camera, &light, 1, &options);
+    ssdgs__request request = ssdgs__request_of(&object, 1, NULL, &light, 1, &options);
     request.maps = 1;
     ssdgs_frame frame;
     ssdgs_result result = ssdgs__frame_begin(&frame, model->context, memory, &request);
-    if (!result) {
-        frame.views[0].cached = 1; /* no camera looks */
-        result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
-    }
+    if (!result) result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
     for (int i = 0; !result && i < model->count; i++) {
         ssdgs_real raw[4], q[4], r[9];
         for (size_t c = 0; c < 4; c++)
@@ -11765,14 +11763,6 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 #define SSDGS__CHECKPOINT_MAGIC "SSDGSCK6" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
-#define SSDGS__FOLD_START UINT64_C(0xCBF29CE484222325)
-
-static uint64_t ssdgs__fold(uint64_t hash, const void *data, size_t size) { /* FNV-1a on bytes */
-    const unsigned char *bytes = (const unsigned char *)data;
-    for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3);
-    return hash;
-}
-
 /* Of bytes by the gigabyte: words of 8 in four lanes, each step of which can be undone, so that no changed
    word is lost; then the lanes and the rest. */
 static uint64_t ssdgs__fold_many(uint64_t hash, const void *data, size_t size) {
@@ -11894,7 +11884,7 @@ static void ssdgs__checkpoint_photo_task(void *data, int index) {
                                     ssdgs__fold(SSDGS__FOLD_START, &photo->format, sizeof photo->format)};
     for (int i = 0; i <= photo->more_count; i++) {
         const ssdgs_light *light = ssdgs__photo_light(photo, i);
-        hash.lights = ssdgs__fold(hash.lights, &light->kind, sizeof light->kind);
+        SSDGS__FOLD(hash.lights, light->kind);
         hash.lights = ssdgs__fold(hash.lights, light->position,
                                   offsetof(ssdgs_light, unshadowed) - offsetof(ssdgs_light, position));
     }

@@ -533,7 +533,7 @@ static void test_scene_depth(void) {
     image.scene_depth = NULL;
     image.median_depth = median;
     CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, &shot[0].stats));
-    CHECK(shot[0].stats.camera_cached == 0);
+    CHECK(shot[0].stats.camera_cached == 1); /* but for the walk */
     int crossed = 0;
     for (int i = 0; i < PIXELS; i++) {
         const int half = shot[2].value[15 * PIXELS + i] > (ssdgs_real)0.5;
@@ -575,6 +575,7 @@ static void test_dark(void) {
     CHECK(ssdgs_model_count(model) == 300 && ssdgs_model_count(NULL) == 0);
     alone(model, &camera, lights, 1, &options, shot);
     const double work = shot[0].stats.network_work;
+    (void)ssdgs_model_arrays(model); /* forget */
     alone(model, &camera, lights, 2, &options, shot + 1);
     double worst = 0;
     for (int i = 0; i < 12 * PIXELS; i++)
@@ -1470,6 +1471,44 @@ static void test_kept(void) {
     CHECK(shot->stats.gaussians == 0 && shot->value[15 * PIXELS] == 0);
 }
 
+/* A dark light keeps its map, and lights that come and go cost the others nothing. */
+static void test_flicker(void) {
+    static const struct {
+        int lights, dark, inside, kept; /* dark: a mask; inside: where the first one is; kept: how many */
+    } frames[] = {{2, 0, 0, 0}, {2, 1, 0, 2}, {2, 0, 0, 2}, {2, 1, 0, 2}, {2, 1, 1, 0}, {2, 0, 1, 1},
+                  {2, 0, 1, 2}, {3, 0, 1, 2}, {2, 0, 1, 2}, {3, 2, 1, 2}, {3, 0, 1, 3}, {1, 0, 1, 1},
+                  {2, 0, 1, 1}, {2, 3, 1, 2}, {2, 3, 0, 0}, {2, 2, 0, 1}, {2, 0, 0, 1}, {2, 0, 0, 2}};
+    ssdgs_settings s = small_settings();
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    const ssdgs_object object = ssdgs_object_default(model);
+    for (size_t f = 0; f < sizeof frames / sizeof *frames; f++) {
+        ssdgs_light lights[3] = {point_light(2, -2, 2), point_light(-2, -1, 1), point_light(0, 2, 2)};
+        if (frames[f].inside) lights[0] = point_light(0.05, 0, 0.1);
+        for (int i = 0; i < 3; i++)
+            if (frames[f].dark >> i & 1) memset(lights[i].intensity, 0, sizeof lights[i].intensity);
+        together(&object, 1, &camera, lights, frames[f].lights, NULL, shot);
+        if (!CHECK(shot->stats.lights_cached == frames[f].kept && shot->stats.camera_cached == (f > 0)))
+            printf("    frame %d: %d\n", (int)f, shot->stats.lights_cached);
+        ssdgs_scene *other = NULL;
+        const ssdgs_image image = planes_of(shot + 1);
+        CHECK(!ssdgs_scene_create(context, &other));
+        CHECK(!ssdgs_scene_render(other, &object, 1, &camera, lights, frames[f].lights, NULL, &image,
+                                  &shot[1].stats));
+        CHECK(same(shot, shot + 1) && shot->stats.light_views == shot[1].stats.light_views);
+        ssdgs_scene_destroy(other);
+    }
+    const ssdgs_light dark = point_light(2, -2, 2);
+    ssdgs_real behind[3] = {-2, 2, -2}, fraction = -1;
+    for (int shines = 1; shines >= 0; shines--) { /* who asks for the shadow of a dark light hears of none */
+        ssdgs_light light = dark;
+        if (!shines) memset(light.intensity, 0, sizeof light.intensity);
+        CHECK(!ssdgs_scene_light(scene, &object, 1, &light, 1, NULL));
+        CHECK(!ssdgs_scene_shadow(scene, 0, behind, 1, &fraction) && (fraction < 1) == shines);
+    }
+    ssdgs_model_destroy(model);
+}
+
 static test_meter memory;
 
 /* Any number of threads; nothing allocated from the second frame on, once it has been where things move to; a
@@ -1867,6 +1906,7 @@ int main(void) {
     test_missed();
     test_anything();
     test_kept();
+    test_flicker();
     TEST_ROW("94", "objects out of sight", test_out_of_sight());
     TEST_ROW("95", "lights that reach some", test_local_lights());
     test_threads_and_memory();

@@ -53,7 +53,7 @@ static void on_sphere(ssdgs_model *model, int count) {
 static void sums_at(ssdgs_frame *frame, int light, const ssdgs_real *x, ssdgs_real *sums) {
     ssdgs__transport_job job;
     memset(&job, 0, sizeof job);
-    for (int i = 0; i < frame->light_count; i++) ssdgs__cached_lights(frame)[i].transport_ready = 0;
+    for (int i = 0; i < frame->light_count; i++) ssdgs__light_memories(frame)[i].transport_key = 0;
     CHECK(!ssdgs__nodes(frame, &job.tree));
     job.sources = (ssdgs_real *)malloc(SSDGS__SOURCES * 9 * sizeof *job.sources);
     ssdgs__transport_block(&job, job.tree.trees, light, 0, x, 15, sums);

@@ -1186,7 +1186,7 @@ static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
     gpu_upload_faces(g, frame);
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
-        v->cached = v->cached && !v->record && g->owner == frame->memory;
+        v->cached = v->cached == 2 && !v->record && g->owner == frame->memory ? 2 : 0;
         v->record = NULL;
         v->light_map = NULL;
     }
@@ -1234,8 +1234,8 @@ static void gpu_run_stages(gpu *g, ssdgs_frame *frame, ssdgs_stage first, ssdgs_
 }
 
 /* Reads what the device has counted: 1 where every list had room, else there is more from now on. This,
-   gpu_end_frame() and uploads in mid-frame wait for the device. What is counted of a view that was kept is
-   its last. */
+   gpu_end_frame() and uploads in mid-frame wait for the device. A view that was kept has its
+   counts. */
 static int gpu_had_room(gpu *g, ssdgs_frame *frame) {
     const size_t size = (size_t)frame->view_count * sizeof(gpu_fact);
     gpu_fact *facts = (gpu_fact *)gpu_host(g, size);
@@ -1244,6 +1244,7 @@ static int gpu_had_room(gpu *g, ssdgs_frame *frame) {
     gpu_download(g, &g->frame.facts, facts, size);
     for (int i = 0; i < frame->view_count && !g->result; i++) {
         ssdgs_splat_view *v = frame->views + i;
+        if (v->cached) continue;
         if (most < facts[i].instances) most = facts[i].instances;
         v->visible = (int)facts[i].visible;
         v->instances = facts[i].instances;
@@ -1324,7 +1325,7 @@ static ssdgs_result gpu_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage)
     gpu *g = (gpu *)user;
     if (!gpu_takes(g, frame)) {
         for (int i = 0; i < frame->view_count; i++) /* what the device has the CPU must find anew */
-            frame->views[i].cached = frame->views[i].cached && frame->views[i].record;
+            if (!frame->views[i].record) frame->views[i].cached = 0;
         return ssdgs_stage_cpu(frame, stage);
     }
     if (!g->waits && stage != SSDGS_STAGE_COMPOSITE) return SSDGS_OK; /* to enter a context takes time */
