@@ -113,7 +113,7 @@ FILES
   splat file loads as baked colours: drawn as they are, not trained.
   Reading takes ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
   (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties.
-  Editors of splats drop what lies behind the vertices, and move these: ssdgs_model_adopt() mends that.
+  Editors of splats drop what lies behind the vertices, and move these: examples/adopt.h mends that.
   Checkpoints have native byte order, and fit one version, precision, set of options and photographs; else the
   message names the first that differs.
   Files are written under another name and renamed when complete: a link is replaced, not followed. A process
@@ -154,8 +154,8 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
 BESIDE IT, in examples/, headers on this interface
-  judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps, olat.h
-  reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3.
+  judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps, adopt.h
+  mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3.
   Nothing finds cameras or lights (options.refine corrects small errors), traces light between objects,
   undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
 
@@ -163,6 +163,7 @@ CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
   ssdgs_model_reduce(model, n)   reduce_model(context, &model, n) of examples/reduce.h: another model
   ssdgs_environment(context, ..) sky_lights(..) of examples/sky.h, which returns what is wrong
+  ssdgs_model_adopt(model, from) adopt_model(context, &model, ..) of examples/adopt.h: another model
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
 
@@ -353,7 +354,7 @@ typedef struct ssdgs_settings {
     ssdgs_real origin[3]; /* world: where the model's 0 lies. The library only stores it, see CONVENTIONS */
     struct {
         ssdgs_real turn[3], scale, move[3];
-    } placement; /* where an editor of splats has put the model, see ssdgs_model_adopt(): its point p is drawn
+    } placement; /* where an editor of splats has put the model, see examples/adopt.h: its point p is drawn
                     at scale x (p turned) + move. turn: axis x radians; scale: 1, below 0 it mirrors, too */
     struct {
         ssdgs_real scattering[3], absorption[3]; /* RGB, of 1 world unit: the reduced sigma_s, and sigma_a */
@@ -412,13 +413,6 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model);
 /* The box, in the model's space, that holds its Gaussians to three standard deviations, but for a few strays.
    0 0 0 where it has none. ERR_MEMORY. */
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]);
-/* Gives the model the settings, ASG and networks of another, as to one whose file lost them in an editor.
-   Networks know the model only where it was trained. So the Gaussians that both have, in any order, tell how
-   the editor has turned, scaled and moved it; the model's own come back to the original's places, and what
-   the editor did becomes part of settings.placement, with which the model is drawn. Notes tell that, or that
-   no rotation, scale and move fits. ERR_ARGUMENT: one is baked, or a trainer has the model. ERR_MEMORY:
-   nothing has changed. */
-SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original);
 
 typedef struct ssdgs_load_stats { /* what reading a file mended */
     int zero_rotations;           /* replaced by the identity */
@@ -426,7 +420,8 @@ typedef struct ssdgs_load_stats { /* what reading a file mended */
     int clamped_scales;           /* to +-20 before exp */
     int dropped;                  /* Gaussians with values that are not finite */
     int plain;                    /* 1: a plain splat file, loaded as baked colours */
-    int untrained;                /* 1: ours without settings, as editors leave it: ssdgs_model_adopt() */
+    int untrained;                /* 1: ours without settings, as editors leave it: examples/adopt.h */
+    int version;                  /* SSDGS_VERSION of who wrote its settings; 0: it has none */
     int sorted;                   /* 1: was in no order, so ssdgs_model_sort() was called */
 } ssdgs_load_stats;
 
@@ -2365,7 +2360,6 @@ struct ssdgs_model {
     uint64_t arrangement; /* another one whenever its Gaussians change places, which trainers' moments must
                              follow */
     int references;       /* itself and its trainers: the last that goes frees it */
-    int version;          /* SSDGS_VERSION that wrote its file, 0 if that says none; without a file ours */
     int count;
     size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
     ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
@@ -2572,15 +2566,6 @@ static void ssdgs__quaternion_matrix(const double q[4], double r[9]) {
         }
 }
 
-/* q, then p. */
-static void ssdgs__quaternion_product(const double p[4], const double q[4], double to[4]) {
-    to[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];
-    for (int k = 1; k < 4; k++) {
-        const int a = k % 3 + 1, b = (k + 1) % 3 + 1;
-        to[k] = p[0] * q[k] + p[k] * q[0] + p[a] * q[b] - p[b] * q[a];
-    }
-}
-
 /* Where a placed model is drawn, (3,4) as ssdgs_object.to_world. */
 static void ssdgs__placement_matrix(const ssdgs_settings *s, ssdgs_real m[12]) {
     double turn[3], q[4], r[9];
@@ -2715,7 +2700,6 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     context->references++;
     model->references = 1;
     model->settings = s;
-    model->version = SSDGS_VERSION;
     model->revision = ++context->revisions;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&s, first);
@@ -3111,308 +3095,6 @@ static void ssdgs__gaussians_update(ssdgs_model *model, int version) {
     }
 }
 
-/* A rotation, a scale and a move: x -> scale (turned x) + move. scale below 0 mirrors, too. */
-typedef struct ssdgs__similarity {
-    double q[4], r[9], scale, move[3];
-} ssdgs__similarity;
-
-static void ssdgs__similarity_at(const ssdgs__similarity *s, const double x[3], double to[3]) {
-    for (int i = 0; i < 3; i++)
-        to[i] =
-            s->scale * (s->r[3 * i] * x[0] + s->r[3 * i + 1] * x[1] + s->r[3 * i + 2] * x[2]) + s->move[i];
-}
-
-/* Two places of one Gaussian, and how far a similarity is off. */
-typedef struct ssdgs__pair_of_places {
-    double from[3], to[3], off;
-} ssdgs__pair_of_places;
-
-static int ssdgs__off_compare(const void *a, const void *b) {
-    const double x = ((const ssdgs__pair_of_places *)a)->off, y = ((const ssdgs__pair_of_places *)b)->off;
-    return (x > y) - (x < y);
-}
-
-/* The similarity nearest to n pairs; side: 1, or -1 for one that mirrors. Its quaternion is the eigenvector
-   of the largest eigenvalue of a symmetric 4 x 4 matrix (Horn 1987). 0 where the pairs tell none: all lie on
-   a line, say. */
-static int ssdgs__similarity_of(const ssdgs__pair_of_places *pairs, int n, double side,
-                                ssdgs__similarity *s) {
-    double mean[2][3] = {{0, 0, 0}, {0, 0, 0}}, c[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0}, m[16], trace = 0;
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) mean[0][k] += pairs[i].from[k] / n, mean[1][k] += pairs[i].to[k] / n;
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 9; k++)
-            c[k] += side * (pairs[i].from[k / 3] - mean[0][k / 3]) * (pairs[i].to[k % 3] - mean[1][k % 3]);
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const int a = (i ? i : j) - 1, d = j - 1; /* axes */
-            const double sum = c[0] + c[4] + c[8];
-            double v = sum; /* of the real part with itself */
-            if ((i > 0) != (j > 0))
-                v = c[3 * ((a + 1) % 3) + (a + 2) % 3] - c[3 * ((a + 2) % 3) + (a + 1) % 3];
-            if (i > 0 && j > 0) v = c[3 * a + d] + c[3 * d + a] - (i == j ? sum : 0);
-            m[4 * i + j] = v;
-        }
-    double size = 0;
-    for (int i = 0; i < 16; i++) size += fabs(m[i]);
-    if (!(size > 0)) return 0;
-    for (int i = 0; i < 16; i++) m[i] = m[i] / size + (i % 5 == 0); /* all eigenvalues positive */
-    for (int turn = 0; turn < 50; turn++) { /* squared again and again the largest one is left */
-        double square[16];
-        trace = m[0] + m[5] + m[10] + m[15];
-        for (int i = 0; i < 16; i++) {
-            square[i] = 0;
-            for (int k = 0; k < 4; k++) square[i] += m[i / 4 * 4 + k] * m[4 * k + i % 4] / (trace * trace);
-        }
-        memcpy(m, square, sizeof m);
-    }
-    int best = 0;
-    for (int i = 1; i < 4; i++) best = m[5 * i] > m[5 * best] ? i : best;
-    trace = m[0] + m[5] + m[10] + m[15];
-    double norm = 0;
-    for (int i = 0; i < 4; i++) norm += m[4 * best + i] * m[4 * best + i];
-    if (!(norm > 0.999 * m[5 * best] * trace)) return 0; /* two eigenvalues are alike */
-    for (int i = 0; i < 4; i++) s->q[i] = m[4 * best + i] / sqrt(norm);
-    ssdgs__quaternion_matrix(s->q, s->r);
-    double along = 0, square = 0;
-    for (int k = 0; k < 9; k++) along += s->r[k] * c[k % 3 * 3 + k / 3];
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++)
-            square += (pairs[i].from[k] - mean[0][k]) * (pairs[i].from[k] - mean[0][k]);
-    s->scale = side * along / square;
-    if (!(along > 0) || !(square > 0)) return 0;
-    for (int k = 0; k < 3; k++) s->move[k] = 0;
-    double centre[3];
-    ssdgs__similarity_at(s, mean[0], centre);
-    for (int k = 0; k < 3; k++) s->move[k] = mean[1][k] - centre[k];
-    return 1;
-}
-
-/* The similarity that most pairs follow, by fits to the better half, and how far off half of them are; 1e300:
-   there is none. */
-static double ssdgs__similarity_fit(ssdgs__pair_of_places *pairs, int n, double side, ssdgs__similarity *s) {
-    for (int turn = 0; turn < 12; turn++) {
-        if (!ssdgs__similarity_of(pairs, turn ? n / 2 + 1 : n, side, s)) return 1e300;
-        for (int i = 0; i < n; i++) {
-            double at[3];
-            ssdgs__similarity_at(s, pairs[i].from, at);
-            pairs[i].off = 0;
-            for (int k = 0; k < 3; k++) pairs[i].off += (at[k] - pairs[i].to[k]) * (at[k] - pairs[i].to[k]);
-        }
-        qsort(pairs, (size_t)n, sizeof *pairs, ssdgs__off_compare);
-    }
-    return sqrt(pairs[n / 2].off);
-}
-
-/* What no editor of splats changes of a Gaussian are the properties that are ours alone: from SSDGS_DIFFUSE
-   on. One of them as files have it. */
-static uint32_t ssdgs__own_bits(const ssdgs_model *model, size_t i, size_t c) {
-    const float value = (float)model->gaussians[c * model->capacity + i];
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-static uint64_t ssdgs__own_key(const ssdgs_model *model, size_t i) {
-    uint64_t hash = 1;
-    for (size_t c = SSDGS_DIFFUSE; c < SSDGS_CHANNELS; c++) {
-        hash = (hash ^ ssdgs__own_bits(model, i, c)) * UINT64_C(0x9E3779B97F4A7C15);
-        hash ^= hash >> 29;
-    }
-    return hash << 32 | (uint32_t)i;
-}
-
-static int ssdgs__own_same(const ssdgs_model *a, size_t i, const ssdgs_model *b, size_t j) {
-    size_t c = SSDGS_DIFFUSE;
-    while (c < SSDGS_CHANNELS && ssdgs__own_bits(a, i, c) == ssdgs__own_bits(b, j, c)) c++;
-    return c == SSDGS_CHANNELS;
-}
-
-/* Which of the original's Gaussians Gaussian i is; -1: none, or several. keys: the original's, sorted. */
-static int ssdgs__own_match(const ssdgs_model *model, size_t i, const ssdgs_model *original,
-                            const uint64_t *keys) {
-    const uint64_t key = ssdgs__own_key(model, i) >> 32;
-    size_t low = 0, high = (size_t)original->count;
-    int found = -1;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (keys[middle] >> 32 < key) low = middle + 1;
-        else high = middle;
-    }
-    for (; low < (size_t)original->count && keys[low] >> 32 == key; low++) {
-        if (!ssdgs__own_same(model, i, original, (uint32_t)keys[low])) continue;
-        if (found >= 0) return -1;
-        found = (int)(uint32_t)keys[low];
-    }
-    return found;
-}
-
-/* Brings Gaussian i back. A place, rotation or size that is what the similarity makes of the original's, j,
-   or that the editor left as it was, becomes the original's to the bit; any other has been edited, and is
-   turned back. j -1: it is not in the original. */
-static void ssdgs__bring_back(ssdgs_model *model, size_t i, const ssdgs_model *original, int j,
-                              const ssdgs__similarity *s, double tolerance) {
-    ssdgs_real *g = model->gaussians + i;
-    const ssdgs_real *o = original->gaussians + (j < 0 ? 0 : j);
-    const size_t stride = model->capacity, from = original->capacity;
-    double x[3], q[4], back[4], dot = 0, norm[2] = {0, 0}, off = 0;
-    for (size_t k = 0; k < 3; k++) x[k] = (double)g[(SSDGS_POSITION + k) * stride] - s->move[k];
-    for (size_t k = 0; k < 3; k++) {
-        const double home = (s->r[k] * x[0] + s->r[3 + k] * x[1] + s->r[6 + k] * x[2]) / s->scale;
-        off += j < 0 ? 0 : fabs(home - (double)o[(SSDGS_POSITION + k) * from]);
-        g[(SSDGS_POSITION + k) * stride] = (ssdgs_real)home;
-    }
-    for (size_t k = 0; k < 3 && j >= 0 && off * fabs(s->scale) < 2 * tolerance; k++)
-        g[(SSDGS_POSITION + k) * stride] = o[(SSDGS_POSITION + k) * from];
-    for (size_t k = 0; k < 4; k++) q[k] = (double)g[(SSDGS_ROTATION + k) * stride];
-    const double inverse[4] = {s->q[0], -s->q[1], -s->q[2], -s->q[3]};
-    ssdgs__quaternion_product(inverse, q, back);
-    int same = j >= 0;
-    for (size_t k = 0; k < 4 && j >= 0; k++) {
-        const double own = (double)o[(SSDGS_ROTATION + k) * from];
-        same = same && !(q[k] < own) && !(q[k] > own);
-        dot += back[k] * own, norm[0] += back[k] * back[k], norm[1] += own * own;
-    }
-    same = same || (j >= 0 && dot * dot > (1 - 1e-6) * norm[0] * norm[1]);
-    for (size_t k = 0; k < 4; k++)
-        g[(SSDGS_ROTATION + k) * stride] = same ? o[(SSDGS_ROTATION + k) * from] : (ssdgs_real)back[k];
-    for (size_t k = 0; k < 3; k++) {
-        ssdgs_real *size = g + (SSDGS_LOG_SCALE + k) * stride;
-        const double home = (double)*size - log(fabs(s->scale)),
-                     own = j < 0 ? 1e300 : (double)o[(SSDGS_LOG_SCALE + k) * from];
-        const int kept = !((double)*size < own) && !((double)*size > own);
-        *size = kept || fabs(home - own) < 1e-4 ? (ssdgs_real)own : (ssdgs_real)home;
-    }
-}
-
-static const ssdgs__similarity ssdgs__unmoved = {{1, 0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1, {0, 0, 0}};
-
-/* Puts what an editor did, s, in front of the settings' placement. A file that lost its origin had positions
-   relative to it or in the world: that is taken which moves the model less. 0: the settings' ranges do not
-   hold the result. */
-static int ssdgs__place_after(ssdgs_settings *settings, const ssdgs__similarity *s, const double apart[3],
-                              int lost, double tolerance) {
-    double move2 = 0, other2 = 0, turn = 0, move[3], placed[3], q[4];
-    for (int k = 0; k < 3; k++) {
-        move2 += s->move[k] * s->move[k];
-        other2 += (s->move[k] + apart[k]) * (s->move[k] + apart[k]);
-        turn += s->q[1 + k] * s->q[1 + k];
-    }
-    const int in_world = !lost || other2 < move2;
-    if (2 * atan2(sqrt(turn), fabs(s->q[0])) < 1e-6 && fabs(s->scale - 1) < 1e-6 &&
-        (in_world ? other2 : move2) < tolerance * tolerance)
-        return 1;
-    ssdgs__similarity before;
-    for (int k = 0; k < 3; k++) { /* without what rounding left */
-        placed[k] = (double)settings->placement.turn[k];
-        before.move[k] = (double)settings->placement.move[k];
-        move[k] = s->move[k] + (in_world ? apart[k] : 0);
-        move[k] = fabs(move[k]) < 1e-2 * tolerance ? 0 : move[k];
-    }
-    ssdgs__turn_quaternion(placed, before.q);
-    ssdgs__quaternion_matrix(before.q, before.r);
-    before.scale = (double)settings->placement.scale;
-    ssdgs__similarity_at(&before, move, placed);
-    ssdgs__quaternion_product(before.q, s->q, q);
-    const double sine = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), side = q[0] < 0 ? -1 : 1,
-                 angle = 2 * atan2(sine, fabs(q[0])), scale = before.scale * s->scale;
-    if (!(fabs(scale) < 1e9 && fabs(scale) > 1.001e-9)) return 0;
-    for (int k = 0; k < 3; k++)
-        if (!(fabs(placed[k]) < 1e9)) return 0;
-    for (int k = 0; k < 3; k++) {
-        const double turned = sine > 0 ? side * angle * q[1 + k] / sine : 0;
-        settings->placement.turn[k] = (ssdgs_real)(fabs(turned) < 1e-6 ? 0 : turned);
-        settings->placement.move[k] = (ssdgs_real)placed[k];
-    }
-    settings->placement.scale = (ssdgs_real)(fabs(fabs(scale) - 1) < 1e-6 ? (scale < 0 ? -1 : 1) : scale);
-    return 1;
-}
-
-/* Gives the model the original's settings, finds what has become of the original's Gaussians, and brings the
-   model back to their place. */
-static ssdgs_result ssdgs__come_back(ssdgs_model *model, const ssdgs_model *original) {
-    enum { MOST = 4096 };
-    ssdgs_context *context = model->context;
-    double apart[3]; /* the origins' difference, which positions of a file without settings may have or not */
-    int together = 1;
-    for (int c = 0; c < 3; c++) {
-        apart[c] = (double)model->settings.origin[c] - (double)original->settings.origin[c];
-        together = together && !(apart[c] < 0) && !(apart[c] > 0);
-    }
-    const int lost = !model->version;
-    const size_t count = (size_t)model->count, known = (size_t)original->count;
-    uint64_t *keys = (uint64_t *)ssdgs__allocate(context, (known + 1) * sizeof *keys +
-                                                              MOST * sizeof(ssdgs__pair_of_places) +
-                                                              (count + 1) * sizeof(int));
-    if (!keys) return SSDGS_ERR_MEMORY;
-    const ssdgs_settings before = model->settings;
-    model->settings = original->settings;
-    if (lost) ssdgs__gaussians_update(model, original->version);
-    else model->settings.placement = before.placement;
-    ssdgs__pair_of_places *pairs = (ssdgs__pair_of_places *)(keys + known + 1);
-    int *match = (int *)(pairs + MOST), n = 0;
-    size_t shared = 0, still = 0, taken = 0;
-    for (size_t i = 0; i < known; i++) keys[i] = ssdgs__own_key(original, i);
-    qsort(keys, known, sizeof *keys, ssdgs__key_compare);
-    for (size_t i = 0; i < count; i++) {
-        match[i] = ssdgs__own_match(model, i, original, keys);
-        shared += match[i] >= 0;
-    }
-    double largest = 0, spread = 0, mean[3] = {0, 0, 0};
-    for (size_t i = 0; i < count; i++) {
-        if (match[i] < 0) continue;
-        int same = 1, sound = 1;
-        double from[3], place[3];
-        for (size_t k = 0; k < 3; k++) {
-            place[k] = (double)model->gaussians[(SSDGS_POSITION + k) * model->capacity + i];
-            from[k] =
-                (double)original->gaussians[(SSDGS_POSITION + k) * original->capacity + (size_t)match[i]];
-            same = same && !(place[k] < from[k]) && !(place[k] > from[k]);
-            sound = sound && fabs(place[k]) < 1e15 && fabs(from[k]) < 1e15; /* finite, too */
-        }
-        still += (size_t)same;
-        /* some of all tell enough */
-        if (!sound || (uint64_t)taken++ * MOST / shared < (uint64_t)n || n == MOST) continue;
-        for (size_t k = 0; k < 3; k++) {
-            pairs[n].from[k] = from[k];
-            pairs[n].to[k] = place[k];
-            mean[k] += place[k];
-            largest = fabs(place[k]) > largest ? fabs(place[k]) : largest;
-        }
-        n++;
-    }
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++)
-            spread += (pairs[i].to[k] - mean[k] / n) * (pairs[i].to[k] - mean[k] / n) / n;
-    /* floats are exact to 6e-8 of themselves, what editors compute with them to some more */
-    const double tolerance = 1e-4 * sqrt(spread) + 1e-6 * largest;
-    ssdgs__similarity s = ssdgs__unmoved, mirrored;
-    int fits = !count || (2 * still > shared && (lost || together));
-    const int stays = fits;
-    const char *problem = NULL;
-    if (!stays && (n < 4 || 2 * shared < count))
-        problem =
-            "too few of its Gaussians are the original's to tell whether an editor has turned, scaled or "
-            "moved it";
-    else if (!stays) {
-        fits = ssdgs__similarity_fit(pairs, n, 1, &s) < tolerance;
-        if (!fits && (fits = ssdgs__similarity_fit(pairs, n, -1, &mirrored) < tolerance) != 0) s = mirrored;
-        if (fits) fits = ssdgs__place_after(&model->settings, &s, apart, lost, tolerance);
-        if (!fits)
-            problem = "no rotation, scale and move brings the original's Gaussians to where they are: has an "
-                      "editor stretched it, or joined several?";
-    }
-    if (!fits) {
-        s = ssdgs__unmoved;
-        for (int k = 0; k < 3; k++) s.move[k] = -apart[k];
-        ssdgs__note(context, "the model: %s; it is not drawn as it was trained where it was moved", problem);
-    }
-    for (size_t i = 0; i < count && !stays; i++)
-        ssdgs__bring_back(model, i, original, match[i], &s, tolerance);
-    ssdgs__release(context, keys);
-    return SSDGS_OK;
-}
-
 /* Notes where a model stands, if not where it was trained. */
 static void ssdgs__tell_placement(const ssdgs_model *model, const char *name) {
     const ssdgs_settings *s = &model->settings;
@@ -3429,45 +3111,6 @@ static void ssdgs__tell_placement(const ssdgs_model *model, const char *name) {
         (double)s->placement.turn[1] / unit, (double)s->placement.turn[2] / unit,
         s->placement.scale < 0 ? "mirrored, " : "", fabs((double)s->placement.scale),
         (double)s->placement.move[0], (double)s->placement.move[1], (double)s->placement.move[2]);
-}
-
-static ssdgs_result ssdgs__model_adopt(ssdgs_model *model, const ssdgs_model *original) {
-    if (!original) return ssdgs__null(model->context, "ssdgs_model_adopt", "original");
-    if (model->settings.baked || original->settings.baked)
-        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
-                           "ssdgs_model_adopt: a baked model has no networks");
-    if (model->references > 1)
-        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT, "ssdgs_model_adopt: a trainer has the model");
-    ssdgs_real *globals =
-        (ssdgs_real *)ssdgs__allocate(model->context, original->global_count * sizeof *globals);
-    if (!globals) return SSDGS_ERR_MEMORY;
-    const ssdgs_result result = ssdgs__come_back(model, original);
-    if (result) {
-        ssdgs__release(model->context, globals);
-        return result;
-    }
-    memcpy(globals, original->globals, original->global_count * sizeof *globals);
-    ssdgs__release(model->context, model->globals);
-    model->globals = globals;
-    model->global_count = original->global_count;
-    model->version = original->version;
-    ssdgs__model_changed(model);
-    ssdgs__tell_placement(model, "the model");
-    return SSDGS_OK;
-}
-
-SSDGS_API ssdgs_result ssdgs_model_adopt(ssdgs_model *model, const ssdgs_model *original) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    ssdgs_context *context = model->context, *from = original ? original->context : context;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_adopt");
-    if (result) return result;
-    if (from != context && SSDGS__ENTER(from, "ssdgs_model_adopt"))
-        return ssdgs__leave(context,
-                            ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                        "ssdgs_model_adopt: a call on the original's context is at work"));
-    result = ssdgs__model_adopt(model, original);
-    if (from != context) (void)ssdgs__leave(from, SSDGS_OK);
-    return ssdgs__leave(context, result);
 }
 
 /* Whether a Gaussian's predecessor is often further away than another a little before it: half of the time in
@@ -4894,8 +4537,9 @@ static ssdgs_result ssdgs__begin_views(ssdgs_frame *frame, int wanted, int looks
     if (result) return result;
     SSDGS__KEEP(m->views, frame->views, ssdgs_splat_view, frame->view_count);
     frame->batch[1] = frame->view_count;
+    frame->views->light = -1;
+    frame->views->cached = 2;
     if (looks) ssdgs__begin_camera(frame);
-    else frame->views->cached = 2;
     for (int i = 0; i < light_count; i++) ssdgs__begin_light(frame, i, wanted);
     return SSDGS_OK;
 }
@@ -9254,7 +8898,7 @@ static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, con
         ssdgs__note(context,
                     "%s: has no settings, as editors of splats drop them, mostly with ASG and networks: it "
                     "is not drawn as it "
-                    "was trained. ssdgs_model_adopt() (relight --networks ORIGINAL.ply) takes them from the "
+                    "was trained. relight --networks ORIGINAL.ply (examples/adopt.h) takes them from the "
                     "original file",
                     name);
     ssdgs__tell_placement(model, name);
@@ -9316,7 +8960,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         if (kind != SSDGS__PLY_SETTINGS && ply->known[kind])
             result = ssdgs__ply_read_rows(ply, kind, *out, stats);
     if (result) return result;
-    (*out)->version = ply->version;
+    stats->version = ply->version;
     if (ours) ssdgs__gaussians_update(*out, ply->version);
     ssdgs__ply_tell(ply, *out, stats);
     return SSDGS_OK;

@@ -2,6 +2,7 @@
    or on a path */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "adopt.h"
 #include "olat.h"
 #include "flip.h"
 #include "reduce.h"
@@ -688,12 +689,35 @@ static int load_sky(job *j) {
     return 1;
 }
 
+/* Saves the model, and takes what the file has: loading tells where it stands. */
 static int save_model(job *j, const char *name) {
     char *path = output_path(j, NULL, name);
     if (!path) return 0;
-    const int failed = ssdgs_model_save(j->model, path) && fail(ssdgs_error_message(j->context));
+    ssdgs_result result = ssdgs_model_save(j->model, path);
+    if (!result) {
+        ssdgs_model_destroy(j->model);
+        result = ssdgs_model_load(j->context, path, &j->model, NULL);
+    }
     free(path);
-    return !failed;
+    return !result || !fail(ssdgs_error_message(j->context));
+}
+
+/* Gives the model the networks of another, which an editor has dropped. */
+static int take_networks(job *j, const char *path, const ssdgs_load_stats *own) {
+    ssdgs_model *original;
+    ssdgs_load_stats trained;
+    const char *problem;
+    if (ssdgs_model_load(j->context, path, &original, &trained))
+        return !fail(ssdgs_error_message(j->context));
+    const ssdgs_result result = adopt_model(j->context, &j->model, own, original, &trained, &problem);
+    ssdgs_model_destroy(original);
+    if (result == SSDGS_ERR_ARGUMENT) return !fail("--networks: a baked model has no networks");
+    if (result) return !fail(ssdgs_result_string(result));
+    fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", path);
+    if (problem)
+        fprintf(stderr, "relight: note: %s; the model is not drawn as it was trained where it was moved\n",
+                problem);
+    return 1;
 }
 
 static int relight(job *j) {
@@ -703,17 +727,10 @@ static int relight(job *j) {
     int row = 0, scored = 0;
     char error[512] = "";
     if (result) return fail(ssdgs_result_string(result));
-    if (ssdgs_model_load(j->context, j->model_path, &j->model, NULL))
+    ssdgs_load_stats own;
+    if (ssdgs_model_load(j->context, j->model_path, &j->model, &own))
         return fail(ssdgs_error_message(j->context));
-    if (j->given[NETWORKS]) {
-        ssdgs_model *original;
-        if (ssdgs_model_load(j->context, j->given[NETWORKS], &original, NULL))
-            return fail(ssdgs_error_message(j->context));
-        result = ssdgs_model_adopt(j->model, original);
-        ssdgs_model_destroy(original);
-        if (result) return fail(ssdgs_error_message(j->context));
-        fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", j->given[NETWORKS]);
-    }
+    if (j->given[NETWORKS] && !take_networks(j, j->given[NETWORKS], &own)) return 1;
     if (!load_frames(j) || (j->given[SKY] && !load_sky(j))) return 1;
     if (olat_make_folder(j->out, error))
         return fail(error); /* so that paths can be told apart by what they are */

@@ -71,7 +71,6 @@ static const any_function functions[] = {ADDRESS(ssdgs_context_create),
                                          ADDRESS(ssdgs_compose),
                                          ADDRESS(ssdgs_to_pixels),
                                          ADDRESS(ssdgs_blend_pixels),
-                                         ADDRESS(ssdgs_model_adopt),
                                          ADDRESS(ssdgs_model_bounds),
                                          ADDRESS(ssdgs_model_move),
                                          ADDRESS(ssdgs_checkpoint_iteration)};

@@ -18,8 +18,22 @@ sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests
 # apply: $header with $MUTANT, "function: old ==> new" or "function#2: old ==> new" for the second place, as the copy's.
 # A function, by its name without F(), ends where a line begins with }. A space in old stands for any white space, line ends
 # included, and between an operator or a parenthesis and what follows there may be some: however the lines are broken, it fits.
+parse='function parse(line,   colon, arrow, hash) {
+            colon = index(line, ": "); arrow = index(line, " ==> ")
+            name = substr(line, 1, colon - 1); new = substr(line, arrow + 5)
+            old = pattern = substr(line, colon + 2, arrow - colon - 2)
+            gsub(/[][\\.^$*+?(){}|]/, "[&]", pattern); gsub(/\[\\\]/, "\\\\", pattern); gsub(/\[\^\]/, "\\^", pattern)
+            gsub(/ /, "[ \n]+", pattern); gsub(/\[\(\]/, "[(][ \n]*", pattern)
+            wanted = 0
+            if (hash = index(name, "#")) { wanted = substr(name, hash + 1) + 0; name = substr(name, 1, hash - 1) }
+            starts = "^[A-Za-z].*[ (*]" name "\\)?\\("
+            return arrow && old != new
+        }
+        function fits(places) { return wanted ? places >= wanted : places == 1 }
+        function ends(line) { return line ~ /^}/ || line ~ /^[A-Za-z].*[;}]$/ }'
 apply() {
-    awk 'function mutate(text,   at, rest, put) {
+    awk "$parse"'
+        function mutate(text,   at, rest, put) {
             while (match(rest = substr(text, at + 1), pattern)) {
                 put = ++places == (wanted ? wanted : 1) ? new : substr(rest, RSTART, RLENGTH)
                 printf "%s%s", substr(rest, 1, RSTART - 1), put
@@ -27,18 +41,40 @@ apply() {
             }
             printf "%s", substr(text, at + 1)
         }
-        BEGIN {
-            colon = index(ENVIRON["MUTANT"], ": "); arrow = index(ENVIRON["MUTANT"], " ==> ")
-            name = substr(ENVIRON["MUTANT"], 1, colon - 1); new = substr(ENVIRON["MUTANT"], arrow + 5)
-            old = pattern = substr(ENVIRON["MUTANT"], colon + 2, arrow - colon - 2)
-            gsub(/[][\\.^$*+?(){}|]/, "[&]", pattern); gsub(/\[\\\]/, "\\\\", pattern); gsub(/\[\^\]/, "\\^", pattern)
-            gsub(/ /, "[ \n]+", pattern); gsub(/\[\(\]/, "[(][ \n]*", pattern)
-            if (hash = index(name, "#")) { wanted = substr(name, hash + 1) + 0; name = substr(name, 1, hash - 1) }
+        BEGIN { sound = parse(ENVIRON["MUTANT"]) }
+        !inside && $0 ~ starts { inside = 1 }
+        inside { body = body $0 "\n" } !inside
+        ends($0) { if (inside) mutate(body); body = ""; inside = 0 }
+        END { exit !(sound && fits(places)) }' "$header" >"$work/$header"
+}
+
+# Each line that fits nowhere, or in several places, as ERROR: what apply() would say of it, for all lines at once.
+fit_all() {
+    awk "$parse"'
+        function read(header,   line, inside) {
+            for (count = 0; (getline line <header) > 0;) {
+                if (!inside && line ~ /^[A-Za-z].*\(/) { inside = 1; first[++count] = line; body[count] = "" }
+                if (inside) body[count] = body[count] line "\n"
+                if (ends(line)) inside = 0
+            }
+            close(header)
         }
-        !inside && $0 ~ "^[A-Za-z].*[ (*]" name "\\)?\\(" { inside = 1 }
-        inside && arrow { body = body $0 "\n" } !(inside && arrow)
-        /^}/ || /^[A-Za-z].*[;}]$/ { if (inside && arrow) mutate(body); body = ""; inside = 0 }
-        END { exit !(arrow && old != new && (wanted ? places >= wanted : places == 1)) }' "$header" >"$work/$header"
+        function places_in(text,   n) {
+            for (; match(text, pattern); text = substr(text, RSTART + RLENGTH)) n++
+            return n
+        }
+        BEGIN { read("ssdgs.h") }
+        /^header: / { read(substr($0, 9)) }
+        /^#/ || /^(tests|header): / || /^$/ { next }
+        {
+            number++; places = 0; sound = parse($0)
+            for (i = 1; sound && i <= count; i++)
+                if (index(first[i], name) && first[i] ~ starts) places += places_in(body[i])
+            if (sound && fits(places)) next
+            printf "mutant %03d ERROR : %s\n", number, $0
+            errors++
+        }
+        END { printf "%d lines, %d of them fit nowhere or in several places\n", number, errors; exit errors > 0 }' "$list"
 }
 
 # runs NAME: builds a test of the copy, those named _64 in double, and runs it; 2 when it does not compile. Ten minutes of CPU
@@ -64,7 +100,8 @@ notices() {
 }
 
 cp "$header" "$work/ssdgs.h"
-[ "$first" = fits ] && first=99999 last=0 || notices $(sed -n 's/^tests: //p' "$list" | tr ' ' '\n' | sort -u)
+[ "$first" != fits ] || { fit_all; exit; }
+notices $(sed -n 's/^tests: //p' "$list" | tr ' ' '\n' | sort -u)
 [ -z "$by" ] || { echo "$by: fails without any mutant"; cat "$work/log"; exit 2; }
 while IFS= read -r MUTANT; do
     case $MUTANT in

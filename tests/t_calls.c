@@ -141,9 +141,7 @@ static void call_everything(void) {
     REFUSED(ssdgs_gaussian_mirror, model, rough, &gaussian);
     REFUSED(ssdgs_model_bounds, model, low, high);
     REFUSED(ssdgs_model_sort, model);
-    REFUSED(ssdgs_model_adopt, model, guest);
     REFUSED(ssdgs_model_move, model, home);
-    REFUSED(ssdgs_model_adopt, guest, model);
     REFUSED(ssdgs_evaluate, model, &photo, photo.light.intensity, NULL, &metrics);
     REFUSED(ssdgs_model_move, guest, context);
     REFUSED(ssdgs_refine_photo, model, &copy, photo.light.intensity, 1);
@@ -585,7 +583,6 @@ static void test_null(void) {
     NAMES(ssdgs_render(all.model, NULL, &photo.light, 1, &image), "ssdgs_render: camera is NULL");
     NAMES(ssdgs_render(all.model, &photo.camera, &photo.light, 1, NULL), "ssdgs_render: image is NULL");
     NAMES(ssdgs_model_create(all.context, NULL, 1, NULL), "ssdgs_model_create: out is NULL");
-    NAMES(ssdgs_model_adopt(all.model, NULL), "ssdgs_model_adopt: original is NULL");
     NAMES(ssdgs_model_save(all.model, NULL), "ssdgs_model_save: path is NULL");
     NAMES(ssdgs_model_load(all.context, NULL, &other, NULL), "ssdgs_model_load: path is NULL");
     NAMES(ssdgs_model_load(all.context, FILE_NAME, NULL, NULL), "ssdgs_model_load: out is NULL");
@@ -614,12 +611,11 @@ static void test_null(void) {
           "ssdgs_checkpoint_iteration: path is NULL");
     NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
           "ssdgs_checkpoint_iteration: iteration is NULL");
-    NAMES(ssdgs_model_adopt(all.model, all.model), "ssdgs_model_adopt: a trainer has the model");
     CHECK(!other);
     CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) &&
-          ssdgs_model_adopt(NULL, all.model) && ssdgs_model_save(NULL, FILE_NAME) &&
-          ssdgs_trainer_step(NULL, NULL) && ssdgs_trainer_run(NULL, NULL, NULL) &&
-          ssdgs_trainer_create(NULL, &photo, 1, NULL, &none) && ssdgs_stage_cpu(NULL, SSDGS_STAGE_SORT));
+          ssdgs_model_save(NULL, FILE_NAME) && ssdgs_trainer_step(NULL, NULL) &&
+          ssdgs_trainer_run(NULL, NULL, NULL) && ssdgs_trainer_create(NULL, &photo, 1, NULL, &none) &&
+          ssdgs_stage_cpu(NULL, SSDGS_STAGE_SORT));
     const ssdgs_real there[3] = {0, 1, 0};
     for (int i = 0; i < 6; i++) { /* what sees nothing is refused */
         static const double fov[6] = {1, 0, -1, 3.15, 40, (double)NAN};
