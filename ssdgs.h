@@ -154,10 +154,10 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
 
 BESIDE IT, in examples/, headers on this interface
-  judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps, adopt.h
-  mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3.
-  Nothing finds cameras or lights (options.refine corrects small errors), traces light between objects,
-  undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
+  judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
+adopt.h mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in
+OpenGL 4.3. Nothing finds cameras or lights (options.refine corrects small errors), traces light between
+objects, undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -2484,19 +2484,19 @@ static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SS
     S(medium.scattering, "medium_scattering_", 3, 'r', 0, 1e12, 0, 0, 0) \
     S(medium.absorption, "medium_absorption_", 3, 'r', 0, 1e12, 0, 0, 0)
 /* clang-format on */
-typedef struct ssdgs__setting {
+/* A number among settings and options: what it is, its range and its presets. */
+typedef struct ssdgs__number {
     const char *name;
     size_t at;
-    int count, type;
-    double low, high, standard, published;
-} ssdgs__setting;
+    int count, type; /* values of an array, or 0; 'i' int, 'r' ssdgs_real, 'u' uint64_t */
+    double low, high, preset[4];
+} ssdgs__number;
 #define SSDGS__S(member, property, count, type, low, high, standard, published, before) \
-    {#member, offsetof(ssdgs_settings, member), count, type, low, high, standard, published},
-static const ssdgs__setting ssdgs__settings[] = {SSDGS__SETTINGS(SSDGS__S)};
+    {#member, offsetof(ssdgs_settings, member), count, type, low, high, {standard, published, 0, 0}},
+static const ssdgs__number ssdgs__settings[] = {SSDGS__SETTINGS(SSDGS__S)};
 #undef SSDGS__S
 enum { SSDGS__SETTING_COUNT = sizeof ssdgs__settings / sizeof *ssdgs__settings };
 
-/* A number among settings and options: an int, a ssdgs_real or a uint64_t. */
 static size_t ssdgs__number_size(int type) {
     return type == 'i' ? sizeof(int) : type == 'r' ? sizeof(ssdgs_real) : sizeof(uint64_t);
 }
@@ -2510,37 +2510,55 @@ static double ssdgs__number_get(int type, const unsigned char *at) {
     return memcpy(&wide, at, sizeof wide), (double)wide;
 }
 
-/* Sets an int or a real. */
 static void ssdgs__number_put(int type, unsigned char *at, double value) {
     const int whole = type == 'i' ? (int)value : 0;
     const ssdgs_real real = (ssdgs_real)value;
-    if (type == 'i') memcpy(at, &whole, sizeof whole);
-    else memcpy(at, &real, sizeof real);
+    const uint64_t wide = type == 'u' ? (uint64_t)value : 0;
+    const void *from = type == 'i' ? (const void *)&whole : type == 'r' ? (const void *)&real : &wide;
+    memcpy(at, from, ssdgs__number_size(type));
 }
 
-static size_t ssdgs__setting_at(const ssdgs__setting *entry, int i) {
-    return entry->at + (size_t)i * ssdgs__number_size(entry->type);
+static void ssdgs__numbers_preset(const ssdgs__number *list, int count, int preset, void *to) {
+    for (const ssdgs__number *n = list; n < list + count; n++)
+        for (int i = 0; !i || i < n->count; i++)
+            ssdgs__number_put(n->type, (unsigned char *)to + n->at + (size_t)i * ssdgs__number_size(n->type),
+                              n->preset[preset]);
 }
 
-static ssdgs_settings ssdgs__settings_preset(int published) {
+/* Ranges are those of files, which hold floats. */
+static ssdgs_result ssdgs__number_check(ssdgs_context *context, const char *what, const ssdgs__number *n,
+                                        const void *of, double low, double high) {
+    for (int i = 0; !i || i < n->count; i++) {
+        const double value = ssdgs__number_get(n->type, (const unsigned char *)of + n->at +
+                                                            (size_t)i * ssdgs__number_size(n->type));
+        const char index[4] = {'[', (char)('0' + i), ']', 0};
+        const int within = n->type == 'r' ? (float)value >= (float)low && (float)value <= (float)high &&
+                                                ssdgs__finite((ssdgs_real)value)
+                                          : value >= low && value <= high;
+        if (!within)
+            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%s: %s%s = %g is not within %g .. %g", what,
+                               n->name, n->count ? index : "", value, low, high);
+    }
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__numbers_check(ssdgs_context *context, const char *what, const ssdgs__number *list,
+                                         int count, const void *of) {
+    ssdgs_result result = SSDGS_OK;
+    for (const ssdgs__number *n = list; n < list + count && !result; n++)
+        result = ssdgs__number_check(context, what, n, of, n->low, n->high);
+    return result;
+}
+
+static ssdgs_settings ssdgs__settings_preset(int preset) {
     ssdgs_settings s;
     memset(&s, 0, sizeof s);
-    for (int k = 0; k < SSDGS__SETTING_COUNT; k++)
-        for (int i = 0; !i || i < ssdgs__settings[k].count; i++)
-            ssdgs__number_put(ssdgs__settings[k].type,
-                              (unsigned char *)&s + ssdgs__setting_at(ssdgs__settings + k, i),
-                              published ? ssdgs__settings[k].published : ssdgs__settings[k].standard);
+    ssdgs__numbers_preset(ssdgs__settings, SSDGS__SETTING_COUNT, preset, &s);
     return s;
 }
 
 SSDGS_API ssdgs_settings ssdgs_settings_default(void) { return ssdgs__settings_preset(0); }
 SSDGS_API ssdgs_settings ssdgs_settings_published(void) { return ssdgs__settings_preset(1); }
-
-#define SSDGS__RANGE_OF(what, type, s, field, low, high) \
-    if (!((type)(s)->field >= (type)(low) && (type)(s)->field <= (type)(high)) || \
-        !ssdgs__finite((ssdgs_real)(s)->field)) \
-    return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, what ": %s = %g is not within %g .. %g", #field, \
-                       (double)(s)->field, (double)(low), (double)(high))
 
 static int ssdgs__is_placed(const ssdgs_settings *s) {
     ssdgs_settings here;
@@ -2597,23 +2615,15 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
                            "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed",
                            SSDGS_MAX_LAYERS);
     const int medium = ssdgs__has_medium(s, s->terms);
-    for (int k = 0; k < SSDGS__SETTING_COUNT; k++) {
-        const ssdgs__setting *entry = ssdgs__settings + k;
-        const int of_medium = entry->at >= offsetof(ssdgs_settings, medium.scattering);
-        double low = entry->low; /* some depends on others */
-        if (entry->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
-        if (entry->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
-        if (entry->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
-        for (int i = 0; !i || i < entry->count; i++) {
-            const double value =
-                ssdgs__number_get(entry->type, (const unsigned char *)s + ssdgs__setting_at(entry, i));
-            const int within =
-                (float)value >= (float)low && (float)value <= (float)entry->high; /* of files */
-            if ((within || (of_medium && !medium)) && ssdgs__finite((ssdgs_real)value)) continue;
-            const char index[4] = {'[', (char)('0' + i), ']', 0};
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: %s%s = %g is not within %g .. %g",
-                               entry->name, entry->count ? index : "", value, low, entry->high);
-        }
+    for (const ssdgs__number *n = ssdgs__settings; n < ssdgs__settings + SSDGS__SETTING_COUNT; n++) {
+        const int idle = n->at >= offsetof(ssdgs_settings, medium.scattering) && !medium;
+        double low = n->low; /* some depends on others */
+        if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
+        if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
+        if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
+        const ssdgs_result result =
+            ssdgs__number_check(context, "settings", n, s, idle ? -1e300 : low, idle ? 1e300 : n->high);
+        if (result) return result;
     }
     if (s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9)
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: placement.scale = %g is too small",
@@ -3931,55 +3941,45 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
     return SSDGS_OK;
 }
 
-SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void) {
+#define SSDGS__O(member, type, low, high, exact, standard, fast, preview) \
+    { \
+#member, offsetof(ssdgs_render_options, member), 0, type, low, high, { \
+            exact, standard, fast, preview \
+        } \
+    }
+/* clang-format off */
+static const ssdgs__number ssdgs__render_numbers[] = {
+    SSDGS__O(terms, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS),
+    SSDGS__O(antialias, 'i', 0, 1, 0, 0, 0, 0),
+    SSDGS__O(stop, 'r', 0, 1, 1e-4, 1.0 / 1024, 1.0 / 256, 1.0 / 64),
+    SSDGS__O(alpha_threshold, 'r', 0, 1, 1.0 / 255, 1.0 / 255, 1.0 / 255, 2.0 / 255),
+    SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 16, 1.0 / 4, 1.0 / 2),
+    SSDGS__O(light_detail, 'r', 0.01, 8, 1, 1, 0.7, 0.6),
+    SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.7, 0.6, 0.4)};
+/* clang-format on */
+#undef SSDGS__O
+enum { SSDGS__RENDER_NUMBERS = sizeof ssdgs__render_numbers / sizeof *ssdgs__render_numbers };
+
+static ssdgs_render_options ssdgs__render_preset(int preset) {
     ssdgs_render_options o;
     memset(&o, 0, sizeof o);
     o.version = SSDGS_VERSION;
-    o.terms = SSDGS_ALL_TERMS;
-    o.stop = (ssdgs_real)1e-4;
-    o.alpha_threshold = (ssdgs_real)(1.0 / 255);
-    o.light_detail = o.transport_detail = 1;
+    ssdgs__numbers_preset(ssdgs__render_numbers, SSDGS__RENDER_NUMBERS, preset, &o);
     return o;
 }
 
-SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) {
-    ssdgs_render_options o = ssdgs_render_options_exact();
-    o.max_error = (ssdgs_real)(1.0 / 16);
-    o.stop = (ssdgs_real)(1.0 / 1024);
-    o.transport_detail = (ssdgs_real)0.7;
-    return o;
-}
-
-SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) {
-    ssdgs_render_options o = ssdgs_render_options_default();
-    o.max_error = (ssdgs_real)(1.0 / 4);
-    o.stop = (ssdgs_real)(1.0 / 256);
-    o.light_detail = (ssdgs_real)0.7;
-    o.transport_detail = (ssdgs_real)0.6;
-    return o;
-}
-
-SSDGS_API ssdgs_render_options ssdgs_render_options_preview(void) {
-    ssdgs_render_options o = ssdgs_render_options_fast();
-    o.max_error = (ssdgs_real)(1.0 / 2);
-    o.stop = (ssdgs_real)(1.0 / 64);
-    o.alpha_threshold = (ssdgs_real)(2.0 / 255);
-    o.light_detail = (ssdgs_real)0.6;
-    o.transport_detail = (ssdgs_real)0.4;
-    return o;
-}
+SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void) { return ssdgs__render_preset(0); }
+SSDGS_API ssdgs_render_options ssdgs_render_options_default(void) { return ssdgs__render_preset(1); }
+SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void) { return ssdgs__render_preset(2); }
+SSDGS_API ssdgs_render_options ssdgs_render_options_preview(void) { return ssdgs__render_preset(3); }
 
 static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ssdgs_render_options *o) {
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "render options: not made by ssdgs_render_options_default()");
-    SSDGS__RANGE_OF("render options", double, o, terms, 0, SSDGS_ALL_TERMS);
-    SSDGS__RANGE_OF("render options", double, o, antialias, 0, 1);
-    SSDGS__RANGE_OF("render options", double, o, stop, 0, 1);
-    SSDGS__RANGE_OF("render options", double, o, alpha_threshold, 0, 1);
-    SSDGS__RANGE_OF("render options", double, o, max_error, 0, 1);
-    SSDGS__RANGE_OF("render options", double, o, light_detail, (ssdgs_real)0.01, 8);
-    SSDGS__RANGE_OF("render options", double, o, transport_detail, (ssdgs_real)0.1, 8);
+    const ssdgs_result result =
+        ssdgs__numbers_check(context, "render options", ssdgs__render_numbers, SSDGS__RENDER_NUMBERS, o);
+    if (result) return result;
     for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(o->background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: background[%d] is not finite",
@@ -9361,64 +9361,70 @@ struct ssdgs_trainer {
     ssdgs__buffer sums; /* of a batch */
 };
 
-#define SSDGS__RATE(field, first, last) \
-    o.rates.field.start = (ssdgs_real)(first), o.rates.field.end = (ssdgs_real)(last)
+#define SSDGS__MAX_BATCH 256
+enum {
+    SSDGS__REFINE_ALL =
+        SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT
+};
+#define SSDGS__O(member, count, type, low, high, standard, published) \
+    { \
+#member, offsetof(ssdgs_train_options, member), count, type, low, high, { \
+            standard, published, 0, 0 \
+        } \
+    }
+#define SSDGS__R(rate, first, last, published_first, published_last) /* a rate */ \
+    SSDGS__O(rates.rate.start, 0, 'r', 0, 1e30, first, published_first), \
+        SSDGS__O(rates.rate.end, 0, 'r', 0, 1e30, last, published_last)
+/* clang-format off */
+static const ssdgs__number ssdgs__train_numbers[] = {
+    SSDGS__O(iterations, 0, 'i', 1, 100000000, 20000, 60000),
+    SSDGS__O(seed, 0, 'u', 0, 18446744073709551615.0, 1, 1),
+    SSDGS__O(schedule, 0, 'i', 0, SSDGS_SCHEDULE_MERGED, SSDGS_SCHEDULE_MERGED, SSDGS_SCHEDULE_PROGRESSIVE),
+    SSDGS__O(random_background, 0, 'i', -2147483648.0, 2147483647.0, 1, 1),
+    SSDGS__O(initial_points, 0, 'i', -2147483648.0, 2147483647.0, 10000, 10000),
+    SSDGS__O(max_gaussians, 0, 'i', 0, SSDGS__MAX_GAUSSIANS, 0, 100000),
+    SSDGS__O(densify_every, 0, 'i', 1, 2000000000, 100, 100),
+    SSDGS__O(densify_from, 0, 'i', -2147483648.0, 2147483647.0, 200, 500),
+    SSDGS__O(densify_until, 0, 'i', -2147483648.0, 2147483647.0, 50000, 50000),
+    SSDGS__O(opacity_reset_every, 0, 'i', 0, 2000000000, 3000, 3000),
+    SSDGS__O(batch, 0, 'i', 1, SSDGS__MAX_BATCH, 1, 1),
+    SSDGS__O(refine, 0, 'i', 0, SSDGS__REFINE_ALL, 0, 0),
+    SSDGS__O(background, 3, 'r', -FLT_MAX, FLT_MAX, 0, 0),
+    SSDGS__O(dssim, 0, 'r', 0, 1, 0.2, 0.2),
+    SSDGS__O(normal_weight, 0, 'r', 0, 1000000, 0.05, 0),
+    SSDGS__O(bounds_min, 3, 'r', -1e30, 1e30, -0.5, -0.5),
+    SSDGS__O(bounds_max, 3, 'r', -1e30, 1e30, 0.5, 0.5),
+    SSDGS__O(densify_gradient, 0, 'r', 0, 1e30, 4e-4, 2e-4),
+    SSDGS__O(prune_outside, 0, 'r', 0, 1, 0.02, 0),
+    SSDGS__O(adam_epsilon, 0, 'r', 0, 1e30, 0.1, 0),
+    SSDGS__O(finish, 0, 'r', 0, 1, 0.3, 1),
+    SSDGS__R(position, 6.4e-4, 6.4e-6, 1.6e-4, 1.6e-6),
+    SSDGS__R(opacity, 0.05, 0.05, 0.05, 0.05),
+    SSDGS__R(scale, 0.015, 0.005, 0.005, 0.005),
+    SSDGS__R(rotation, 0.001, 0.001, 0.001, 0.001),
+    SSDGS__R(color, 0.03, 0.01, 0.01, 0.01),
+    SSDGS__R(asg, 0.01, 1e-4, 0.01, 1e-4),
+    SSDGS__R(frame, 0.01, 1e-4, 0.01, 1e-4),
+    SSDGS__R(material, 0.001, 1e-5, 0.001, 1e-5),
+    SSDGS__R(shadow, 0.001, 1e-5, 0.001, 1e-5),
+    SSDGS__R(scattering, 0.001, 1e-5, 0.001, 1e-5),
+    SSDGS__R(camera, 1e-3, 1e-5, 1e-3, 1e-5),
+    SSDGS__R(light, 1e-3, 5e-5, 1e-3, 5e-5)};
+/* clang-format on */
+#undef SSDGS__O
+#undef SSDGS__R
+enum { SSDGS__TRAIN_NUMBERS = sizeof ssdgs__train_numbers / sizeof *ssdgs__train_numbers };
 
-SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) {
+static ssdgs_train_options ssdgs__train_preset(int preset) {
     ssdgs_train_options o;
     memset(&o, 0, sizeof o);
     o.version = SSDGS_VERSION;
-    o.iterations = 20000;
-    o.seed = 1;
-    o.schedule = SSDGS_SCHEDULE_MERGED;
-    o.random_background = 1;
-    o.dssim = (ssdgs_real)0.2;
-    o.normal_weight = (ssdgs_real)0.05;
-    o.initial_points = 10000;
-    for (int i = 0; i < 3; i++) {
-        o.bounds_min[i] = (ssdgs_real)-0.5;
-        o.bounds_max[i] = (ssdgs_real)0.5;
-    }
-    o.densify_every = 100;
-    o.densify_from = 200;
-    o.densify_until = 50000;
-    o.opacity_reset_every = 3000;
-    o.batch = 1;
-    o.densify_gradient = (ssdgs_real)4e-4;
-    o.prune_outside = (ssdgs_real)0.02;
-    o.adam_epsilon = (ssdgs_real)0.1;
-    o.finish = (ssdgs_real)0.3;
-    SSDGS__RATE(position, 6.4e-4, 6.4e-6);
-    SSDGS__RATE(opacity, 0.05, 0.05);
-    SSDGS__RATE(scale, 0.015, 0.005);
-    SSDGS__RATE(rotation, 0.001, 0.001);
-    SSDGS__RATE(color, 0.03, 0.01);
-    SSDGS__RATE(asg, 0.01, 1e-4);
-    SSDGS__RATE(frame, 0.01, 1e-4);
-    SSDGS__RATE(material, 0.001, 1e-5);
-    SSDGS__RATE(shadow, 0.001, 1e-5);
-    SSDGS__RATE(scattering, 0.001, 1e-5);
-    SSDGS__RATE(camera, 1e-3, 1e-5);
-    SSDGS__RATE(light, 1e-3, 5e-5);
+    ssdgs__numbers_preset(ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, preset, &o);
     return o;
 }
 
-SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) {
-    ssdgs_train_options o = ssdgs_train_options_default();
-    o.iterations = 60000;
-    o.max_gaussians = 100000;
-    o.schedule = SSDGS_SCHEDULE_PROGRESSIVE;
-    o.densify_from = 500;
-    o.normal_weight = 0;
-    o.densify_gradient = (ssdgs_real)2e-4;
-    o.prune_outside = o.adam_epsilon = 0;
-    o.finish = 1;
-    SSDGS__RATE(position, 1.6e-4, 1.6e-6);
-    SSDGS__RATE(scale, 0.005, 0.005);
-    SSDGS__RATE(color, 0.01, 0.01);
-    return o;
-}
-#undef SSDGS__RATE
+SSDGS_API ssdgs_train_options ssdgs_train_options_default(void) { return ssdgs__train_preset(0); }
+SSDGS_API ssdgs_train_options ssdgs_train_options_published(void) { return ssdgs__train_preset(1); }
 
 /* The iteration on the scale of a 60,000-iteration run. */
 static double ssdgs__schedule_time(const ssdgs_train_options *o, int iteration) {
@@ -10084,7 +10090,6 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 /* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by steps. */
 
 #define SSDGS__STATISTICS 3
-#define SSDGS__MAX_BATCH 256
 #define SSDGS__PER_PIXEL 0.75  /* more Gaussians than that take time and show nothing */
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
@@ -10400,48 +10405,22 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
 SSDGS__SMALL_BEGIN
 
 static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_train_options *o) {
-    static const char *const names[12] = {"position", "opacity",  "scale",  "rotation",   "color",  "asg",
-                                          "frame",    "material", "shadow", "scattering", "camera", "light"};
-    const ssdgs_rate *rates = &o->rates.position;
-    const ssdgs_real most = (ssdgs_real)1e30;
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "train options: not made by ssdgs_train_options_default()");
-#define SSDGS__RANGE(field, low, high) SSDGS__RANGE_OF("train options", double, o, field, low, high)
-    SSDGS__RANGE(iterations, 1, 100000000);
-    SSDGS__RANGE(schedule, 0, SSDGS_SCHEDULE_MERGED);
-    SSDGS__RANGE(max_gaussians, 0, SSDGS__MAX_GAUSSIANS);
-    SSDGS__RANGE(densify_every, 1, 2000000000);
-    SSDGS__RANGE(opacity_reset_every, 0, 2000000000);
-    SSDGS__RANGE(batch, 1, SSDGS__MAX_BATCH);
-    SSDGS__RANGE(refine, 0,
-                 SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT);
-    SSDGS__RANGE(dssim, 0, 1);
-    SSDGS__RANGE(normal_weight, 0, 1000000);
-    SSDGS__RANGE(densify_gradient, 0, most);
-    SSDGS__RANGE(prune_outside, 0, 1);
-    SSDGS__RANGE(adam_epsilon, 0, most);
-    SSDGS__RANGE(finish, 0, 1);
-#undef SSDGS__RANGE
+    const ssdgs_result result =
+        ssdgs__numbers_check(context, "train options", ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, o);
+    if (result) return result;
     if (o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
                        o->batch % o->sum.processes))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "train options: process %d of %d cannot share a batch of %d", o->sum.rank,
                            o->sum.processes, o->batch);
-    for (int i = 0; i < 12; i++)
-        if (!(rates[i].start >= 0 && rates[i].start <= most && rates[i].end >= 0 && rates[i].end <= most))
+    for (int i = 0; i < 3; i++)
+        if (!(o->bounds_min[i] < o->bounds_max[i]))
             return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                               "train options: %s = %g, %g: rates must be finite and not negative", names[i],
-                               (double)rates[i].start, (double)rates[i].end);
-    for (int i = 0; i < 3; i++) {
-        if (!(o->bounds_min[i] >= -most && o->bounds_max[i] <= most && o->bounds_min[i] < o->bounds_max[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                               "train options: bounds_min[%d] = %g, bounds_max[%d] = %g: they "
-                               "must be finite and the first below the second",
-                               i, (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
-        if (!ssdgs__finite(o->background[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "train options: background[%d] is not finite", i);
-    }
+                               "train options: bounds_min[%d] = %g is not below bounds_max[%d] = %g", i,
+                               (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
     if (!(ssdgs__bounds_side(o) >= 2e-15 && ssdgs__bounds_side(o) <= 2e15))
         return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                            "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
@@ -11423,34 +11402,7 @@ static uint64_t ssdgs__fold_many(uint64_t hash, const void *data, size_t size) {
     return ssdgs__fold(ssdgs__fold(hash, lane, sizeof lane), bytes, size);
 }
 
-/* What must be the same where a run goes on: besides settings, these options. */
-typedef struct ssdgs__member {
-    const char *name;
-    int type; /* 'i' int, 'r' real, 'u' uint64_t */
-    size_t at;
-} ssdgs__member;
-
-#define SSDGS__O(type, name) \
-    { #name, type, offsetof(ssdgs_train_options, name) }
-#define SSDGS__3(name) SSDGS__O('r', name[0]), SSDGS__O('r', name[1]), SSDGS__O('r', name[2])
-#define SSDGS__R(name) SSDGS__O('r', rates.name.start), SSDGS__O('r', rates.name.end)
-/* clang-format off */
-static const ssdgs__member ssdgs__members[] = {
-    SSDGS__O('i', iterations), SSDGS__O('u', seed), SSDGS__O('i', schedule), SSDGS__O('i', random_background),
-    SSDGS__O('i', initial_points), SSDGS__O('i', max_gaussians), SSDGS__O('i', densify_every),
-    SSDGS__O('i', densify_from), SSDGS__O('i', densify_until), SSDGS__O('i', opacity_reset_every),
-    SSDGS__O('i', batch), SSDGS__O('i', refine), SSDGS__3(background), SSDGS__O('r', dssim),
-    SSDGS__O('r', normal_weight), SSDGS__3(bounds_min), SSDGS__3(bounds_max),
-    SSDGS__O('r', densify_gradient), SSDGS__O('r', prune_outside), SSDGS__O('r', adam_epsilon),
-    SSDGS__O('r', finish), SSDGS__R(position), SSDGS__R(opacity), SSDGS__R(scale), SSDGS__R(rotation),
-    SSDGS__R(color), SSDGS__R(asg), SSDGS__R(frame), SSDGS__R(material), SSDGS__R(shadow),
-    SSDGS__R(scattering), SSDGS__R(camera), SSDGS__R(light)};
-/* clang-format on */
-#undef SSDGS__O
-#undef SSDGS__3
-#undef SSDGS__R
-
-/* And of each photograph, as hashes. */
+/* What must be the same where a run goes on, besides settings and options: of each photograph, as hashes. */
 typedef struct ssdgs__checkpoint_photo {
     uint64_t camera, lights, pixels;
 } ssdgs__checkpoint_photo;
@@ -11644,13 +11596,23 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
 
 #define SSDGS__ANOTHER ": a run goes on with the same options, settings and photographs"
 
-/* Compares one number of a checkpoint with the trainer's. index: "[1]", of a value in an array, or "". */
-static ssdgs_result ssdgs__checkpoint_number(ssdgs_context *context, const char *path, const char *name,
-                                             const char *index, int type, const unsigned char *there,
-                                             const unsigned char *here) {
-    if (!memcmp(there, here, ssdgs__number_size(type))) return SSDGS_OK;
-    return ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER,
-                       path, name, index, ssdgs__number_get(type, there), ssdgs__number_get(type, here));
+/* Compares a checkpoint's numbers with the trainer's. */
+static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char *path,
+                                              const ssdgs__number *list, int count, const void *there,
+                                              const void *here) {
+    for (const ssdgs__number *n = list; n < list + count; n++)
+        for (int i = 0; !i || i < n->count; i++) {
+            const size_t size = ssdgs__number_size(n->type), at = n->at + (size_t)i * size;
+            const unsigned char *was = (const unsigned char *)there + at,
+                                *is = (const unsigned char *)here + at;
+            const char index[4] = {'[', (char)('0' + i), ']', 0};
+            if (memcmp(was, is, size))
+                return ssdgs__fail(context, SSDGS_ERR_FORMAT,
+                                   "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER, path, n->name,
+                                   n->count ? index : "", ssdgs__number_get(n->type, was),
+                                   ssdgs__number_get(n->type, is));
+        }
+    return SSDGS_OK;
 }
 
 /* Whether a checkpoint is of the trainer's run; the message names the first thing that differs. */
@@ -11658,27 +11620,15 @@ static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const c
                                            const ssdgs__checkpoint_head *own,
                                            const ssdgs__checkpoint_head *head, const unsigned char *hashes) {
     ssdgs_context *context = trainer->context;
-    const unsigned char *there = (const unsigned char *)&head->options,
-                        *here = (const unsigned char *)&own->options;
-    ssdgs_result result = SSDGS_OK;
-    for (size_t i = 0; i < sizeof ssdgs__members / sizeof *ssdgs__members && !result; i++) {
-        const ssdgs__member *m = ssdgs__members + i;
-        result = ssdgs__checkpoint_number(context, path, m->name, "", m->type, there + m->at, here + m->at);
-    }
-    there = (const unsigned char *)&head->settings;
-    here = (const unsigned char *)&own->settings;
-    for (int k = 0; k < SSDGS__SETTING_COUNT; k++) {
-        const ssdgs__setting *entry = ssdgs__settings + k;
-        const int made = entry->at == offsetof(ssdgs_settings, centre) ||
-                         entry->at == offsetof(ssdgs_settings, length_unit) ||
-                         entry->at == offsetof(ssdgs_settings, light_scale); /* of the photographs */
-        for (int i = 0; (!i || i < entry->count) && !made && !result; i++) {
-            const char index[4] = {'[', (char)('0' + i), ']', 0};
-            const size_t at = ssdgs__setting_at(entry, i);
-            result = ssdgs__checkpoint_number(context, path, entry->name, entry->count ? index : "",
-                                              entry->type, there + at, here + at);
-        }
-    }
+    ssdgs_settings was = head->settings; /* but for what comes of the photographs */
+    memcpy(was.centre, own->settings.centre, sizeof was.centre);
+    was.length_unit = own->settings.length_unit;
+    was.light_scale = own->settings.light_scale;
+    ssdgs_result result = ssdgs__checkpoint_numbers(context, path, ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS,
+                                                    &head->options, &own->options);
+    if (!result)
+        result = ssdgs__checkpoint_numbers(context, path, ssdgs__settings, SSDGS__SETTING_COUNT, &was,
+                                           &own->settings);
     if (result) return result;
     if (head->photo_count != own->photo_count)
         return ssdgs__fail(context, SSDGS_ERR_FORMAT,
