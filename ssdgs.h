@@ -155,9 +155,9 @@ MACROS, defined before the header; those with * in every file that includes it
 
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
-adopt.h mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in
-OpenGL 4.3. Nothing finds cameras or lights (options.refine corrects small errors), traces light between
-objects, undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
+  adopt.h mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in
+  OpenGL 4.3. Nothing finds cameras or lights (options.refine corrects small errors), traces light between
+  objects, undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -1814,6 +1814,12 @@ static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
     return result;
 }
 
+/* All of a public function that hands its work to another. */
+#define SSDGS__GUARD(object, context, function, call) \
+    if (!(object)) return SSDGS_ERR_ARGUMENT; \
+    const ssdgs_result entered_ = SSDGS__ENTER(context, function); \
+    return entered_ ? entered_ : ssdgs__leave(context, call)
+
 static void ssdgs__context_drop(ssdgs_context *context);
 
 /* Ends a call and drops a reference. Where it was the last, the context stays busy until freed. */
@@ -2733,9 +2739,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
 SSDGS_API ssdgs_result ssdgs_model_create(ssdgs_context *context, const ssdgs_settings *settings, int count,
                                           ssdgs_model **out) {
     if (out) *out = NULL;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_create");
-    return result ? result : ssdgs__leave(context, ssdgs__model_create(context, settings, count, out));
+    SSDGS__GUARD(context, context, "ssdgs_model_create", ssdgs__model_create(context, settings, count, out));
 }
 
 SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
@@ -2977,9 +2981,8 @@ static ssdgs_result ssdgs__gaussian_mirror(ssdgs_model *model, const ssdgs_real 
 
 SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                              ssdgs_gaussian *gaussian) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_gaussian_mirror");
-    return result ? result : ssdgs__leave(model->context, ssdgs__gaussian_mirror(model, roughness, gaussian));
+    SSDGS__GUARD(model, model->context, "ssdgs_gaussian_mirror",
+                 ssdgs__gaussian_mirror(model, roughness, gaussian));
 }
 
 static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *function, int index,
@@ -3089,9 +3092,7 @@ static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
 }
 
 SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_sort");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_sort(model));
+    SSDGS__GUARD(model, model->context, "ssdgs_model_sort", ssdgs__model_sort(model));
 }
 
 /* Gaussians as a file of that version has them become today's: up to 0.2.0 c_s was a deferred lobe's height.
@@ -3452,11 +3453,8 @@ static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ss
 SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
                                                   const ssdgs_real projection[16], int flags, int width,
                                                   int height, ssdgs_camera *out) {
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_camera_from_matrices");
-    return result ? result
-                  : ssdgs__leave(context, ssdgs__camera_from_matrices(context, view, projection, flags, width,
-                                                                      height, out));
+    SSDGS__GUARD(context, context, "ssdgs_camera_from_matrices",
+                 ssdgs__camera_from_matrices(context, view, projection, flags, width, height, out));
 }
 
 SSDGS__SMALL_END
@@ -7554,11 +7552,8 @@ SSDGS_API ssdgs_result ssdgs_render_ex(ssdgs_model *model, const ssdgs_camera *c
                                        const ssdgs_render_options *options, const ssdgs_image *image,
                                        ssdgs_render_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_render");
-    return result ? result
-                  : ssdgs__leave(model->context, ssdgs__render_model(model, camera, lights, light_count,
-                                                                     options, image, stats));
+    SSDGS__GUARD(model, model->context, "ssdgs_render",
+                 ssdgs__render_model(model, camera, lights, light_count, options, image, stats));
 }
 
 SSDGS_API ssdgs_result ssdgs_render(ssdgs_model *model, const ssdgs_camera *camera, const ssdgs_light *lights,
@@ -7709,10 +7704,8 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
 
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction) {
-    if (!scene) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(scene->context, "ssdgs_scene_shadow");
-    return result ? result
-                  : ssdgs__leave(scene->context, ssdgs__scene_shadow(scene, light, points, count, fraction));
+    SSDGS__GUARD(scene, scene->context, "ssdgs_scene_shadow",
+                 ssdgs__scene_shadow(scene, light, points, count, fraction));
 }
 
 /* ---- light from all around ---- */
@@ -7823,9 +7816,7 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
 }
 
 SSDGS_API ssdgs_result ssdgs_model_bounds(ssdgs_model *model, ssdgs_real low[3], ssdgs_real high[3]) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_bounds");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_bounds(model, low, high));
+    SSDGS__GUARD(model, model->context, "ssdgs_model_bounds", ssdgs__model_bounds(model, low, high));
 }
 
 SSDGS__SMALL_END
@@ -8179,10 +8170,8 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
 SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *image,
                                      const ssdgs_real *reference, int width, int height,
                                      ssdgs_metrics *metrics) {
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_compare");
-    return result ? result
-                  : ssdgs__leave(context, ssdgs__compare(context, image, reference, width, height, metrics));
+    SSDGS__GUARD(context, context, "ssdgs_compare",
+                 ssdgs__compare(context, image, reference, width, height, metrics));
 }
 #endif /* SSDGS_NO_TRAINER */
 
@@ -9290,9 +9279,7 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
 }
 
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_save");
-    return result ? result : ssdgs__leave(model->context, ssdgs__model_save(model, path));
+    SSDGS__GUARD(model, model->context, "ssdgs_model_save", ssdgs__model_save(model, path));
 }
 #endif /* SSDGS_NO_STDIO */
 
@@ -11252,10 +11239,8 @@ static ssdgs_result ssdgs__trainer_refined(const ssdgs_trainer *trainer, int ind
 
 SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int index, ssdgs_camera *camera,
                                              ssdgs_light *light) {
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_refined");
-    return result ? result
-                  : ssdgs__leave(trainer->context, ssdgs__trainer_refined(trainer, index, camera, light));
+    SSDGS__GUARD(trainer, trainer->context, "ssdgs_trainer_refined",
+                 ssdgs__trainer_refined(trainer, index, camera, light));
 }
 
 static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo,
@@ -11302,10 +11287,8 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_evaluate");
-    return result ? result
-                  : ssdgs__leave(model->context, ssdgs__evaluate(model, photo, background, image, metrics));
+    SSDGS__GUARD(model, model->context, "ssdgs_evaluate",
+                 ssdgs__evaluate(model, photo, background, image, metrics));
 }
 
 /* As long as the longest side of a trainer's bounds; where settings have no such unit, of the Gaussians'
@@ -11373,10 +11356,8 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
 
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_refine_photo");
-    return result ? result
-                  : ssdgs__leave(model->context, ssdgs__refine_photo(model, photo, background, iterations));
+    SSDGS__GUARD(model, model->context, "ssdgs_refine_photo",
+                 ssdgs__refine_photo(model, photo, background, iterations));
 }
 
 #ifndef SSDGS_NO_STDIO
@@ -11564,9 +11545,7 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path) {
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_save");
-    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_save(trainer, path));
+    SSDGS__GUARD(trainer, trainer->context, "ssdgs_trainer_save", ssdgs__trainer_save(trainer, path));
 }
 
 /* Whether what Adam and the density control rely on makes sense; Gaussians may be anything, as in a model. */
@@ -11712,9 +11691,7 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
 }
 
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path) {
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_load");
-    return result ? result : ssdgs__leave(trainer->context, ssdgs__trainer_load(trainer, path));
+    SSDGS__GUARD(trainer, trainer->context, "ssdgs_trainer_load", ssdgs__trainer_load(trainer, path));
 }
 
 SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration) {
