@@ -1282,7 +1282,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__SERIES 10     /* coefficients of a series to second order in x, y, z */
 #define SSDGS__SOURCES 512   /* of light, gathered for a kernel */
 #define SSDGS__ALPHA_MAX 0.999
-#define SSDGS__MOST_RAW 20 /* log scales and logits of opacities are clamped to +-20 */
+#define SSDGS__RAW_LIMIT 20 /* log scales and logits of opacities are clamped to +-20 */
 #define SSDGS__SHARE \
     ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04    /* Schlick */
@@ -2684,14 +2684,14 @@ static void ssdgs__globals_reset(ssdgs_model *model, uint64_t seed) {
 }
 
 /* Tells a hook to let go of what it has kept for a model or some frames. */
-static void ssdgs__gone(ssdgs_context *context, const void *what) {
+static void ssdgs__tell_released(ssdgs_context *context, const void *what) {
     if (context->gpu.released) context->gpu.released(context->gpu.user, what);
 }
 
 static void ssdgs__model_drop(ssdgs_model *model) {
     if (!model || --model->references) return;
     ssdgs_context *context = model->context;
-    ssdgs__gone(context, model);
+    ssdgs__tell_released(context, model);
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
     ssdgs__frame_memory_destroy(context, model->frame);
@@ -2801,12 +2801,12 @@ SSDGS_API ssdgs_model_view ssdgs_model_arrays(ssdgs_model *model) {
 
 /* log(e^x - 1): what softplus makes x of; -20 for 0. */
 static double ssdgs__softplus_inverse(double x) {
-    return x < 2.1e-9 ? -SSDGS__MOST_RAW : x > 30 ? x : log(expm1(x));
+    return x < 2.1e-9 ? -SSDGS__RAW_LIMIT : x > 30 ? x : log(expm1(x));
 }
 
 static double ssdgs__logit(double x) {
     const double raw = log(x) - log1p(-x);
-    return raw < -SSDGS__MOST_RAW ? -SSDGS__MOST_RAW : raw > SSDGS__MOST_RAW ? SSDGS__MOST_RAW : raw;
+    return raw < -SSDGS__RAW_LIMIT ? -SSDGS__RAW_LIMIT : raw > SSDGS__RAW_LIMIT ? SSDGS__RAW_LIMIT : raw;
 }
 
 /* Turns axes the shortest way that brings the third to a direction; 0 0 0 turns nothing. Both are quaternions
@@ -2968,7 +2968,7 @@ static ssdgs_result ssdgs__gaussian_mirror(ssdgs_model *model, const ssdgs_real 
                *sigma = model->globals + first[SSDGS__ASG_SIGMA];
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
         sharpness[2 * j] = 0;
-        sharpness[2 * j + 1] = -SSDGS__MOST_RAW;
+        sharpness[2 * j + 1] = -SSDGS__RAW_LIMIT;
         sigma[j] = (ssdgs_real)ssdgs__softplus_inverse(1.0 / SSDGS_ASG_COUNT);
     }
     ssdgs__model_changed(model);
@@ -3210,7 +3210,7 @@ static void ssdgs__scratch_destroy(ssdgs_context *context, ssdgs__scratch *scrat
 
 static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_memory *m) {
     if (!m) return;
-    ssdgs__gone(context, m);
+    ssdgs__tell_released(context, m);
     for (size_t v = 0; v < m->view_memory.bytes / sizeof(ssdgs__view_memory); v++)
         ssdgs__buffers_release(context, (ssdgs__view_memory *)m->view_memory.memory + v,
                                offsetof(ssdgs__view_memory, chunk_room));
@@ -3242,7 +3242,7 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
         return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: a trainer has the model");
     if (memcmp(&from->allocator, &to->allocator, sizeof from->allocator) != 0)
         return ssdgs__fail(from, SSDGS_ERR_ARGUMENT, "ssdgs_model_move: the contexts' allocators differ");
-    ssdgs__gone(from, model);
+    ssdgs__tell_released(from, model);
     ssdgs__frame_memory_destroy(from, model->frame);
     model->frame = NULL;
     model->context = to;
@@ -3580,19 +3580,19 @@ SSDGS__SMALL_END
 
 /* Where a Gaussian reaches in the world, and its mean log scale; 0 where alpha_threshold, by its logit, lets
    it draw nothing. */
-static int ssdgs__box_of(const ssdgs_placed *o, int index, ssdgs_real faint, double low[3], double high[3],
-                         double *log_scale) {
+static int ssdgs__gaussian_box(const ssdgs_placed *o, int index, ssdgs_real faint, double low[3],
+                               double high[3], double *log_scale) {
     const ssdgs_model_view *g = &o->gaussians;
     const ssdgs_real *p = g->gaussians + index;
-    ssdgs_real largest = -SSDGS__MOST_RAW;
+    ssdgs_real largest = -SSDGS__RAW_LIMIT;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
     for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
     for (*log_scale = 0; j < SSDGS_OPACITY;
          j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
         const ssdgs_real s = p[(size_t)j * g->stride];
-        usable = usable && s < SSDGS__MOST_RAW;
+        usable = usable && s < SSDGS__RAW_LIMIT;
         largest = s > largest ? s : largest;
-        *log_scale += (double)(s > -SSDGS__MOST_RAW ? s : -SSDGS__MOST_RAW) / 3;
+        *log_scale += (double)(s > -SSDGS__RAW_LIMIT ? s : -SSDGS__RAW_LIMIT) / 3;
     }
     if (!usable) return 0;
     const double scale = (double)o->scale, reach = scale * (double)(3 * ssdgs__exp_scalar(largest));
@@ -3628,7 +3628,7 @@ static void ssdgs__bounds_task(void *data, int index) {
     for (int at = index * SSDGS__CHUNK; ssdgs__piece_next(frame, &at, end, &piece);)
         for (int i = piece.begin; i < piece.end; i++) {
             double low[3], high[3], log_scale;
-            if (!ssdgs__box_of(piece.object, i, job->faint, low, high, &log_scale)) continue;
+            if (!ssdgs__gaussian_box(piece.object, i, job->faint, low, high, &log_scale)) continue;
             b->log_scale += log_scale;
             b->count++;
             for (int j = 0; j < 3; j++) {
@@ -3658,7 +3658,7 @@ static void ssdgs__cut_strays(const ssdgs_frame *frame, ssdgs_real faint, ssdgs_
         const ssdgs_placed *o = ssdgs__object_of(frame, i);
         double low[3], high[3], log_scale;
         if (i - o->first >= o->gaussians.count ||
-            !ssdgs__box_of(o, i - o->first, faint, low, high, &log_scale))
+            !ssdgs__gaussian_box(o, i - o->first, faint, low, high, &log_scale))
             continue;
         seen++;
         for (int j = 0; j < 3; j++) {
@@ -3769,7 +3769,7 @@ static const unsigned char *ssdgs__reach(const ssdgs_frame *frame, int light) {
 
 /* Whether an object is out of the reach of a light, or with -1 the camera: nothing is known of it or asked.
  */
-static int ssdgs__beyond(const ssdgs_frame *frame, int light, const ssdgs_placed *o) {
+static int ssdgs__out_of_reach(const ssdgs_frame *frame, int light, const ssdgs_placed *o) {
     const unsigned char *reach = ssdgs__reach(frame, light);
     return reach && !reach[o - frame->objects];
 }
@@ -4336,13 +4336,13 @@ static ssdgs_result ssdgs__model_box(ssdgs_model *model) {
     int any = 0;
     for (int i = 0; i < model->count; i++) {
         const ssdgs_real *p = model->gaussians + i;
-        ssdgs_real largest = -SSDGS__MOST_RAW;
+        ssdgs_real largest = -SSDGS__RAW_LIMIT;
         for (size_t c = 0; c < 3; c++) {
             const ssdgs_real s = p[(SSDGS_LOG_SCALE + c) * model->capacity];
             largest = s > largest ? s : largest;
         }
         const double reach =
-            3.4 * (double)ssdgs__exp_scalar(largest < SSDGS__MOST_RAW ? largest : SSDGS__MOST_RAW);
+            3.4 * (double)ssdgs__exp_scalar(largest < SSDGS__RAW_LIMIT ? largest : SSDGS__RAW_LIMIT);
         for (size_t c = 0; c < 3; c++) {
             const double at = (double)p[(SSDGS_POSITION + c) * model->capacity];
             if (!any || at - reach < model->low[c]) model->low[c] = at - reach;
@@ -4733,7 +4733,7 @@ static void ssdgs__project_task(void *data, int index) {
     for (int at = chunk * SSDGS__CHUNK;
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs_placed *o = piece.object;
-        if (ssdgs__beyond(frame, v->light, o)) continue;
+        if (ssdgs__out_of_reach(frame, v->light, o)) continue;
         const ssdgs__projection p = ssdgs__projection_of(frame, o, v);
         frame->context->k->project(&p, o->gaussians.gaussians, o->gaussians.stride, (size_t)piece.begin,
                                    (size_t)piece.end, v->record + o->first, v->depth + o->first);
@@ -5114,7 +5114,7 @@ static void ssdgs__occlude_task(void *data, int index) {
     while (ssdgs__piece_next(frame, &at, end, &piece)) {
         const ssdgs_placed *o = piece.object;
         const ssdgs_model_view *g = &o->gaussians;
-        if (ssdgs__beyond(frame, job->light, o)) continue;
+        if (ssdgs__out_of_reach(frame, job->light, o)) continue;
         for (int i = piece.begin; i < piece.end; i++) {
             ssdgs_real local[3], *to = points + 3 * count;
             for (size_t c = 0; c < 3; c++)
@@ -5300,7 +5300,8 @@ static void ssdgs__join_task(void *data, int index) {
     size_t first[SSDGS__LEVELS + 1];
     const int levels = ssdgs__levels((size_t)tree->object->gaussians.count, first);
     for (int light = 0; light < job->frame->light_count && tree->leaves; light++) {
-        if (job->lights[light].transport_ready || ssdgs__beyond(job->frame, light, tree->object)) continue;
+        if (job->lights[light].transport_ready || ssdgs__out_of_reach(job->frame, light, tree->object))
+            continue;
         ssdgs__node *nodes = tree->nodes + tree->count * (size_t)light;
         for (int level = 1; level < levels; level++) {
             ssdgs__node *to = nodes + first[level];
@@ -5344,7 +5345,8 @@ static void ssdgs__leaf_task(void *data, int chunk) {
          ssdgs__piece_next(frame, &at, ssdgs__chunk_end(frame, chunk), &piece);) {
         const ssdgs__tree *tree = job->trees + (piece.object - frame->objects);
         for (int light = 0; light < frame->light_count && tree->leaves; light++) {
-            if (job->lights[light].transport_ready || ssdgs__beyond(frame, light, piece.object)) continue;
+            if (job->lights[light].transport_ready || ssdgs__out_of_reach(frame, light, piece.object))
+                continue;
             for (size_t leaf = (size_t)piece.begin / SSDGS__LEAF; SSDGS__LEAF * leaf < (size_t)piece.end;
                  leaf++) {
                 ssdgs__node parts[SSDGS__LEAF];
@@ -5595,7 +5597,7 @@ static void ssdgs__transport_task(void *data, int slot) {
         }
         for (int light = 0; light < frame->light_count; light++) {
             const size_t at = (size_t)job->blocks * (size_t)light + (size_t)block;
-            const int groups = !ssdgs__casts(frame->lights + light) || ssdgs__beyond(frame, light, o)
+            const int groups = !ssdgs__casts(frame->lights + light) || ssdgs__out_of_reach(frame, light, o)
                                    ? 0
                                    : seen & ~job->known[at];
             if (!groups) continue;
@@ -6237,8 +6239,9 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
 
 /* Finds how an object differs from its model: rows of factors of the colours and, last, of the highlights.
    Changes the sharpness of deferred lobes. 0: it does not differ. */
-static int ssdgs__edit(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
-                       ssdgs_real *gauss, ssdgs_real factors[4 * SSDGS__BLOCK]) {
+static int ssdgs__object_factors(const ssdgs_frame *frame, const ssdgs_placed *o,
+                                 const size_t at[SSDGS__BLOCK], ssdgs_real *gauss,
+                                 ssdgs_real factors[4 * SSDGS__BLOCK]) {
     const ssdgs__lighting *k = ssdgs__lightings(frame, o) + frame->light_count;
     const int rougher = (o->terms & SSDGS_SPECULAR_TERM) && (o->roughness < 1 || o->roughness > 1);
     int edited = rougher || o->specular < 1 || o->specular > 1;
@@ -6260,7 +6263,7 @@ static int ssdgs__edit(const ssdgs_frame *frame, const ssdgs_placed *o, const si
     return edited;
 }
 
-/* Multiplies the first so many rows of a block's outs by what ssdgs__edit() found. */
+/* Multiplies the first so many rows of a block's outs by what ssdgs__object_factors() found. */
 static void ssdgs__edit_rows(const ssdgs_real *factors, int rows, ssdgs_real *outs) {
     for (int i = 0; i < rows * SSDGS__BLOCK; i++) {
         const int row = i / SSDGS__BLOCK, s = i % SSDGS__BLOCK;
@@ -6298,7 +6301,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     ssdgs_real factors[4 * SSDGS__BLOCK];
-    const int edited = ssdgs__edit(frame, o, at, gauss, factors);
+    const int edited = ssdgs__object_factors(frame, o, at, gauss, factors);
     const int medium = ssdgs__has_medium(settings, o->terms);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     if (frame->layer_count && o->turned) ssdgs__lobe_turn(o, scratch + l->lobe);
@@ -6310,7 +6313,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
                    *shadow = NULL, *scattering = NULL;
         const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
         const ssdgs_light *source = frame->lights + light;
-        const int off = ssdgs__beyond(frame, light, o);
+        const int off = ssdgs__out_of_reach(frame, light, o);
         const int limited = ssdgs__limited(source), casts = ssdgs__casts(source);
         ssdgs_real reach[SSDGS__BLOCK];
         int lit = o->light_count && !off && (ssdgs__shines(source) || frame->training);
@@ -6819,8 +6822,9 @@ typedef struct ssdgs__composite_job {
 /* Transmittance at a distance from the light, by one pixel of its map. After a fall it stays at what that
    left, until `thick` ahead of the next fall, then goes linearly to what there was before that one. steep:
    its derivative by the distance. */
-static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x, int y, ssdgs_real distance,
-                                              ssdgs_real thick, ssdgs_real *steep) {
+static SSDGS__INLINE ssdgs_real ssdgs__pixel_transmittance(const ssdgs_splat_view *map, int x, int y,
+                                                           ssdgs_real distance, ssdgs_real thick,
+                                                           ssdgs_real *steep) {
     const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
     *steep = 0;
     if (tile == UINT32_MAX) return 1;
@@ -6841,8 +6845,8 @@ static SSDGS__INLINE ssdgs_real ssdgs__passed(const ssdgs_splat_view *map, int x
 
 /* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. slope: its gradient
    by the place, or NULL. */
-static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real at[3], ssdgs_real bias,
-                                   ssdgs_real *slope) {
+static ssdgs_real ssdgs__map_transmittance(const ssdgs_splat_view *map, const ssdgs_real at[3],
+                                           ssdgs_real bias, ssdgs_real *slope) {
     const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1),
                      half = (ssdgs_real)0.5;
     ssdgs_real t[3];
@@ -6866,8 +6870,8 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
     ssdgs_real row[2], by_u[2], by_distance[2];
     for (int i = 0; i < 2; i++) {
         ssdgs_real steep[2];
-        const ssdgs_real left = ssdgs__passed(map, x, y + i, distance, bias, steep),
-                         right = ssdgs__passed(map, x + 1, y + i, distance, bias, steep + 1);
+        const ssdgs_real left = ssdgs__pixel_transmittance(map, x, y + i, distance, bias, steep),
+                         right = ssdgs__pixel_transmittance(map, x + 1, y + i, distance, bias, steep + 1);
         row[i] = (1 - u) * left + u * right;
         by_u[i] = right - left;
         by_distance[i] = (1 - u) * steep[0] + u * steep[1];
@@ -6886,13 +6890,13 @@ static ssdgs_real ssdgs__passed_to(const ssdgs_splat_view *map, const ssdgs_real
 
 /* Transmittance from a light to a place in the world, by its maps from its first view on; -1 where none knows
    it. slope as above. */
-static ssdgs_real ssdgs__passed_from(const ssdgs_frame *frame, int light, int first, const ssdgs_real at[3],
-                                     ssdgs_real *slope) {
+static ssdgs_real ssdgs__light_transmittance(const ssdgs_frame *frame, int light, int first,
+                                             const ssdgs_real at[3], ssdgs_real *slope) {
     ssdgs_real passed = -1;
     for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
          view++)
         if (frame->views[view].light_map)
-            passed = ssdgs__passed_to(frame->views + view, at, frame->bias[1], slope);
+            passed = ssdgs__map_transmittance(frame->views + view, at, frame->bias[1], slope);
     return passed;
 }
 
@@ -6926,7 +6930,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
         ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
-        const ssdgs_real passed = ssdgs__passed_from(frame, light, first, at, NULL);
+        const ssdgs_real passed = ssdgs__light_transmittance(frame, light, first, at, NULL);
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
@@ -7118,7 +7122,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
         const ssdgs_real z = pixels[layer] / cover;
         ssdgs__place_of_pixel(k, tile, i, z, ray, at);
-        if (ssdgs__passed_from(frame, light, first, at, slope) < 0) { /* it is the Gaussians' */
+        if (ssdgs__light_transmittance(frame, light, first, at, slope) < 0) { /* it is the Gaussians' */
             const int own = (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16;
             gradient[own] += dv[lane] / cover;
             gradient[layer + 32] -= dv[lane] * pixels[own] / (cover * cover);
@@ -7478,7 +7482,8 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
     stats->instances = frame->views[0].instances;
     stats->light_instances = frame->light_instances;
     for (int i = 0; i < frame->object_count; i++)
-        stats->objects += frame->reach ? !ssdgs__beyond(frame, -1, frame->objects + i) : stats->visible > 0;
+        stats->objects +=
+            frame->reach ? !ssdgs__out_of_reach(frame, -1, frame->objects + i) : stats->visible > 0;
     for (int i = 0; i < frame->shaded_count; i++)
         stats->blackened += frame->color[4 * (size_t)frame->shaded[i] + 3] > 0;
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
@@ -7675,7 +7680,7 @@ static void ssdgs__shadow_task(void *data, int chunk) {
     for (int i = chunk * SSDGS__CHUNK; i < job->count && i / SSDGS__CHUNK == chunk; i++) {
         ssdgs_real passed = -1;
         for (const ssdgs_splat_view *v = job->view; v < job->end && passed < 0; v++)
-            passed = ssdgs__passed_to(v, job->points + 3 * (size_t)i, job->bias, NULL);
+            passed = ssdgs__map_transmittance(v, job->points + 3 * (size_t)i, job->bias, NULL);
         job->fraction[i] = passed < 0 ? 1 : passed; /* beside all objects */
     }
 }
@@ -7792,7 +7797,7 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
         const ssdgs_real *p = model->gaussians + i;
         double box[6], log_scale;
         ssdgs_real raw[4], q[4], r[9];
-        if (!ssdgs__box_of(&placed, i, -21, box, box + 3, &log_scale)) continue;
+        if (!ssdgs__gaussian_box(&placed, i, -21, box, box + 3, &log_scale)) continue;
         for (size_t c = 0; c < 4; c++) raw[c] = p[(SSDGS_ROTATION + c) * model->capacity];
         ssdgs__rotation_scalar(raw, q, r);
         for (size_t j = 0; j < 3; j++) {
@@ -8762,7 +8767,7 @@ static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
 /* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite,
    infinity, NaN. */
 static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
-    const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, most = 0x41a00000u /* SSDGS__MOST_RAW, 20 */,
+    const uint32_t sign = 0x80000000u, infinity = 0x7f800000u, most = 0x41a00000u /* SSDGS__RAW_LIMIT, 20 */,
                    one = 0x3f800000u;
     for (int i = 0; i < planes; i++) {
         const int clamped =
@@ -9199,7 +9204,7 @@ static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)ra
 /* What other programs show: the normal, and as f_dc the look under a training set's average light. That light
    is 1 at the object and comes from anywhere above the surface: c_d / pi x 1/2, and c_sss x 0.02, a typical
    f_sss. */
-static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *words) {
+static void ssdgs__average_colour(const ssdgs_model *model, size_t row, uint32_t *words) {
     const ssdgs_settings *settings = &model->settings;
     const ssdgs_real *gaussian = model->gaussians + row;
     const size_t stride = model->capacity;
@@ -9227,7 +9232,7 @@ static void ssdgs__ply_look(const ssdgs_model *model, size_t row, uint32_t *word
 static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
     const ssdgs_settings *settings = &model->settings;
     uint32_t words[SSDGS__PLY_WORDS];
-    if (kind == SSDGS__PLY_VERTEX) ssdgs__ply_look(model, row, words);
+    if (kind == SSDGS__PLY_VERTEX) ssdgs__average_colour(model, row, words);
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
         uint32_t *word = &words[cursor.word];
@@ -9303,7 +9308,7 @@ static const char *const ssdgs__group_names[SSDGS__GROUPS] = {
 
 /* What a photograph moves: gradients of value[0 .. 8] below, a Gauss-Newton step of value[9] and how sure it
    is, the gradient of settings.ambient. */
-#define SSDGS__MOVES 14
+#define SSDGS__CORRECTIONS 14
 /* value: the camera's shift t' and rotation w (x_cam = exp(w)(R x + t) + t'), the light's shift, ln of its
    intensity's factor. */
 typedef struct ssdgs__correction {
@@ -9321,7 +9326,8 @@ struct ssdgs_trainer {
     ssdgs__correction *corrections;
     unsigned char
         *transparent; /* per photograph: 0 nowhere, 1 somewhere, 2 so that it shows where the object ends */
-    ssdgs_real *magnify; /* per photograph: what makes up for an object small in the picture, 1 for others */
+    ssdgs_real *small_object_gain; /* per photograph: what makes up for an object small in the picture, 1 for
+                                      others */
     int photo_count;
     uint32_t *order;           /* the photographs in the order of a pass */
     int pass;                  /* whose; -1: none */
@@ -9338,10 +9344,11 @@ struct ssdgs_trainer {
     double extent;        /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
     int budget;           /* density control makes no more Gaussians */
     int outlines;         /* photographs show where the object ends */
-    int backdrop, filled; /* they do not, but show options.background around it; or surfaces, everywhere */
-    int one_light;        /* photographs do not tell how the object looks in other light */
-    double unit;          /* the bounds' longest side */
-    double start_size;    /* of random points, 0 without */
+    int backdrop,
+        opaque_everywhere; /* they do not, but show options.background around it; or surfaces, everywhere */
+    int one_light;         /* photographs do not tell how the object looks in other light */
+    double unit;           /* the bounds' longest side */
+    double start_size;     /* of random points, 0 without */
     int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
     int iteration, skipped;
     int running;        /* in ssdgs_trainer_run() */
@@ -9619,12 +9626,13 @@ static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value
 
 /* What moves a photograph's corrections. */
 static void ssdgs__moves_of(const ssdgs_photo *photo, const double value[10], const ssdgs_frame *frame,
-                            double moves[SSDGS__MOVES]) {
-    ssdgs__correct_backward(photo, value, frame->view_gradient, moves);
+                            double correction_gradient[SSDGS__CORRECTIONS]) {
+    ssdgs__correct_backward(photo, value, frame->view_gradient, correction_gradient);
     for (int i = 0; i < 3; i++)
-        moves[6 + i] = (double)frame->light_gradient[i] / ssdgs__moved_length(&photo->light, value);
-    for (int i = 0; i < 2; i++) moves[9 + i] = frame->intensity[i];
-    for (int i = 0; i < 3; i++) moves[11 + i] = (double)frame->ambient_gradient[i];
+        correction_gradient[6 + i] =
+            (double)frame->light_gradient[i] / ssdgs__moved_length(&photo->light, value);
+    for (int i = 0; i < 2; i++) correction_gradient[9 + i] = frame->intensity[i];
+    for (int i = 0; i < 3; i++) correction_gradient[11 + i] = (double)frame->ambient_gradient[i];
 }
 
 #define SSDGS__PIXELS 1024               /* of a store task */
@@ -9634,7 +9642,7 @@ typedef struct ssdgs__store_job {
     ssdgs_frame *frame;
     const ssdgs_photo *photo;
     const ssdgs_real *background; /* stored values */
-    ssdgs_real *image, *slope, *lift,
+    ssdgs_real *image, *slope, *by_transmittance,
         *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
 } ssdgs__store_job;
 
@@ -9667,7 +9675,7 @@ static void ssdgs__store_task(void *data, int index) {
             const ssdgs_real s = clipped ? shown : rendered, d = clipped ? 0 : linear ? 1 : slope[i];
             job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
             job->slope[at + i] = d;
-            job->lift[at + i] = job->background[c] - s + d * straight[i];
+            job->by_transmittance[at + i] = job->background[c] - s + d * straight[i];
         }
     }
 }
@@ -9681,7 +9689,7 @@ static void ssdgs__store_backward_task(void *data, int index) {
     for (size_t i = begin; i < end; i++) transmittance_gradient[i] = 0;
     for (size_t c = 0; c < 3; c++)
         for (size_t i = begin; i < end; i++) {
-            transmittance_gradient[i] += gradient[pixels * c + i] * job->lift[pixels * c + i];
+            transmittance_gradient[i] += gradient[pixels * c + i] * job->by_transmittance[pixels * c + i];
             gradient[pixels * c + i] *= job->slope[pixels * c + i];
         }
 }
@@ -9762,24 +9770,25 @@ static ssdgs_result ssdgs__photo_lights(ssdgs_context *context, const ssdgs_phot
 
 /* The loss of one photograph and all gradients, left in the frame. */
 static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model,
-                                          const ssdgs__photo_job *shot, ssdgs__loss_values *values) {
-    const ssdgs_camera *camera = shot->camera;
+                                          const ssdgs__photo_job *photo_job, ssdgs__loss_values *values) {
+    const ssdgs_camera *camera = photo_job->camera;
     ssdgs_context *context = model->context;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     ssdgs_render_options options =
-        shot->exact ? ssdgs_render_options_exact() : ssdgs_render_options_default();
+        photo_job->exact ? ssdgs_render_options_exact() : ssdgs_render_options_default();
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
-    options.terms = shot->terms;
+    options.terms = photo_job->terms;
     options.max_error = 0; /* all that a pixel blends gets a gradient */
-    if (!shot->exposure) memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
+    if (!photo_job->exposure)
+        memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
     ssdgs_light *lights;
-    ssdgs_result result = ssdgs__photo_lights(context, shot->photo, shot->light, &lights);
+    ssdgs_result result = ssdgs__photo_lights(context, photo_job->photo, photo_job->light, &lights);
     if (!result)
-        result =
-            ssdgs__frame_of_model(frame, model, camera, lights, 1 + shot->photo->more_count, &options, 0, 1);
-    if (!result && shot->exposure) { /* set earlier, the frame would find it itself */
+        result = ssdgs__frame_of_model(frame, model, camera, lights, 1 + photo_job->photo->more_count,
+                                       &options, 0, 1);
+    if (!result && photo_job->exposure) { /* set earlier, the frame would find it itself */
         memcpy(frame->options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
-        frame->objects->exposure = shot->exposure;
+        frame->objects->exposure = photo_job->exposure;
     }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
@@ -9787,14 +9796,14 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     SSDGS__RESERVE(frame->scratch->image, job.image, ssdgs_real, pixels * 9);
     SSDGS__RESERVE(frame->scratch->target, job.target, ssdgs_real, pixels * 3);
     job.frame = frame;
-    job.photo = shot->photo;
-    job.background = shot->background;
+    job.photo = photo_job->photo;
+    job.background = photo_job->background;
     job.slope = job.image + pixels * 3;
-    job.lift = job.image + pixels * 6;
+    job.by_transmittance = job.image + pixels * 6;
     ssdgs__parallel(context, tasks, ssdgs__store_task, &job);
     double along = 0,
            across = 0; /* as if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels */
-    for (size_t i = 0; i < 3 * pixels && shot->exact; i++) {
+    for (size_t i = 0; i < 3 * pixels && photo_job->exact; i++) {
         const double d = (double)job.slope[i] * (double)frame->pixels[i];
         across += d * d;
         along += d * ((double)job.target[i] - (double)job.image[i]);
@@ -9803,12 +9812,13 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     frame->intensity[0] = step < -1 ? -1 : step > 1 ? 1 : step;
     frame->intensity[1] = across;
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
-    result = ssdgs__loss(context, &frame->scratch->loss, &images, shot->dssim, frame->pixel_gradient, values);
+    result =
+        ssdgs__loss(context, &frame->scratch->loss, &images, photo_job->dssim, frame->pixel_gradient, values);
     if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__store_backward_task, &job);
-    result = ssdgs__normals_loss(frame, shot->normal_weight);
+    result = ssdgs__normals_loss(frame, photo_job->normal_weight);
     if (result) return result;
-    memcpy(frame->frozen, shot->frozen, sizeof frame->frozen);
+    memcpy(frame->frozen, photo_job->frozen, sizeof frame->frozen);
     /* Where no network mends what is wrong in shadows, surfaces that follow them run away. */
     if (!model->settings.shadow.layers) frame->visibility_given = 1;
     return ssdgs__run_stages(frame, SSDGS_STAGE_COMPOSITE_BACKWARD, SSDGS_STAGE_PROJECT_BACKWARD);
@@ -10010,9 +10020,9 @@ static double ssdgs__light_at(const ssdgs_light *light, const double place[3], d
 }
 
 /* Goes only a part of the way to the intensity that fits best: what does not fit yet may be the model. */
-static void ssdgs__intensity_step(ssdgs__correction *c, const double *moves) {
-    c->value[9] += SSDGS__INTENSITY_STEP * moves[9];
-    c->sure = moves[10];
+static void ssdgs__intensity_step(ssdgs__correction *c, const double *correction_gradient) {
+    c->value[9] += SSDGS__INTENSITY_STEP * correction_gradient[9];
+    c->sure = correction_gradient[10];
 }
 
 /* Keeps the intensities' mean, each weighted by how sure it is: twice the light on colours half as bright
@@ -10081,8 +10091,10 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
-#define SSDGS__DOUBT 0.02      /* weight of c_s and c_sss in the loss where photographs have one light */
-#define SSDGS__SMALL 0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
+#define SSDGS__ONE_LIGHT_WEIGHT \
+    0.02 /* weight of c_s and c_sss in the loss where photographs have one light */
+#define SSDGS__SMALL_OBJECT \
+    0.15 /* an object that fills less of its photographs gets its Gaussians all the same */
 
 static void ssdgs__rearranged(ssdgs_trainer *trainer) {
     trainer->arrangement = ++trainer->model->arrangement;
@@ -10373,9 +10385,9 @@ static void ssdgs__reset_opacity(ssdgs_trainer *trainer) {
 
 /* Adds what a photograph says of its Gaussians to (SSDGS__STATISTICS, stride) sums. */
 static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_frame *frame,
-                                     ssdgs_real magnify, ssdgs_real *sums) {
-    const ssdgs_real half_w = magnify * (ssdgs_real)frame->camera.width / 2,
-                     half_h = magnify * (ssdgs_real)frame->camera.height / 2;
+                                     ssdgs_real small_object_gain, ssdgs_real *sums) {
+    const ssdgs_real half_w = small_object_gain * (ssdgs_real)frame->camera.width / 2,
+                     half_h = small_object_gain * (ssdgs_real)frame->camera.height / 2;
     for (int i = 0; i < frame->shaded_count; i++) {
         const size_t g = frame->shaded[i];
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
@@ -10582,7 +10594,7 @@ static void ssdgs__trainer_drop(ssdgs_trainer *trainer) {
     ssdgs__release(context, trainer->photos);
     ssdgs__release(context, trainer->corrections);
     ssdgs__release(context, trainer->transparent);
-    ssdgs__release(context, trainer->magnify);
+    ssdgs__release(context, trainer->small_object_gain);
     ssdgs__release(context, trainer->sums.memory);
     ssdgs__release(context, trainer->order);
     ssdgs__release(context, trainer->mean);
@@ -10730,7 +10742,7 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
         spread = variance > spread ? variance : spread;
     }
     trainer->backdrop = same >= 0.5 * count;
-    trainer->filled = !trainer->backdrop;
+    trainer->opaque_everywhere = !trainer->backdrop;
     if (trainer->backdrop)
         ssdgs__note(
             trainer->context,
@@ -10777,11 +10789,12 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         (ssdgs__correction *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->corrections);
     trainer->order = (uint32_t *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->order);
     trainer->transparent = (unsigned char *)ssdgs__allocate(context, (size_t)photo_count);
-    trainer->magnify = (ssdgs_real *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->magnify);
+    trainer->small_object_gain =
+        (ssdgs_real *)ssdgs__allocate(context, (size_t)photo_count * sizeof *trainer->small_object_gain);
     trainer->global_mean =
         (ssdgs_real *)ssdgs__allocate(context, 2 * model->global_count * sizeof(ssdgs_real));
     if (!trainer->photos || !trainer->corrections || !trainer->order || !trainer->transparent ||
-        !trainer->magnify || !trainer->global_mean)
+        !trainer->small_object_gain || !trainer->global_mean)
         return SSDGS_ERR_MEMORY;
     trainer->global_square = trainer->global_mean + model->global_count;
     memcpy(trainer->photos, photos, (size_t)photo_count * sizeof *photos);
@@ -10798,8 +10811,9 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
         /* one that shows nothing at all has no outlines: a failed mask; nor do a few pixels make them */
         trainer->transparent[i] = clear < pixels && clear > pixels / 100 ? 2 : veiled > 0;
         /* the smaller the object is in it, the less the mean loss pulls */
-        const double lack = clear < pixels ? SSDGS__SMALL * (double)pixels / (double)(pixels - clear) : 0;
-        trainer->magnify[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
+        const double lack =
+            clear < pixels ? SSDGS__SMALL_OBJECT * (double)pixels / (double)(pixels - clear) : 0;
+        trainer->small_object_gain[i] = (ssdgs_real)(lack > 1 ? sqrt(lack) : 1);
         empty += clear == pixels;
     }
     const double most = SSDGS__PER_PIXEL * shown;
@@ -10917,14 +10931,15 @@ static void ssdgs__fade(const ssdgs_trainer *trainer, double t, double pixels, s
 }
 
 /* Where photographs have one light, highlights and scattered light are a guess in any other: a matt surface
-   is the safer one. Adds the gradient of SSDGS__DOUBT x the mean of c_s and c_sss over the picture. */
+   is the safer one. Adds the gradient of SSDGS__ONE_LIGHT_WEIGHT x the mean of c_s and c_sss over the
+   picture. */
 static void ssdgs__doubt(const ssdgs_trainer *trainer, const ssdgs_frame *frame, double pixels) {
     for (int i = 0; i < frame->shaded_count && trainer->one_light; i++) {
         const size_t g = frame->shaded[i];
         const ssdgs_real weight = frame->splat_gradient[SSDGS__SPLAT * g + 6];
         for (int c = 0; c < 6; c++) {
             const size_t at = (size_t)(SSDGS_SPECULAR + c) * trainer->stride + g;
-            frame->gradient[at] += (ssdgs_real)(SSDGS__DOUBT / (3 * pixels)) * weight *
+            frame->gradient[at] += (ssdgs_real)(SSDGS__ONE_LIGHT_WEIGHT / (3 * pixels)) * weight *
                                    ssdgs__sigmoid_scalar(trainer->model->gaussians[at]);
         }
     }
@@ -10954,35 +10969,36 @@ static int ssdgs__sees_ambient(const ssdgs_trainer *trainer) {
 /* Draws the photograph of an iteration. Leaves its gradients in the frame, that of its corrections in
    moves. */
 static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step *step, int iteration,
-                                      int photo, ssdgs_frame *frame, double moves[SSDGS__MOVES],
-                                      ssdgs__drawn *drawn) {
+                                      int photo, ssdgs_frame *frame,
+                                      double correction_gradient[SSDGS__CORRECTIONS], ssdgs__drawn *drawn) {
     const ssdgs_train_options *o = &trainer->options;
     const double *correction = trainer->corrections[photo].value;
     const int shown = trainer->transparent[photo]; /* a few soft pixels do not hide a backdrop */
     ssdgs_real background[3];
     for (int j = 0; j < 3; j++)
-        background[j] = o->random_background && (trainer->backdrop ? shown == 2 : shown || trainer->filled)
-                            ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
-                                                         3 * (uint64_t)iteration + (uint64_t)j)
-                            : o->background[j];
+        background[j] =
+            o->random_background && (trainer->backdrop ? shown == 2 : shown || trainer->opaque_everywhere)
+                ? (ssdgs_real)ssdgs__uniform(o->seed ^ UINT64_C(0x6261636B),
+                                             3 * (uint64_t)iteration + (uint64_t)j)
+                : o->background[j];
     ssdgs_camera camera;
     ssdgs_light light;
     ssdgs__correct(trainer->photos + photo, correction, &camera, &light);
     ssdgs__loss_values values;
     const int *learns = step->learns + SSDGS__PLANE_GROUPS;
-    const ssdgs__photo_job shot = {trainer->photos + photo,
-                                   &camera,
-                                   &light,
-                                   background,
-                                   step->terms,
-                                   {!learns[SSDGS__SCATTERING_NET], !learns[SSDGS__SHADOW_NET]},
-                                   o->dssim,
-                                   o->normal_weight,
-                                   o->refine & ~SSDGS_REFINE_AMBIENT,
-                                   ssdgs__sees_ambient(trainer) ? trainer->exposure : NULL};
-    const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &shot, &values);
+    const ssdgs__photo_job photo_job = {trainer->photos + photo,
+                                        &camera,
+                                        &light,
+                                        background,
+                                        step->terms,
+                                        {!learns[SSDGS__SCATTERING_NET], !learns[SSDGS__SHADOW_NET]},
+                                        o->dssim,
+                                        o->normal_weight,
+                                        o->refine & ~SSDGS_REFINE_AMBIENT,
+                                        ssdgs__sees_ambient(trainer) ? trainer->exposure : NULL};
+    const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &photo_job, &values);
     if (result) return result;
-    ssdgs__moves_of(trainer->photos + photo, correction, frame, moves);
+    ssdgs__moves_of(trainer->photos + photo, correction, frame, correction_gradient);
     ssdgs__fade(trainer, step->t, (double)camera.width * camera.height,
                 frame->gradient + SSDGS_OPACITY * frame->gaussians.stride);
     ssdgs__doubt(trainer, frame, (double)camera.width * camera.height);
@@ -10999,13 +11015,14 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
 
 /* Where things lie in what a batch adds up, and how long it is. */
 typedef struct ssdgs__batch_layout {
-    size_t moves, gradient, globals, statistics, size; /* before: failures, loss, psnr, shaded */
+    size_t correction_gradient, gradient, globals, statistics,
+        size; /* before: failures, loss, psnr, shaded */
 } ssdgs__batch_layout;
 
 static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) {
     ssdgs__batch_layout at;
-    at.moves = 4;
-    at.gradient = at.moves + SSDGS__MOVES * (size_t)trainer->options.batch;
+    at.correction_gradient = 4;
+    at.gradient = at.correction_gradient + SSDGS__CORRECTIONS * (size_t)trainer->options.batch;
     at.globals = at.gradient + SSDGS_CHANNELS * trainer->stride;
     at.statistics = at.globals + trainer->model->global_count;
     at.size = at.statistics + SSDGS__STATISTICS * trainer->stride;
@@ -11027,12 +11044,12 @@ static ssdgs_result ssdgs__expose_step(ssdgs_trainer *trainer) {
 
 /* Draws this process's part of a batch and adds all, in pairs, pairs of pairs and so on: so the bits are
    those of one process where each draws a power of two. Leaves the mean gradients in the frame, all
-   photographs' in moves (batch, SSDGS__MOVES) and their statistics' sums, (SSDGS__STATISTICS, stride), where
-   *statistics says. A process whose photograph fails, but not one without memory for the sums, takes part in
-   the sum, so that the others hear of it. */
+   photographs' in moves (batch, SSDGS__CORRECTIONS) and their statistics' sums, (SSDGS__STATISTICS, stride),
+   where *statistics says. A process whose photograph fails, but not one without memory for the sums, takes
+   part in the sum, so that the others hear of it. */
 static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
-                                      ssdgs_frame *frame, double *moves, const ssdgs_real **statistics,
-                                      ssdgs__drawn *drawn) {
+                                      ssdgs_frame *frame, double *correction_gradient,
+                                      const ssdgs_real **statistics, ssdgs__drawn *drawn) {
     ssdgs_context *context = trainer->context;
     const ssdgs_sum *sum = &trainer->options.sum;
     const ssdgs__batch_layout at = ssdgs__batch_layout_of(trainer);
@@ -11048,14 +11065,14 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
         ssdgs_real *out = sums + at.size * (size_t)depth++;
         memset(out, 0, at.size * sizeof *out);
         failed = ssdgs__draw_photo(trainer, step, trainer->iteration + b, photos[b], frame,
-                                   moves + SSDGS__MOVES * b, drawn);
+                                   correction_gradient + SSDGS__CORRECTIONS * b, drawn);
         if (failed) break;
-        ssdgs__gather_statistics(trainer, frame, trainer->magnify[photos[b]], out + at.statistics);
+        ssdgs__gather_statistics(trainer, frame, trainer->small_object_gain[photos[b]], out + at.statistics);
         out[1] = (ssdgs_real)drawn->loss;
         out[2] = (ssdgs_real)drawn->psnr;
         out[3] = (ssdgs_real)drawn->shaded;
-        for (int j = SSDGS__MOVES * b; j < SSDGS__MOVES * (b + 1); j++)
-            out[at.moves + (size_t)j] = (ssdgs_real)moves[j];
+        for (int j = SSDGS__CORRECTIONS * b; j < SSDGS__CORRECTIONS * (b + 1); j++)
+            out[at.correction_gradient + (size_t)j] = (ssdgs_real)correction_gradient[j];
         memcpy(out + at.gradient, frame->gradient, SSDGS_CHANNELS * trainer->stride * sizeof *out);
         memcpy(out + at.globals, frame->global_gradient, trainer->model->global_count * sizeof *out);
         for (int pairs = i + 1; depth > 1 && (pairs % 2 == 0 || i + 1 == own); pairs /= 2, depth--)
@@ -11076,7 +11093,8 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     drawn->loss = (double)(mean * sums[1]);
     drawn->psnr = (double)(mean * sums[2]);
     drawn->shaded = (double)(mean * sums[3]);
-    for (int j = 0; j < SSDGS__MOVES * batch; j++) moves[j] = (double)sums[at.moves + (size_t)j];
+    for (int j = 0; j < SSDGS__CORRECTIONS * batch; j++)
+        correction_gradient[j] = (double)sums[at.correction_gradient + (size_t)j];
     for (size_t k = 0; k < at.globals - at.gradient; k++) frame->gradient[k] = mean * sums[at.gradient + k];
     for (size_t k = 0; k < at.statistics - at.globals; k++)
         frame->global_gradient[k] = mean * sums[at.globals + k];
@@ -11085,25 +11103,25 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
 }
 
 /* Moves the camera and the light of a photograph. */
-static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, const double moves[SSDGS__MOVES],
-                               const int refines[4]) {
+static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
+                               const double correction_gradient[SSDGS__CORRECTIONS], const int refines[4]) {
     const ssdgs_train_options *o = &trainer->options;
     const double shows = (double)o->iterations / trainer->photo_count,
                  wider = shows < 300 ? sqrt(300 / shows) : 1;
     const double angle = ssdgs__view_angle(&trainer->photos[photo].camera);
     ssdgs__correction *correction = trainer->corrections + photo;
     if (refines[0])
-        ssdgs__correction_step(correction, moves, 0,
+        ssdgs__correction_step(correction, correction_gradient, 0,
                                wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
                                trainer->unit, angle);
     if (refines[0] && o->rates.position.start > 0)
         ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
     if (trainer->photos[photo].more_count) return;
     if (refines[1])
-        ssdgs__correction_step(correction, moves, 1,
+        ssdgs__correction_step(correction, correction_gradient, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
                                ssdgs__light_unit(&trainer->photos[photo].light, trainer->unit), angle);
-    if (refines[2]) ssdgs__intensity_step(correction, moves);
+    if (refines[2]) ssdgs__intensity_step(correction, correction_gradient);
     if (refines[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
         ssdgs__anchor_intensities(trainer);
 }
@@ -11111,14 +11129,14 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo, cons
 #define SSDGS__AMBIENT_RATE 0.01 /* of the lamps' light */
 
 /* Adam on settings.ambient, by the moves of a batch. */
-static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *moves) {
+static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *correction_gradient) {
     ssdgs_settings *s = &trainer->model->settings;
     const int batch = trainer->options.batch, steps = ++trainer->ambient_steps;
     const double end = ssdgs__schedule_end(&trainer->options);
     const double rate = SSDGS__AMBIENT_RATE * (1 - 0.99 * (t < end ? t : end) / end) * sqrt((double)batch);
     for (int c = 0; c < 3; c++) {
         double g = 0;
-        for (int i = 0; i < batch; i++) g += moves[SSDGS__MOVES * i + 11 + c] / batch;
+        for (int i = 0; i < batch; i++) g += correction_gradient[SSDGS__CORRECTIONS * i + 11 + c] / batch;
         const double step = ssdgs__adam_one(g, trainer->ambient + c, trainer->ambient + 3 + c, steps),
                      value = (double)s->ambient[c] - rate / (double)s->light_scale * step;
         s->ambient[c] = (ssdgs_real)(value > 0 ? value < SSDGS__MOST_LIGHT ? value : SSDGS__MOST_LIGHT : 0);
@@ -11135,28 +11153,30 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     step.terms =
         ssdgs__phase(o, trainer->model->settings.asg, step.t, step.learns) & trainer->model->settings.terms;
     int photos[SSDGS__MAX_BATCH];
-    double moves[SSDGS__MOVES * SSDGS__MAX_BATCH];
+    double correction_gradient[SSDGS__CORRECTIONS * SSDGS__MAX_BATCH];
     for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
     const ssdgs_real *statistics = NULL;
     ssdgs__drawn drawn;
     ssdgs_frame frame;
     if (o->batch > 1 || o->sum.add)
-        result = ssdgs__draw_batch(trainer, &step, photos, &frame, moves, &statistics, &drawn);
+        result = ssdgs__draw_batch(trainer, &step, photos, &frame, correction_gradient, &statistics, &drawn);
     else {
         result = ssdgs__expose_step(trainer);
-        if (!result) result = ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, moves, &drawn);
+        if (!result)
+            result =
+                ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, correction_gradient, &drawn);
     }
     if (result) return result;
     const int refines[4] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
                             (o->refine & SSDGS_REFINE_LIGHT) && step.t >= 16e3,
                             (o->refine & SSDGS_REFINE_INTENSITY) && step.t >= 5e3,
                             (o->refine & SSDGS_REFINE_AMBIENT) != 0};
-    for (int i = 0; i < SSDGS__MOVES * o->batch && !result; i++) {
-        const int j = i % SSDGS__MOVES, of = j < 6 ? 0 : j < 9 ? 1 : j < 11 ? 2 : 3;
-        if (refines[of] && !ssdgs__finite((ssdgs_real)moves[i]))
+    for (int i = 0; i < SSDGS__CORRECTIONS * o->batch && !result; i++) {
+        const int j = i % SSDGS__CORRECTIONS, of = j < 6 ? 0 : j < 9 ? 1 : j < 11 ? 2 : 3;
+        if (refines[of] && !ssdgs__finite((ssdgs_real)correction_gradient[i]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s is not finite",
-                                 before, photos[i / SSDGS__MOVES],
+                                 before, photos[i / SSDGS__CORRECTIONS],
                                  of == 3 ? "ambient light"
                                  : of    ? "light"
                                          : "camera");
@@ -11167,15 +11187,16 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     }
     trainer->skipped += result != SSDGS_OK;
     for (int i = 0; i < o->batch && !result; i++)
-        ssdgs__refine_step(trainer, step.t, photos[i], moves + SSDGS__MOVES * i, refines);
-    if (!result && refines[3]) ssdgs__ambient_step(trainer, step.t, moves);
+        ssdgs__refine_step(trainer, step.t, photos[i], correction_gradient + SSDGS__CORRECTIONS * i, refines);
+    if (!result && refines[3]) ssdgs__ambient_step(trainer, step.t, correction_gradient);
     ssdgs__model_changed(trainer->model);
     trainer->iteration = after;
     if (!result && ssdgs__schedule_time(o, after) <= o->densify_until) {
         for (size_t k = 0; statistics && k < SSDGS__STATISTICS * trainer->stride; k++)
             trainer->screen_gradient[k] += statistics[k];
         if (!statistics)
-            ssdgs__gather_statistics(trainer, &frame, trainer->magnify[photos[0]], trainer->screen_gradient);
+            ssdgs__gather_statistics(trainer, &frame, trainer->small_object_gain[photos[0]],
+                                     trainer->screen_gradient);
         if (after >= o->densify_from && after / o->densify_every > before / o->densify_every)
             result = ssdgs__densify(trainer);
         if (ssdgs__last_reset(o, after) > before) ssdgs__reset_opacity(trainer);
@@ -11333,13 +11354,13 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         ssdgs__correct(photo, correction.value, &camera, &light);
         ssdgs__loss_values values;
         ssdgs_frame frame;
-        const ssdgs__photo_job shot = {photo,  &camera,         &light, background, model->settings.terms,
-                                       {1, 1}, (ssdgs_real)0.2, 0,      1,          NULL};
-        result = ssdgs__photo_backward(&frame, model, &shot, &values);
+        const ssdgs__photo_job photo_job = {
+            photo, &camera, &light, background, model->settings.terms, {1, 1}, (ssdgs_real)0.2, 0, 1, NULL};
+        result = ssdgs__photo_backward(&frame, model, &photo_job, &values);
         if (result) return result;
-        double gradient[SSDGS__MOVES];
+        double gradient[SSDGS__CORRECTIONS];
         ssdgs__moves_of(photo, correction.value, &frame, gradient);
-        for (int j = 0; j < SSDGS__MOVES; j++)
+        for (int j = 0; j < SSDGS__CORRECTIONS; j++)
             if (!ssdgs__finite((ssdgs_real)gradient[j]))
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
@@ -12265,7 +12286,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
         raw[i] = V_SEL(off, V_SET(i == 0), V_LOAD(g + (size_t)(SSDGS_ROTATION + i) * stride));
     for (int i = 0; i < 3; i++) {
         V log_scale = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
-        p->s[i] = V_EXP(V_MAX(V_SET(-SSDGS__MOST_RAW), V_MIN(V_SET(SSDGS__MOST_RAW), log_scale)));
+        p->s[i] = V_EXP(V_MAX(V_SET(-SSDGS__RAW_LIMIT), V_MIN(V_SET(SSDGS__RAW_LIMIT), log_scale)));
         p->t[i] = V_ADD(V_DOT3(V_SET(k->view[4 * i]), V_SET(k->view[4 * i + 1]), V_SET(k->view[4 * i + 2]),
                                p->x[0], p->x[1], p->x[2]),
                         V_SET(k->view[4 * i + 3]));
@@ -12307,7 +12328,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     p->uy = V_MUL(p->ux, V_NEG(V_MUL(p->b, inverse_high)));
     p->wy = V_SQRT(inverse_high);
     p->opacity = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)SSDGS_OPACITY * stride));
-    p->clear = V_EXP(V_NEG(V_MAX(V_SET(-SSDGS__MOST_RAW), V_MIN(V_SET(SSDGS__MOST_RAW), p->opacity))));
+    p->clear = V_EXP(V_NEG(V_MAX(V_SET(-SSDGS__RAW_LIMIT), V_MIN(V_SET(SSDGS__RAW_LIMIT), p->opacity))));
     p->opacity = V_DIV(V_SET(1), V_ADD(V_SET(1), p->clear));
     p->clear = V_MUL(p->clear, p->opacity);
 }
@@ -12386,7 +12407,7 @@ SSDGS__FI void F(fade_backward)(const ssdgs__projection *k, const F(rim) * rim, 
         R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride;
         const V held = V_ABS(V_LOAD(raw + (size_t)(SSDGS_LOG_SCALE + j) * stride));
         V_STORE(d_scale, V_ADD(V_LOAD(d_scale),
-                               V_SEL(V_LT(held, V_SET(SSDGS__MOST_RAW)), V_MUL(by_axis, p->axis[j]), zero)));
+                               V_SEL(V_LT(held, V_SET(SSDGS__RAW_LIMIT)), V_MUL(by_axis, p->axis[j]), zero)));
         for (int l = 0; l < 3; l++) {
             dr[3 * l + j] = V_FMA(along, V_SET(k->view[8 + l]), dr[3 * l + j]);
             view_sum[8 + l][v] = V_FMA(along, p->r[3 * l + j], view_sum[8 + l][v]);
@@ -12452,7 +12473,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                 ds = V_FMA(push0, p.m[0][j], V_FMA(push1, p.m[1][j], ds));
             }
             V_STORE(d_scale,
-                    V_ADD(V_LOAD(d_scale), V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__MOST_RAW)), ds, V_SET(0))));
+                    V_ADD(V_LOAD(d_scale), V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), ds, V_SET(0))));
             dm0 = V_MUL(dm0, p.s[j]);
             dm1 = V_MUL(dm1, p.s[j]);
             for (int l = 0; l < 3; l++) {
@@ -12474,7 +12495,7 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
             R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
             V raw = V_LOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
-            V logit = V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__MOST_RAW)), V_MUL(g[5], p.clear), V_SET(0));
+            V logit = V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), V_MUL(g[5], p.clear), V_SET(0));
             V_STORE(d, V_ADD(V_LOAD(d), logit));
         }
         V dt[3];

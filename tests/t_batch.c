@@ -195,7 +195,8 @@ static void test_mean(void) {
     }
     CHECK(at.size == both.count && bad == 0 && apart > 1000);
     for (size_t j = 0; j < 9; j++) /* a photograph's moves stand in its place alone */
-        CHECK(each[0].part[at.moves + SSDGS__MOVES + j] == 0 && each[1].part[at.moves + j] == 0);
+        CHECK(each[0].part[at.correction_gradient + SSDGS__CORRECTIONS + j] == 0 &&
+              each[1].part[at.correction_gradient + j] == 0);
     ssdgs_real *total = both.part;
     both.total = total;
     ssdgs_train_stats stats;

@@ -1366,7 +1366,7 @@ static void test_one_light(void) {
         double weights = 0, shown = 0, worst = 0;
         const int known = trainer->one_light;
         for (int k = 0; k < 2; k++) {
-            double moves[SSDGS__MOVES];
+            double moves[SSDGS__CORRECTIONS];
             ssdgs__drawn drawn;
             ssdgs_frame frame;
             trainer->one_light = k ? known : 0;
@@ -1383,7 +1383,7 @@ static void test_one_light(void) {
                 const double x = (double)model->gaussians[(size_t)c * model->capacity + (size_t)i],
                              more = (double)(gradient[1][c * MANY + i] - gradient[0][c * MANY + i]);
                 const int doubted = known && c >= SSDGS_SPECULAR && c < SSDGS_SCATTERING + 3;
-                if (doubted) weights += more * (1 + exp(-x)) * SIDE * SIDE / (2 * SSDGS__DOUBT);
+                if (doubted) weights += more * (1 + exp(-x)) * SIDE * SIDE / (2 * SSDGS__ONE_LIGHT_WEIGHT);
                 else worst = test_most(worst, fabs(more));
             }
         CHECK(shown > 100 && worst == 0);
@@ -2425,7 +2425,8 @@ static void test_borders(void) {
         if (!CHECK(!judge_and_create(model, shots, PHOTOS, &options, &trainer))) exit(1);
         if (!CHECK(heard[BACKDROP] == cases[i].backdrop && heard[FILLED] == !cases[i].backdrop &&
                    heard[ALIKE] == cases[i].alike && heard[NO_OUTLINES] == 1 &&
-                   trainer->backdrop == cases[i].backdrop && trainer->filled == !cases[i].backdrop))
+                   trainer->backdrop == cases[i].backdrop &&
+                   trainer->opaque_everywhere == !cases[i].backdrop))
             printf("    case %d\n", (int)i);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -2554,7 +2555,8 @@ static void test_outlines_known(void) {
             CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
         { /* where an object fills less than 0.15 of the picture, screen gradients count for more */
             const double shown = cases[i].clear < SIDE * SIDE ? SIDE * SIDE - cases[i].clear : SIDE * SIDE;
-            CHECK(fabs((double)trainer->magnify[0] - fmax(1, sqrt(0.15 * SIDE * SIDE / shown))) < 1e-5);
+            CHECK(fabs((double)trainer->small_object_gain[0] - fmax(1, sqrt(0.15 * SIDE * SIDE / shown))) <
+                  1e-5);
         }
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -2566,7 +2568,7 @@ static void test_outlines_known(void) {
             ssdgs_trainer *trainer = NULL;
             CHECK(!ssdgs_model_create(context, NULL, 0, &model));
             if (!CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options, &trainer))) exit(1);
-            for (int k = 0; k < PHOTOS && pass; k++) trainer->magnify[k] = 3;
+            for (int k = 0; k < PHOTOS && pass; k++) trainer->small_object_gain[k] = 3;
             CHECK(!ssdgs_trainer_step(trainer, NULL));
             for (int k = 0; k < model->count; k++) sum[pass] += (double)trainer->screen_gradient[k];
             ssdgs_trainer_destroy(trainer);
@@ -2618,7 +2620,7 @@ static void test_fade(void) {
         CHECK(!ssdgs_trainer_step(trainer, NULL));
         if (!CHECK((model->gaussians[SSDGS_OPACITY * model->capacity] < 2) == !known))
             printf("    %d: %g %d %d\n", known, (double)model->gaussians[SSDGS_OPACITY * model->capacity],
-                   trainer->backdrop, trainer->filled);
+                   trainer->backdrop, trainer->opaque_everywhere);
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -2655,7 +2657,7 @@ static void test_backdrop(void) {
                 options.random_background = random;
                 CHECK(!ssdgs_model_create(context, NULL, 20, &model));
                 if (!CHECK(!ssdgs_trainer_create(model, shots, MANY, &options, &trainer))) exit(1);
-                CHECK(trainer->backdrop == !filled && trainer->filled == filled);
+                CHECK(trainer->backdrop == !filled && trainer->opaque_everywhere == filled);
                 for (int i = 0; i < MANY; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
                 hash[random] = 1;
                 for (size_t c = 0; c < SSDGS_CHANNELS; c++)
