@@ -1465,6 +1465,23 @@ static void test_kept(void) {
     object[0].model = larger;
     together(object, 2, &camera, lights, 2, &options, shot + 1);
     CHECK(same(shot, shot + 1));
+    for (int way = 0; way < 3; way++) { /* one that grows where it is, beside a larger one */
+        ssdgs_camera near_by = camera;
+        ssdgs_object two[2] = {placed(model[1], 0, way ? 0.6 : 0.5, 0, 0, 0, 0),
+                               placed(model[0], 0, 3, 0, 0, 3, 0)};
+        near_by.near_plane = (ssdgs_real)0.02;
+        if (way == 2) (void)ssdgs_model_arrays(model[1]), (void)ssdgs_model_arrays(model[0]);
+        together(two, 2, &near_by, lights, 2, &options, shot + (way > 1));
+        CHECK(!shot[way > 1].stats.camera_cached);
+    }
+    CHECK(same(shot, shot + 1));
+    for (int way = 0; way < 2; way++) { /* as many in all, but in other places */
+        ssdgs_object four[4] = {placed(way ? larger : model[1], 0, 0.5, 0, 0, -40, 0), object[1],
+                                placed(way ? model[1] : larger, 0, 0.5, 0, 0, -40, 0), object[1]};
+        four[3].to_world[7] = 2;
+        together(four, 4, &camera, lights, 2, &options, shot + way);
+    }
+    CHECK(same(shot, shot + 1));
     ssdgs_model_destroy(larger);
     for (int i = 0; i < 2; i++) ssdgs_model_destroy(model[i]);
     together(NULL, 0, &camera, lights, 2, &options, shot); /* and of models that are gone nothing is asked */
