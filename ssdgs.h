@@ -1814,6 +1814,12 @@ static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
     return result;
 }
 
+/* Ends a function whose caller asks what cannot be; the rest is the message. */
+#define SSDGS__REFUSE(wrong, ...) \
+    do { \
+        if (wrong) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, __VA_ARGS__); \
+    } while (0)
+
 /* All of a public function that hands its work to another. */
 #define SSDGS__GUARD(object, context, function, call) \
     if (!(object)) return SSDGS_ERR_ARGUMENT; \
@@ -2541,9 +2547,8 @@ static ssdgs_result ssdgs__number_check(ssdgs_context *context, const char *what
         const int within = n->type == 'r' ? (float)value >= (float)low && (float)value <= (float)high &&
                                                 ssdgs__finite((ssdgs_real)value)
                                           : value >= low && value <= high;
-        if (!within)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "%s: %s%s = %g is not within %g .. %g", what,
-                               n->name, n->count ? index : "", value, low, high);
+        SSDGS__REFUSE(!within, "%s: %s%s = %g is not within %g .. %g", what, n->name, n->count ? index : "",
+                      value, low, high);
     }
     return SSDGS_OK;
 }
@@ -2609,17 +2614,12 @@ static int ssdgs__has_medium(const ssdgs_settings *s, int terms) {
 static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_settings *s) {
     if (s->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS, "settings: not made by ssdgs_settings_default()");
-    if (s->dipole == 2 || s->dipole == 3)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "settings: dipole = %d, %s, was never better and is gone; train with 0 or 1",
-                           s->dipole, s->dipole == 2 ? "the released form" : "Burley's profile");
-    if (s->asg == 1)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "settings: asg = 1, the released angular form, is gone; train with 0 or 2");
-    if (s->scattering.layers == 1)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed",
-                           SSDGS_MAX_LAYERS);
+    SSDGS__REFUSE(s->dipole == 2 || s->dipole == 3,
+                  "settings: dipole = %d, %s, was never better and is gone; train with 0 or 1", s->dipole,
+                  s->dipole == 2 ? "the released form" : "Burley's profile");
+    SSDGS__REFUSE(s->asg == 1, "settings: asg = 1, the released angular form, is gone; train with 0 or 2");
+    SSDGS__REFUSE(s->scattering.layers == 1,
+                  "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed", SSDGS_MAX_LAYERS);
     const int medium = ssdgs__has_medium(s, s->terms);
     for (const ssdgs__number *n = ssdgs__settings; n < ssdgs__settings + SSDGS__SETTING_COUNT; n++) {
         const int idle = n->at >= offsetof(ssdgs_settings, medium.scattering) && !medium;
@@ -2631,11 +2631,9 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
             ssdgs__number_check(context, "settings", n, s, idle ? -1e300 : low, idle ? 1e300 : n->high);
         if (result) return result;
     }
-    if (s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: placement.scale = %g is too small",
-                           (double)s->placement.scale);
-    if (medium && !s->transport)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "settings: a medium needs transport = 1");
+    SSDGS__REFUSE(s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9,
+                  "settings: placement.scale = %g is too small", (double)s->placement.scale);
+    SSDGS__REFUSE(medium && !s->transport, "settings: a medium needs transport = 1");
     return SSDGS_OK;
 }
 
@@ -2706,8 +2704,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     if (!out) return ssdgs__null(context, "ssdgs_model_create", "out");
     const ssdgs_result result = ssdgs__settings_check(context, &s);
     if (result) return result;
-    if (count < 0)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "a model of %d Gaussians: fewer than 0", count);
+    SSDGS__REFUSE(count < 0, "a model of %d Gaussians: fewer than 0", count);
     if (count > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians: over 2^28", count);
     ssdgs_model *model = (ssdgs_model *)ssdgs__allocate(context, sizeof *model);
@@ -3375,15 +3372,14 @@ static ssdgs_camera ssdgs__no_camera(void) {
 SSDGS__SMALL_BEGIN
 
 static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c, int mirrored) {
-    if (c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: %d x %d pixels", c->width, c->height);
-    if (!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
-        !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
-        !ssdgs__finite(c->near_plane))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
-                           "lengths must be positive, near_plane not negative, all finite",
-                           (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
+    SSDGS__REFUSE(c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE,
+                  "camera: %d x %d pixels", c->width, c->height);
+    SSDGS__REFUSE(!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
+                      !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
+                      !ssdgs__finite(c->near_plane),
+                  "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
+                  "lengths must be positive, near_plane not negative, all finite",
+                  (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
     for (int i = 0; i < 12; i++)
         if (!ssdgs__finite(c->view[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
@@ -3391,15 +3387,12 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
         for (int j = 0; j <= i; j++) {
             const ssdgs_real *a = c->view + 4 * i, *b = c->view + 4 * j;
             const double dot = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-            if (fabs(dot - (i == j)) > 1e-3)
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "camera: the rows of view are not orthonormal");
+            SSDGS__REFUSE(fabs(dot - (i == j)) > 1e-3, "camera: the rows of view are not orthonormal");
         }
     const double determinant = (double)(c->view[0] * (c->view[5] * c->view[10] - c->view[6] * c->view[9]) -
                                         c->view[1] * (c->view[4] * c->view[10] - c->view[6] * c->view[8]) +
                                         c->view[2] * (c->view[4] * c->view[9] - c->view[5] * c->view[8]));
-    if (determinant < 0 && !mirrored)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: view is a mirror image");
+    SSDGS__REFUSE(determinant < 0 && !mirrored, "camera: view is a mirror image");
     return SSDGS_OK;
 }
 
@@ -3420,20 +3413,16 @@ static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ss
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                                "camera: row %d, column %d of view or projection is not finite", i / 4, i % 4);
     }
-    if (flags & ~(SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: flags = %d", flags);
-    if (fabs(v[12]) + fabs(v[13]) + fabs(v[14]) > 1e-6 || fabs(v[15] - 1) > 1e-6)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "camera: the last row of view is not 0 0 0 1: is it the other order of elements?");
+    SSDGS__REFUSE(flags & ~(SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN), "camera: flags = %d", flags);
+    SSDGS__REFUSE(fabs(v[12]) + fabs(v[13]) + fabs(v[14]) > 1e-6 || fabs(v[15] - 1) > 1e-6,
+                  "camera: the last row of view is not 0 0 0 1: is it the other order of elements?");
     const double w = p[14], size = fabs(w);
-    if (!(size > 0) || fabs(p[12]) + fabs(p[13]) + fabs(p[15]) > 1e-6 * size)
-        return ssdgs__fail(
-            context, SSDGS_ERR_ARGUMENT,
-            "camera: the last row of projection is not 0 0 +-1 0: it is no perspective, or its "
-            "elements are in the other order");
-    if (p[0] == 0 || p[5] == 0 || fabs(p[1]) + fabs(p[3]) > 1e-6 * fabs(p[0]) ||
-        fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "camera: projection shears, shifts or is flat");
+    SSDGS__REFUSE(!(size > 0) || fabs(p[12]) + fabs(p[13]) + fabs(p[15]) > 1e-6 * size,
+                  "camera: the last row of projection is not 0 0 +-1 0: it is no perspective, or its "
+                  "elements are in the other order");
+    SSDGS__REFUSE(p[0] == 0 || p[5] == 0 || fabs(p[1]) + fabs(p[3]) > 1e-6 * fabs(p[0]) ||
+                      fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]),
+                  "camera: projection shears, shifts or is flat");
     const double down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
     const double sign[3] = {p[0] > 0 ? 1.0 : -1.0, p[5] * down > 0 ? 1.0 : -1.0, w > 0 ? 1.0 : -1.0};
     ssdgs_camera camera;
@@ -3522,49 +3511,39 @@ static double ssdgs__scale2(const ssdgs_real m[12]) {
 static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_object *objects, int count) {
     int64_t gaussians = 0;
     const ssdgs_model *first = NULL;
-    if (count < 0 || (count && !objects))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           count < 0 ? "%d objects" : "%d objects, but the array is NULL", count);
+    SSDGS__REFUSE(count < 0 || (count && !objects),
+                  count < 0 ? "%d objects" : "%d objects, but the array is NULL", count);
     for (int i = 0; i < count; i++) {
         const ssdgs_object *o = objects + i;
         const double length2 = ssdgs__scale2(o->to_world);
-        if (!o->model || o->model->context != context)
-            return ssdgs__fail(
-                context, SSDGS_ERR_ARGUMENT,
-                o->model ? "object %d: its model is of another context" : "object %d: its model is NULL", i);
+        SSDGS__REFUSE(
+            !o->model || o->model->context != context,
+            o->model ? "object %d: its model is of another context" : "object %d: its model is NULL", i);
         for (int j = 0; j < 12; j++)
             if (!ssdgs__finite(o->to_world[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "object %d: to_world[%d] is not finite", i,
                                    j);
-        if (!(length2 >= 1e-24 && length2 <= 1e24))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "object %d: to_world's scale is %g", i,
-                               sqrt(length2));
+        SSDGS__REFUSE(!(length2 >= 1e-24 && length2 <= 1e24), "object %d: to_world's scale is %g", i,
+                      sqrt(length2));
         for (int j = 0; j < 9; j++) {
             const ssdgs_real *a = o->to_world + j / 3 * 4, *b = o->to_world + j % 3 * 4;
             const double dot =
                 (double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2];
-            if (!(fabs(dot / length2 - (j % 4 == 0)) <= 1e-3))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "object %d: to_world is not a rotation times one scale", i);
+            SSDGS__REFUSE(!(fabs(dot / length2 - (j % 4 == 0)) <= 1e-3),
+                          "object %d: to_world is not a rotation times one scale", i);
         }
         for (int j = 0; j < 3; j++)
-            if (!(o->tint[j] >= 0) || !ssdgs__finite(o->tint[j]))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "object %d: tint[%d] = %g is negative or not finite", i, j,
-                                   (double)o->tint[j]);
-        if (!(o->roughness >= (ssdgs_real)0.1 && o->roughness <= 10) ||
-            !(o->translucency >= (ssdgs_real)0.1 && o->translucency <= 10) ||
-            !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6))
-            return ssdgs__fail(
-                context, SSDGS_ERR_ARGUMENT,
-                "object %d: roughness = %g, specular = %g, translucency = %g, where 0.1 .. 10, "
-                "0 .. 1e6 and 0.1 .. 10 are allowed; ssdgs_object_default() makes them 1",
-                i, (double)o->roughness, (double)o->specular, (double)o->translucency);
+            SSDGS__REFUSE(!(o->tint[j] >= 0) || !ssdgs__finite(o->tint[j]),
+                          "object %d: tint[%d] = %g is negative or not finite", i, j, (double)o->tint[j]);
+        SSDGS__REFUSE(!(o->roughness >= (ssdgs_real)0.1 && o->roughness <= 10) ||
+                          !(o->translucency >= (ssdgs_real)0.1 && o->translucency <= 10) ||
+                          !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6),
+                      "object %d: roughness = %g, specular = %g, translucency = %g, where 0.1 .. 10, "
+                      "0 .. 1e6 and 0.1 .. 10 are allowed; ssdgs_object_default() makes them 1",
+                      i, (double)o->roughness, (double)o->specular, (double)o->translucency);
         if (!o->model->settings.baked) {
-            if (first && first->settings.transfer != o->model->settings.transfer)
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "object %d: its settings.transfer is not that of the objects before it",
-                                   i);
+            SSDGS__REFUSE(first && first->settings.transfer != o->model->settings.transfer,
+                          "object %d: its settings.transfer is not that of the objects before it", i);
             first = o->model;
         }
         gaussians += (o->model->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
@@ -3894,47 +3873,39 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
 }
 
 static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_light *lights, int light_count) {
-    if (light_count < 0 || (light_count && !lights))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
+    SSDGS__REFUSE(light_count < 0 || (light_count && !lights),
+                  light_count < 0 ? "%d lights" : "%d lights, but the array is NULL", light_count);
     for (int i = 0; i < light_count; i++) {
         const ssdgs_real *cone = lights[i].cone, *along = lights[i].direction;
         const int directional = lights[i].kind == SSDGS_LIGHT_DIRECTIONAL;
         double norm2 = 0, old_norm2 = 0; /* position towards the light was its direction before 0.2.5 */
-        if ((int)lights[i].kind < 0 || lights[i].kind > SSDGS_LIGHT_SPOT)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: kind = %d", i, (int)lights[i].kind);
+        SSDGS__REFUSE((int)lights[i].kind < 0 || lights[i].kind > SSDGS_LIGHT_SPOT, "light %d: kind = %d", i,
+                      (int)lights[i].kind);
         for (int j = 0; j < 3; j++) {
             if (!directional && !ssdgs__finite(lights[i].position[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
-            if (!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]))
-                return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                   "light %d: intensity[%d] = %g is negative or not finite", i, j,
-                                   (double)lights[i].intensity[j]);
+            SSDGS__REFUSE(!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]),
+                          "light %d: intensity[%d] = %g is negative or not finite", i, j,
+                          (double)lights[i].intensity[j]);
             norm2 += (double)along[j] * (double)along[j];
             old_norm2 += (double)lights[i].position[j] * (double)lights[i].position[j];
         }
-        if (directional && !(norm2 > 0) && fabs(old_norm2 - 1) <= 1e-3)
-            return ssdgs__fail(
-                context, SSDGS_ERR_ARGUMENT,
-                "light %d: a directional light shines along `direction`, and its position is not "
-                "read: set direction to (%g, %g, %g), which is -position",
-                i, 0 - (double)lights[i].position[0], 0 - (double)lights[i].position[1],
-                0 - (double)lights[i].position[2]);
-        if ((directional || ssdgs__aimed(lights + i)) && !(fabs(norm2 - 1) <= 1e-3))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: its direction is not a unit vector",
-                               i);
-        if (lights[i].kind == SSDGS_LIGHT_SPOT &&
-            !(cone[0] >= 0 && cone[1] > cone[0] && cone[1] <= (ssdgs_real)3.1416))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                               "light %d: the angles of its cone are %g and %g, where 0 <= first < second <= "
-                               "pi is needed",
-                               i, (double)cone[0], (double)cone[1]);
-        if (!(lights[i].range >= 0) || !ssdgs__finite(lights[i].range))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: range = %g is negative or not finite",
-                               i, (double)lights[i].range);
-        if (!(lights[i].focus >= 0) || lights[i].focus > 1000)
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: focus = %g is not in 0 .. 1000", i,
-                               (double)lights[i].focus);
+        SSDGS__REFUSE(directional && !(norm2 > 0) && fabs(old_norm2 - 1) <= 1e-3,
+                      "light %d: a directional light shines along `direction`, and its position is not "
+                      "read: set direction to (%g, %g, %g), which is -position",
+                      i, 0 - (double)lights[i].position[0], 0 - (double)lights[i].position[1],
+                      0 - (double)lights[i].position[2]);
+        SSDGS__REFUSE((directional || ssdgs__aimed(lights + i)) && !(fabs(norm2 - 1) <= 1e-3),
+                      "light %d: its direction is not a unit vector", i);
+        SSDGS__REFUSE(lights[i].kind == SSDGS_LIGHT_SPOT &&
+                          !(cone[0] >= 0 && cone[1] > cone[0] && cone[1] <= (ssdgs_real)3.1416),
+                      "light %d: the angles of its cone are %g and %g, where 0 <= first < second <= "
+                      "pi is needed",
+                      i, (double)cone[0], (double)cone[1]);
+        SSDGS__REFUSE(!(lights[i].range >= 0) || !ssdgs__finite(lights[i].range),
+                      "light %d: range = %g is negative or not finite", i, (double)lights[i].range);
+        SSDGS__REFUSE(!(lights[i].focus >= 0) || lights[i].focus > 1000,
+                      "light %d: focus = %g is not in 0 .. 1000", i, (double)lights[i].focus);
     }
     return SSDGS_OK;
 }
@@ -4570,9 +4541,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (!result) result = ssdgs__lights_check(context, request->lights, light_count);
     if (result) return result;
     frame->stride = image && image->stride ? image->stride : camera->width;
-    if (frame->stride < camera->width)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "image: stride = %d is below the width of %d",
-                           frame->stride, camera->width);
+    SSDGS__REFUSE(frame->stride < camera->width, "image: stride = %d is below the width of %d", frame->stride,
+                  camera->width);
     frame->scene_depth = image ? image->scene_depth : NULL;
     frame->image = image;
     frame->context = context;
@@ -4584,10 +4554,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->maps = request->maps;
     frame->light_count = request->maps ? light_count : 0;
     frame->training = training;
-    if (training &&
-        ssdgs__has_medium(&request->objects->model->settings, request->objects->model->settings.terms))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "settings: scattering.layers = 0: a medium is not trained");
+    SSDGS__REFUSE(training && ssdgs__has_medium(&request->objects->model->settings,
+                                                request->objects->model->settings.terms),
+                  "settings: scattering.layers = 0: a medium is not trained");
     for (int i = 0; i < 3; i++)
         frame->eye[i] = -(camera->view[i] * camera->view[3] + camera->view[4 + i] * camera->view[7] +
                           camera->view[8 + i] * camera->view[11]);
@@ -7690,12 +7659,10 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     ssdgs_context *context = scene->context;
     const ssdgs__frame_memory *m = scene->frame;
     ssdgs__shadow_job job;
-    if (count < 0 || (count && (!points || !fraction)))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           count < 0 ? "%d points" : "%d points, but an array is NULL", count);
-    if (!m || light < 0 || light >= m->mapped)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "light %d: ssdgs_scene_light() has made no map of it",
-                           light);
+    SSDGS__REFUSE(count < 0 || (count && (!points || !fraction)),
+                  count < 0 ? "%d points" : "%d points, but an array is NULL", count);
+    SSDGS__REFUSE(!m || light < 0 || light >= m->mapped,
+                  "light %d: ssdgs_scene_light() has made no map of it", light);
     const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;
     job.view = (const ssdgs_splat_view *)m->views.memory + own->first;
     job.end = job.view + (own->wanted ? own->views : 0);
@@ -8148,8 +8115,8 @@ static ssdgs_result ssdgs__compare(ssdgs_context *context, const ssdgs_real *ima
     if (!metrics) return ssdgs__null(context, "ssdgs_compare", "metrics");
     memset(metrics, 0, sizeof *metrics);
     if (!image || !reference) return ssdgs__null(context, "ssdgs_compare", image ? "reference" : "image");
-    if (width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "compare: images of %d x %d", width, height);
+    SSDGS__REFUSE(width < 1 || height < 1 || width > SSDGS__MAX_SIDE || height > SSDGS__MAX_SIDE,
+                  "compare: images of %d x %d", width, height);
     const size_t pixels = (size_t)width * (size_t)height;
     ssdgs_result result = ssdgs__reserve(context, &planes, pixels, 6 * sizeof(ssdgs_real));
     ssdgs__loss_values values;
@@ -10410,21 +10377,18 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     const ssdgs_result result =
         ssdgs__numbers_check(context, "train options", ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, o);
     if (result) return result;
-    if (o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
-                       o->batch % o->sum.processes))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "train options: process %d of %d cannot share a batch of %d", o->sum.rank,
-                           o->sum.processes, o->batch);
+    SSDGS__REFUSE(o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
+                                 o->batch % o->sum.processes),
+                  "train options: process %d of %d cannot share a batch of %d", o->sum.rank, o->sum.processes,
+                  o->batch);
     for (int i = 0; i < 3; i++)
-        if (!(o->bounds_min[i] < o->bounds_max[i]))
-            return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                               "train options: bounds_min[%d] = %g is not below bounds_max[%d] = %g", i,
-                               (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
-    if (!(ssdgs__bounds_side(o) >= 2e-15 && ssdgs__bounds_side(o) <= 2e15))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
-                           "2e-15 .. 2e15",
-                           ssdgs__bounds_side(o));
+        SSDGS__REFUSE(!(o->bounds_min[i] < o->bounds_max[i]),
+                      "train options: bounds_min[%d] = %g is not below bounds_max[%d] = %g", i,
+                      (double)o->bounds_min[i], i, (double)o->bounds_max[i]);
+    SSDGS__REFUSE(!(ssdgs__bounds_side(o) >= 2e-15 && ssdgs__bounds_side(o) <= 2e15),
+                  "train options: the longest side of bounds_min .. bounds_max, %g, is not within "
+                  "2e-15 .. 2e15",
+                  ssdgs__bounds_side(o));
     return SSDGS_OK;
 }
 
@@ -10770,16 +10734,11 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     int outlined = 0, empty = 0, dark = 0;
     double shown = 0;
     if (result) return result;
-    if (model->settings.baked)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "a baked model cannot be trained: it has no reflectance");
-    if (ssdgs__has_medium(&model->settings, model->settings.terms))
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           "settings: scattering.layers = 0: a medium is not trained");
-    if (photo_count < 1 || !photos)
-        return ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                           photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL",
-                           photo_count);
+    SSDGS__REFUSE(model->settings.baked, "a baked model cannot be trained: it has no reflectance");
+    SSDGS__REFUSE(ssdgs__has_medium(&model->settings, model->settings.terms),
+                  "settings: scattering.layers = 0: a medium is not trained");
+    SSDGS__REFUSE(photo_count < 1 || !photos,
+                  photo_count < 1 ? "%d photographs" : "%d photographs, but the array is NULL", photo_count);
     for (int i = 0; i < photo_count; i++) {
         result = ssdgs__photo_check(context, photos + i, i, o->background);
         if (result) return result;
