@@ -169,7 +169,9 @@ CHANGES, for programs written for 0.2.4
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
-  >>model >>frame                    parameters and networks; a frame's memory, views and cache
+  >>model >>frame >>camera           parameters and networks; a frame's memory; cameras and lights by values
+  >>objects >>lights >>options       placed models and bounds; views of light maps; presets
+  >>table >>begin                    what kernels need of a light; a frame's beginning, and what it finds kept
   >>project >>shadow >>transport     splats and tiles; visibility from the lights; dipole transport
   >>shade >>composite >>render       colour of the Gaussians seen; blending, highlights; stages in order
   >>scene >>loss >>ply               placed models; loss and metrics; model files
@@ -3144,10 +3146,9 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
     return further > (n - around) / 3;
 }
 
-/* ==== >>frame  memory of a frame, its views, its cache ==== */
+/* ==== >>frame  what a frame has in memory, and what of it stays for the next ==== */
 
-/* Reads model, camera, lights and options. Writes ssdgs_frame, and finds what of the last frame still
-   holds. Called by render and by the trainer. */
+/* Buffers of a model's or a scene's frames, and of a context. >>begin reserves them. */
 
 typedef struct ssdgs__view_memory {
     ssdgs__buffer light_map, map_tile; /* the view's own; the batches share the rest */
@@ -3264,6 +3265,10 @@ SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
     ssdgs__leave_and_drop(from);
     return SSDGS_OK;
 }
+
+/* ==== >>camera  cameras and lights by their values ==== */
+
+/* Reads the caller's values. Writes ssdgs_camera and ssdgs_light; a light map's views look along too. */
 
 /* c = a x b */
 static void ssdgs__cross(const double a[3], const double b[3], double c[3]) {
@@ -3448,7 +3453,10 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
 
 SSDGS__SMALL_END
 
-/* ---- objects: models placed in a frame ---- */
+/* ==== >>objects  placed models: their spaces, checks and bounds ==== */
+
+/* Reads ssdgs_object and raw parameters. Writes bounds of what is drawn. Stages walk objects piece by piece.
+ */
 
 /* From the world to the object's space. */
 static void ssdgs__to_object(const ssdgs_placed *o, const ssdgs_real world[3], ssdgs_real local[3]) {
@@ -3709,6 +3717,10 @@ static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bo
     return ssdgs__scene_bounds(&frame, bounds);
 }
 
+/* ==== >>lights  what a light reaches, and the views of its map ==== */
+
+/* Reads lights and bounds. Writes ssdgs_splat_view. Called by >>begin; stages ask who is in reach. */
+
 static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *variance, int *compensate) {
     *blur = s->light_map.blur;
     *compensate = *blur == SSDGS_BLUR_FLOOR;
@@ -3910,15 +3922,16 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
     return SSDGS_OK;
 }
 
-#define SSDGS__O(member, type, low, high, exact, standard, fast, preview) \
-    { \
-#member, offsetof(ssdgs_render_options, member), 0, type, low, high, { \
-            exact, standard, fast, preview \
-        } \
-    }
+/* ==== >>options  how to render ==== */
+
+/* Presets and their checks, and what settings and options ask of a frame. */
+
 /* clang-format off */
+#define SSDGS__O(member, type, low, high, exact, standard, fast, preview) \
+    {#member, offsetof(ssdgs_render_options, member), 0, type, low, high, {exact, standard, fast, preview}}
 static const ssdgs__number ssdgs__render_numbers[] = {
-    SSDGS__O(terms, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS),
+    SSDGS__O(terms, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS,
+             SSDGS_ALL_TERMS),
     SSDGS__O(antialias, 'i', 0, 1, 0, 0, 0, 0),
     SSDGS__O(stop, 'r', 0, 1, 1e-4, 1.0 / 1024, 1.0 / 256, 1.0 / 64),
     SSDGS__O(alpha_threshold, 'r', 0, 1, 1.0 / 255, 1.0 / 255, 1.0 / 255, 2.0 / 255),
@@ -3988,7 +4001,9 @@ static ssdgs__light_memory *ssdgs__light_memories(const ssdgs_frame *frame) {
     return (ssdgs__light_memory *)frame->memory->lights.memory;
 }
 
-/* ---- the light table: what kernels need of each light, made once a frame ---- */
+/* ==== >>table  what kernels need of each light ==== */
+
+/* Reads objects, lights and the camera. Writes ssdgs__lighting, once a frame. */
 
 /* Raw weights of deferred lobes, within what neither over- nor underflows. */
 static ssdgs_real ssdgs__lobe_raw(ssdgs_real raw) {
@@ -4168,6 +4183,11 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
     }
     return SSDGS_OK;
 }
+
+/* ==== >>begin  objects placed, memory reserved, views and what is there of them ==== */
+
+/* Reads model, camera, lights and options. Writes ssdgs_frame, and finds what of earlier frames still holds.
+   Called by render and by the trainer. */
 
 /* A model where it stands. */
 static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
@@ -4405,8 +4425,7 @@ static int ssdgs__has_ambient(const ssdgs_render_options *options) {
 
 static ssdgs_result ssdgs__expose(ssdgs_placed *o);
 
-/* ---- what earlier frames have found: results have a key of all that they depend on; equal keys, equal
- * results ---- */
+/* ---- what earlier frames have found has a key of all that it depends on; equal keys, equal results ---- */
 
 /* Of what is drawn and where it stands: all objects, or those that `reach` has. */
 static uint64_t ssdgs__objects_key(const ssdgs_frame *frame, const unsigned char *reach) {
@@ -9327,16 +9346,12 @@ enum {
     SSDGS__REFINE_ALL =
         SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT
 };
+/* clang-format off */
 #define SSDGS__O(member, count, type, low, high, standard, published) \
-    { \
-#member, offsetof(ssdgs_train_options, member), count, type, low, high, { \
-            standard, published, 0, 0 \
-        } \
-    }
+    {#member, offsetof(ssdgs_train_options, member), count, type, low, high, {standard, published, 0, 0}}
 #define SSDGS__R(rate, first, last, published_first, published_last) /* a rate */ \
     SSDGS__O(rates.rate.start, 0, 'r', 0, 1e30, first, published_first), \
-        SSDGS__O(rates.rate.end, 0, 'r', 0, 1e30, last, published_last)
-/* clang-format off */
+    SSDGS__O(rates.rate.end, 0, 'r', 0, 1e30, last, published_last)
 static const ssdgs__number ssdgs__train_numbers[] = {
     SSDGS__O(iterations, 0, 'i', 1, 100000000, 20000, 60000),
     SSDGS__O(seed, 0, 'u', 0, 18446744073709551615.0, 1, 1),
